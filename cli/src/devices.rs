@@ -36,10 +36,11 @@ pub type CheckSteps =
 /// Makes of an open device one that takes the steps of a fit.
 pub type TakeSteps = Box<
     dyn FnOnce(
-        &Objective<f32>,
-        &dyn Representation<f32>,
-        &Training,
-    ) -> anyhow::Result<Box<dyn StepDevice<f32>>>,
+            &Objective<f32>,
+            &dyn Representation<f32>,
+            &Training,
+        ) -> anyhow::Result<Box<dyn StepDevice<f32>>>
+        + Send,
 >;
 
 /// An open device for a fit.

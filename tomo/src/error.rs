@@ -4,6 +4,7 @@ use crate::fit::checkpoint::CheckpointError;
 use crate::fit::linear::LinearError;
 use crate::fit::settings::FitError;
 use crate::fit::{DeviceError, Diverged};
+use crate::recovery::Stopped;
 use crate::representation::OwnError;
 use kerrlight_geodesic::Error as OutOfRange;
 use kerrlight_render::Error as RenderError;
@@ -41,6 +42,21 @@ pub enum Error {
     Checkpoint(#[from] CheckpointError),
     /// Reading or writing.
     Io(#[from] std::io::Error),
+    /// A fit that cannot go on, with what is the reason.
+    #[error("{0}")]
+    Failed(String),
+    /// A fit that was told to stop.
+    Stopped(#[from] Stopped),
+    /// What happened in a part of a fit, such as `world.search`.
+    #[error("{part}: {error}")]
+    In {
+        /// The part.
+        part: &'static str,
+        /// What happened.
+        error: Box<Error>,
+    },
+    /// What keeps the results of a fit cannot.
+    Kept(Box<dyn std::error::Error + Send + Sync>),
 }
 
 /// Errors of the crates below, from what their functions return as well as from a single kind.
@@ -89,6 +105,15 @@ impl Error {
         self.parts().3
     }
 
+    /// The same in a part of a fit; what was stopped stays that.
+    #[must_use]
+    pub(crate) fn while_in(self, part: &'static str) -> Self {
+        match self {
+            Self::Stopped(_) => self,
+            error => Self::In { part, error: Box::new(error) },
+        }
+    }
+
     /// The same without its line: of a text that nobody sees, such as one that overrides have changed.
     #[must_use]
     pub fn without_line(self) -> Self {
@@ -103,6 +128,7 @@ impl Error {
             Self::Render(error) => error.parts(),
             Self::Fit(error) => error.parts(),
             Self::Vlbi(error) => (None, None, None, error.line()),
+            Self::In { error, .. } => error.parts(),
             _ => (None, None, None, None),
         }
     }

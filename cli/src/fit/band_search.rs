@@ -1,17 +1,13 @@
 //! Worlds that are weighed by the light curve of a flare in an orbital band, before the emission is fitted.
 
-use super::failed;
 use super::folder::Folder;
-use super::journal::Journal;
-use super::world_search::Placed;
 use crate::checksum::sealed;
-use crate::interrupt::{Interrupted, Keeper};
 use crate::output;
-use crate::progress;
 use anyhow::Context;
 use kerrlight_tomo::fit::band::Interval;
-use kerrlight_tomo::fit::settings::{BandSettings, FitFile};
-use kerrlight_tomo::fit::setup::{self, BandScan, BandWorld, Instrument, Measured};
+use kerrlight_tomo::fit::settings::FitFile;
+use kerrlight_tomo::fit::setup::{BandScan, BandWorld};
+use kerrlight_tomo::recovery::{Choice, Problem};
 use serde_json::{Value, json};
 
 /// What was found, in the folder of the run.
@@ -20,58 +16,28 @@ pub const FILE: &str = "band.json";
 /// Bins of periods.
 const BINS: usize = 24;
 
-/// Finds the world, or reads it where an earlier run has found it; none if it is not asked for.
-pub fn place(
-    file: &FitFile,
-    measured: &Measured,
-    folder: &Folder,
-) -> anyhow::Result<Option<Placed>> {
-    let Some(settings) = &file.band else { return Ok(None) };
-    let path = folder.path().join(FILE);
-    if !path.exists() {
-        let journal = Journal::open(folder)?;
-        let scan = search((file, settings), measured, &journal, &folder.stopped())?;
-        let results = results(&scan, file)?;
-        folder.file(FILE)?.write(sealed(results).as_bytes())?;
-        journal.end();
-    }
-    let damaged = || format!("{} is damaged: remove it to look again", path.display());
-    let results: Value = serde_json::from_str(&output::read_text(&path)?).with_context(damaged)?;
-    sentences(&results).iter().for_each(|line| eprintln!("{line}"));
-    let best = |key: &str| results[key]["best"].as_f64().with_context(damaged);
-    let mut found = setup::in_band_world(file, best("inclination_deg")?);
-    if let Some(law) = &mut found.polarization {
-        law.turn_deg += best("position_angle_deg")?;
-    }
-    let motion = setup::band_motion(&found, measured, best("rotation_factor")?)?;
-    let instrument = Instrument::new(&found)?;
-    let measured = match &results["background_jy"] {
-        Value::Null => None,
-        values => {
-            let values = serde_json::from_value(values.clone()).with_context(damaged)?;
-            Some(measured.before(values))
-        }
-    };
-    Ok(Some(Placed { file: found, instrument, motion, measured }))
+/// Keeps the worlds that were weighed.
+pub fn write(folder: &Folder, problem: &Problem, scan: &BandScan) -> anyhow::Result<()> {
+    folder.file(FILE)?.write(sealed(results(scan, &problem.settings)?).as_bytes())
 }
 
-fn search(
-    (file, settings): (&FitFile, &BandSettings),
-    measured: &Measured,
-    journal: &Journal,
-    stopped: &str,
-) -> anyhow::Result<BandScan> {
-    let keeper = Keeper::brief(stopped);
-    let count = settings.inclinations_deg.values().len() * settings.rotation_factors.len();
-    let bar = progress::worlds(count as u64);
-    let watch = |_: usize| {
-        bar.inc(1);
-        !keeper.stopped()
+/// The world that a run has found, which is told; none if it has not looked.
+pub fn chosen(folder: &Folder) -> anyhow::Result<Option<Choice>> {
+    let path = folder.path().join(FILE);
+    let damaged = || format!("{} is damaged: remove it to look again", path.display());
+    let Some(results) = found(folder).with_context(damaged)? else { return Ok(None) };
+    sentences(&results).iter().for_each(|line| eprintln!("{line}"));
+    let best = |key: &str| results[key]["best"].as_f64().with_context(damaged);
+    let background = match &results["background_jy"] {
+        Value::Null => None,
+        values => Some(serde_json::from_value(values.clone()).with_context(damaged)?),
     };
-    let scan = setup::scan_band(file, measured, settings, journal, &watch)
-        .map_err(|error| failed::linear(error).context("band"))?;
-    bar.finish_and_clear();
-    scan.ok_or_else(|| Interrupted(stopped.to_owned()).into())
+    Ok(Some(Choice::Band {
+        inclination_deg: best("inclination_deg")?,
+        position_angle_deg: best("position_angle_deg")?,
+        rotation_factor: best("rotation_factor")?,
+        background,
+    }))
 }
 
 /// Shares of the probability of values, in their order.

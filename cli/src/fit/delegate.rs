@@ -4,7 +4,7 @@ use super::folder::Folder;
 use crate::devices::FitDevice;
 use anyhow::anyhow;
 use kerrlight_tomo::fit::settings::FitFile;
-use kerrlight_tomo::fit::{Delegate, DeviceError, Trainer};
+use kerrlight_tomo::fit::{Delegate, DeviceError, Trainer, checkpoint};
 
 /// The device, ready for this fit; says what it does.
 pub fn delegate(
@@ -27,7 +27,10 @@ pub fn delegate(
 }
 
 /// What is told when a device fails, after the checkpoint.
-pub fn failed(error: DeviceError, step: u64, folder: &Folder) -> anyhow::Error {
+pub fn failed(error: DeviceError, folder: &Folder) -> anyhow::Error {
+    let header = |bytes: Vec<u8>| checkpoint::header(&bytes).ok();
+    let kept = folder.checkpoint().ok().flatten().and_then(header);
+    let step = kept.map_or(0, |header| header.step);
     anyhow!("{error}; step {step} is kept; {}", elsewhere(folder))
 }
 

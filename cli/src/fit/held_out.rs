@@ -1,54 +1,34 @@
 //! A weight of the linear problem that is chosen by frames or baselines that are held out.
 
-use super::failed;
 use super::folder::Folder;
-use super::journal::Journal;
 use crate::checksum::sealed;
-use crate::interrupt::{Interrupted, Keeper};
 use crate::output;
-use crate::progress;
 use crate::report::{Axis, LinePlot, Marks, Series};
 use anyhow::Context;
-use kerrlight_render::dynamics;
-use kerrlight_tomo::fit::settings::{FitFile, HeldOutSettings, Kind};
-use kerrlight_tomo::fit::setup::{self, Held, HeldData};
+use kerrlight_tomo::fit::settings::{FitFile, HeldOutSettings};
+use kerrlight_tomo::fit::setup::{self, Held};
+use kerrlight_tomo::recovery::Choice;
 use serde_json::{Value, json};
 
 /// What was found, in the folder of the run.
 const FILE: &str = "held_out.json";
 
-/// The settings with the weight that held-out frames choose, or have chosen in an earlier run.
-pub fn place(
-    file: &FitFile,
-    folder: &Folder,
-    data: HeldData<'_>,
-    about: (dynamics::Axis, [f64; 2]),
-) -> anyhow::Result<FitFile> {
-    let Some(settings) = &file.held_out else { return Ok(file.clone()) };
-    if found(folder)?.is_none() {
-        let journal = Journal::open(folder)?;
-        let held = compare((file, settings), data, about, (&journal, &folder.stopped()))?;
-        folder.file(FILE)?.write(sealed(results(settings, &held)).as_bytes())?;
-        journal.end();
-    }
-    for line in found(folder)?.iter().filter_map(sentence) {
-        eprintln!("{line}");
-    }
-    settled(file, folder)
+/// Keeps the values that were compared.
+pub fn write(folder: &Folder, file: &FitFile, held: &[Held]) -> anyhow::Result<()> {
+    let Some(settings) = &file.held_out else { return Ok(()) };
+    folder.file(FILE)?.write(sealed(results(settings, held)).as_bytes())
 }
 
-/// The same for a representation that is learnt in steps, whose price of change is part of every step. What a linear grid
-/// chooses is chosen where it is solved.
-pub fn before_steps(
-    file: &FitFile,
-    folder: &Folder,
-    data: HeldData<'_>,
-    about: (dynamics::Axis, [f64; 2]),
-) -> anyhow::Result<FitFile> {
-    match file.representation.kind {
-        Kind::LinearGrid => Ok(file.clone()),
-        _ => place(file, folder, data, about),
-    }
+/// The weight that a run has chosen, which is told; none if it has not.
+pub fn chosen(folder: &Folder) -> anyhow::Result<Option<Choice>> {
+    let Some(results) = found(folder)? else { return Ok(None) };
+    sentence(&results).iter().for_each(|line| eprintln!("{line}"));
+    Ok(Some(Choice::Weight(weight(&results)?)))
+}
+
+fn weight(results: &Value) -> anyhow::Result<f64> {
+    let chosen = results["chosen"].as_f64();
+    chosen.with_context(|| format!("{FILE} is damaged: remove it to look again"))
 }
 
 /// The settings with the weight that a run has chosen.
@@ -56,28 +36,7 @@ pub fn settled(file: &FitFile, folder: &Folder) -> anyhow::Result<FitFile> {
     let (Some(settings), Some(results)) = (&file.held_out, found(folder)?) else {
         return Ok(file.clone());
     };
-    let chosen = results["chosen"].as_f64();
-    let chosen = chosen.with_context(|| format!("{FILE} is damaged: remove it to look again"))?;
-    Ok(settings.setting.put(file.clone(), chosen))
-}
-
-fn compare(
-    (file, settings): (&FitFile, &HeldOutSettings),
-    data: HeldData<'_>,
-    about: (dynamics::Axis, [f64; 2]),
-    (journal, stopped): (&Journal, &str),
-) -> anyhow::Result<Vec<Held>> {
-    let keeper = Keeper::brief(stopped);
-    let bar = progress::held_out((settings.values.len() * settings.folds) as u64);
-    let mut watch = |value: usize, fold: usize| {
-        bar.set_position((fold * settings.values.len() + value) as u64);
-        bar.set_message(format!("{} = {}", settings.setting.name(), settings.values[value]));
-        !keeper.stopped()
-    };
-    let held = setup::hold_out(file, settings, data, about, journal, &mut watch)
-        .map_err(|error| failed::linear(error).context("held_out"))?;
-    bar.finish_and_clear();
-    held.ok_or_else(|| Interrupted(stopped.to_owned()).into())
+    Ok(settings.setting.put(file.clone(), weight(&results)?))
 }
 
 fn results(settings: &HeldOutSettings, held: &[Held]) -> Value {

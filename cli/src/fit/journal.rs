@@ -52,10 +52,9 @@ impl Journal {
     }
 
     /// Ends a search whose result is kept: its file is removed.
-    pub fn end(self) {
-        drop(self.file);
+    pub fn remove(folder: &Folder) {
         // What is left behind is found by the next search and does no harm.
-        let _ = std::fs::remove_file(self.path);
+        let _ = std::fs::remove_file(folder.path().join(FILE));
     }
 }
 
@@ -115,8 +114,6 @@ mod tests {
         cut.keep(8, &[2.0]);
         let whole = Journal::at(&path).unwrap();
         assert_eq!((whole.known.len(), whole.recall(8)), (3, Some(vec![2.0])));
-        whole.end();
-        assert!(!path.exists());
         // Those of another version are not used.
         std::fs::write(&path, text.replace("kerrlight", "kerrdark")).unwrap();
         assert_eq!(Journal::at(&path).unwrap().known.len(), 0);

@@ -1,44 +1,9 @@
-//! What linear grids do for a fit: they are solved, and started from.
+//! What is said of linear grids, which are solved or started from.
 
-use super::failed;
-use crate::interrupt::{Interrupted, Keeper};
-use crate::progress;
-use anyhow::Context;
-use kerrlight_render::dynamics::Axis;
-use kerrlight_tomo::fit::linear::{Change, Ending, LinearProgress, LinearSolution};
+use kerrlight_tomo::fit::linear::{Ending, LinearSolution};
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
 use kerrlight_tomo::fit::setup::Imprinted;
-use kerrlight_tomo::fit::{Objective, setup};
 use serde_json::{Value, json};
-use std::ops::ControlFlow;
-
-/// The grid of `nodes` along each axis that fits every `stride`-th frame best.
-pub fn solve(
-    file: &FitFile,
-    objective: &mut Objective<f32>,
-    (axis, change): (Axis, Change),
-    (nodes, stride): (usize, usize),
-) -> anyhow::Result<LinearSolution<f32>> {
-    let (keeper, bar) = (Keeper::brief(STOPPED), progress::waiting("linear grid"));
-    let mut watch = |now: &LinearProgress<'_>| {
-        bar.set_message(format!(
-            "round {}, {} evaluations, {} nodes, loss {:.4e}",
-            now.round, now.evaluations, now.nodes, now.value
-        ));
-        bar.tick();
-        if keeper.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    };
-    let solution =
-        setup::solve_linear(file, objective, (axis, change), (nodes, stride), &mut watch);
-    let solution = solution.map_err(failed::linear).context("linear")?;
-    bar.finish_and_clear();
-    if solution.ending == Ending::Cancelled {
-        return Err(Interrupted(STOPPED.to_owned()).into());
-    }
-    Ok(solution)
-}
-
-const STOPPED: &str = "stopped while the linear grid was being solved: nothing is kept of that";
 
 /// A line of the log.
 pub fn solved(solution: &LinearSolution<f32>) -> Value {

@@ -140,7 +140,7 @@ impl Fit {
     /// The fit, and the draws that are wanted after it.
     fn run_all(
         &self,
-        work: &Prepared<'_>,
+        work: &Prepared,
         text: &str,
         (folder, resume): (&Folder, bool),
         device: Option<FitDevice>,

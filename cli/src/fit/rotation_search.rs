@@ -1,69 +1,30 @@
 //! A rotation of all position angles that is looked for before the emission is fitted.
 
-use super::failed;
 use super::folder::Folder;
-use super::world_search::Placed;
 use crate::checksum::sealed;
-use crate::interrupt::{Interrupted, Keeper};
 use crate::output;
-use crate::progress;
 use crate::report::{Axis, LinePlot, Marks, Series};
 use anyhow::Context;
-use kerrlight_tomo::fit::Objective;
-use kerrlight_tomo::fit::settings::{FaradaySettings, FitFile};
-use kerrlight_tomo::fit::setup::{self, Instrument, Measured, Rotation};
+use kerrlight_tomo::fit::settings::FitFile;
+use kerrlight_tomo::fit::setup::Rotation;
+use kerrlight_tomo::recovery::{Choice, Problem};
 use serde_json::{Value, json};
 
 /// What was found, in the folder of the run.
 pub const FILE: &str = "faraday.json";
 
-const STOPPED: &str = "stopped while rotations were compared: nothing is kept of that";
-
-/// Finds the rotation, or reads it where an earlier run has found it; none if it is not asked for.
-pub fn place(
-    file: &FitFile,
-    (instrument, measured): (&Instrument, &Measured),
-    folder: &Folder,
-) -> anyhow::Result<Option<Placed>> {
-    let Some(settings) = &file.faraday else { return Ok(None) };
-    let motion = setup::motion(file, measured.times.clone())?;
-    if found(folder)?.is_none() {
-        let pixels = file.screen.pixels * file.screen.pixels;
-        let data = measured.terms(&file.loss, pixels)?;
-        let objective = Objective { model: setup::forward_model(instrument, &motion)?, data };
-        let rotation = search((file, settings), objective, instrument)?;
-        folder.file(FILE)?.write(sealed(results(&rotation, file)?).as_bytes())?;
-    }
-    let damaged = || format!("{FILE} is damaged: remove it to look again");
-    let results = found(folder)?.with_context(damaged)?;
-    sentences(&results).iter().for_each(|line| eprintln!("{line}"));
-    let angle = results["angle_deg"].as_f64().with_context(damaged)?;
-    let mut found = file.clone();
-    if let Some(law) = &mut found.polarization {
-        law.turn_deg += angle;
-    }
-    let instrument = Instrument::new(&found)?;
-    Ok(Some(Placed { file: found, instrument, motion, measured: None }))
+/// Keeps the rotations that were compared.
+pub fn write(folder: &Folder, problem: &Problem, rotation: &Rotation) -> anyhow::Result<()> {
+    folder.file(FILE)?.write(sealed(results(rotation, &problem.settings)?).as_bytes())
 }
 
-fn search(
-    asked: (&FitFile, &FaradaySettings),
-    mut objective: Objective<f32>,
-    instrument: &Instrument,
-) -> anyhow::Result<Rotation> {
-    let keeper = Keeper::brief(STOPPED);
-    let (axis, _) = setup::axis(asked.0)?;
-    objective.model.weigh(axis);
-    let bar = progress::rotations(asked.1.angles as u64);
-    let mut watch = |done: usize, of: usize| {
-        bar.set_length(of as u64);
-        bar.set_position(done as u64);
-        !keeper.stopped()
-    };
-    let found = setup::find_rotation(asked, &objective, (axis, &instrument.seen), &mut watch)
-        .map_err(|error| failed::linear(error).context("faraday"))?;
-    bar.finish_and_clear();
-    found.ok_or_else(|| Interrupted(STOPPED.to_owned()).into())
+/// The rotation that a run has found, which is told; none if it has not looked.
+pub fn chosen(folder: &Folder) -> anyhow::Result<Option<Choice>> {
+    let Some(results) = found(folder)? else { return Ok(None) };
+    sentences(&results).iter().for_each(|line| eprintln!("{line}"));
+    let angle = results["angle_deg"].as_f64();
+    let angle = angle.with_context(|| format!("{FILE} is damaged: remove it to look again"))?;
+    Ok(Some(Choice::Rotation(angle)))
 }
 
 fn results(rotation: &Rotation, file: &FitFile) -> anyhow::Result<Value> {

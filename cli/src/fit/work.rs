@@ -8,6 +8,7 @@ use crate::devices::FitDevice;
 use anyhow::{Context, bail};
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{FitError, FitFile, StaticImageFile};
+use kerrlight_tomo::recovery::Problem;
 use kerrlight_tomo::representation::Registry;
 use std::path::Path;
 
@@ -21,14 +22,14 @@ pub enum Work {
 }
 
 /// The same with its data, and all that can be found wrong found.
-pub enum Prepared<'a> {
+pub enum Prepared {
     /// Emission around a hole.
-    Emission(Box<run::Prepared<'a>>),
+    Emission(Box<Problem>),
     /// A static image.
     Image(Box<static_image::Prepared>),
 }
 
-impl Prepared<'_> {
+impl Prepared {
     /// Refuses a device that does not do this fit, before anything is written.
     pub fn check_device(&self, device: Option<&FitDevice>) -> anyhow::Result<()> {
         let Some((check, _)) = device else { return Ok(()) };
@@ -36,7 +37,7 @@ impl Prepared<'_> {
             Prepared::Image(_) => {
                 bail!("--device: a static image is fitted on the processor; leave it out")
             }
-            Prepared::Emission(prepared) => prepared.check_device(*check).context("--device"),
+            Prepared::Emission(prepared) => run::check_device(prepared, *check).context("--device"),
         }
     }
 }
@@ -55,15 +56,10 @@ impl Work {
     }
 
     /// With its data, whose relative paths start from `base_dir`.
-    pub fn prepared<'a>(
-        self,
-        base_dir: &Path,
-        registry: &'a Registry,
-    ) -> anyhow::Result<Prepared<'a>> {
+    pub fn prepared(self, base_dir: &Path, registry: &Registry) -> anyhow::Result<Prepared> {
         Ok(match self {
             Work::Emission(file) => {
-                let prepared = run::Prepared::new(*file, base_dir, registry)?;
-                Prepared::Emission(Box::new(prepared))
+                Prepared::Emission(Box::new(run::problem(*file, base_dir, registry)?))
             }
             Work::Image(file) => {
                 Prepared::Image(Box::new(static_image::Prepared::new(*file, base_dir)?))

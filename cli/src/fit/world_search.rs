@@ -1,140 +1,71 @@
 //! A world that is not known: it is found before the emission is fitted in it.
 
 use super::folder::Folder;
-use super::journal::Journal;
-use super::{failed, world_results, world_scan};
+use super::{world_results, world_scan};
 use crate::checksum::sealed;
-use crate::interrupt::{Interrupted, Keeper};
 use crate::output;
-use crate::progress;
 use anyhow::{Context, bail};
-use kerrlight_render::dynamics::Velocity;
-use kerrlight_tomo::fit::Motion;
 use kerrlight_tomo::fit::settings::{FitFile, Region, UnknownWorld};
-use kerrlight_tomo::fit::setup::{self, FoundWorld, Instrument, Measured, Trial};
+use kerrlight_tomo::fit::setup::{self, FoundWorld, Measured, Trial};
 use kerrlight_tomo::fit::world::{Free, Parameter, Span, Spread, World};
+use kerrlight_tomo::recovery::{Choice, Problem, settled};
 use serde_json::{Map, Value, json};
 
 /// What was found, in the folder of the run.
 pub const FILE: &str = "world.json";
 
-/// Settings, rays and motion in the world that was found.
-pub struct Placed {
-    /// Settings with its spin, inclination and power of g.
-    pub file: FitFile,
-    /// Rays.
-    pub instrument: Instrument,
-    /// Motion.
-    pub motion: Motion,
-    /// The data, where they are not those that were read.
-    pub measured: Option<Measured>,
-}
-
-/// Finds the world of a fit, or reads it where an earlier run has found it; none if it is known.
-pub fn place(
-    file: &FitFile,
-    instrument: &Instrument,
-    measured: &Measured,
+/// Keeps what a search has found.
+pub fn write(
     folder: &Folder,
-) -> anyhow::Result<Option<Placed>> {
-    let Some(unknown) = file.unknown_world()? else { return Ok(None) };
-    let path = folder.path().join(FILE);
-    if !path.exists() {
-        let journal = Journal::open(folder)?;
-        let found = search((file, &unknown), measured, &journal, &folder.stopped())?;
-        if let Some(scan) = &found.scan {
-            let truth = true_world(file, measured)?;
-            world_scan::write(folder, scan, truth.as_ref())?;
-        }
-        let results = results(file, measured, &unknown, &found)?;
-        folder.file(FILE)?.write(sealed(results).as_bytes())?;
-        journal.end();
+    problem: &Problem,
+    unknown: &UnknownWorld,
+    found: &FoundWorld,
+) -> anyhow::Result<()> {
+    let Problem { settings, measured, .. } = problem;
+    if let Some(scan) = &found.scan {
+        let truth = true_world(settings, measured)?;
+        world_scan::write(folder, scan, truth.as_ref())?;
     }
-    // Read in any case, so that a run that goes on has the same bits.
-    let results: Value = serde_json::from_str(&output::read_text(&path)?)
-        .with_context(|| format!("{} is damaged: remove it to look again", path.display()))?;
-    for line in world_results::lines(&results) {
-        eprintln!("{line}");
-    }
-    let world = world_of(file, &unknown.free()?, &results)
-        .with_context(|| format!("{} is damaged: remove it to look again", path.display()))?;
-    Ok(Some(placed(file, &unknown, instrument, measured, &world, 0)?))
+    let results = results(settings, measured, unknown, found)?;
+    folder.file(FILE)?.write(sealed(results).as_bytes())
 }
 
-/// Settings, rays (those of this number near the critical curve) and motion in a world.
-pub fn placed(
-    file: &FitFile,
-    unknown: &UnknownWorld,
-    instrument: &Instrument,
-    measured: &Measured,
-    world: &World,
-    rays: u64,
-) -> anyhow::Result<Placed> {
-    let (instrument, motion) = setup::in_world(file, unknown, instrument, measured, world, rays)?;
-    Ok(Placed { file: settled(file, unknown, world), instrument, motion, measured: None })
+/// The world that a run has found, which is told; none if it has not looked.
+pub fn chosen(folder: &Folder, file: &FitFile) -> anyhow::Result<Option<Choice>> {
+    let path = folder.path().join(FILE);
+    let damaged = || format!("{} is damaged: remove it to look again", path.display());
+    let Some(results) = found(folder).with_context(damaged)? else { return Ok(None) };
+    let Some(unknown) = file.unknown_world()? else { return Ok(None) };
+    world_results::lines(&results).iter().for_each(|line| eprintln!("{line}"));
+    let world = world_of(file, &unknown.free()?, &results).with_context(damaged)?;
+    Ok(Some(Choice::World(world)))
+}
+
+/// Worlds of one of the coarse searches at most.
+pub fn each(file: &FitFile) -> anyhow::Result<usize> {
+    Ok(searches(file)?[1])
+}
+
+/// Worlds of all searches at most.
+pub fn planned(file: &FitFile) -> anyhow::Result<u64> {
+    let [searches, each, fine] = searches(file)?;
+    Ok((searches * each + fine) as u64)
+}
+
+/// Coarse searches, worlds of each, and worlds of the fine one.
+fn searches(file: &FitFile) -> anyhow::Result<[usize; 3]> {
+    let Some(unknown) = file.unknown_world()? else { return Ok([0; 3]) };
+    let (search, scanned) = (&unknown.search, unknown.scanned());
+    let [count, each] = match scanned.is_empty() {
+        true => [search.starts, search.coarse.worlds],
+        false => [1, scanned.iter().map(|scanned| scanned.values.len()).product()],
+    };
+    Ok([count, each, search.fine.worlds])
 }
 
 /// Names and values of the free parameters of a world, in their units.
 pub fn values_of(free: &[Free], world: &World) -> Value {
     Value::Object(values(free, |_, parameter| Some(world.get(parameter))))
-}
-
-fn search(
-    (file, unknown): (&FitFile, &UnknownWorld),
-    measured: &Measured,
-    journal: &Journal,
-    stopped: &str,
-) -> anyhow::Result<FoundWorld> {
-    let keeper = Keeper::brief(stopped);
-    let search = &unknown.search;
-    let scanned = unknown.scanned();
-    let (searches, each) = match scanned.is_empty() {
-        true => (search.starts, search.coarse.worlds),
-        false => (1, scanned.iter().map(|scanned| scanned.values.len()).product()),
-    };
-    let bar = progress::worlds((searches * each + search.fine.worlds) as u64);
-    let mut watch = |(k, count): (usize, usize), worlds: usize, best: f64| {
-        bar.set_position((k * each + worlds) as u64);
-        bar.set_message(format!("search {} of {count}, least chi2/2 {best:.5e}", k + 1));
-        !keeper.stopped()
-    };
-    let found = setup::find_world(file, measured, unknown, journal, &mut watch)
-        .map_err(|error| failed::linear(error).context("world.search"))?;
-    bar.finish_and_clear();
-    found.ok_or_else(|| Interrupted(stopped.to_owned()).into())
-}
-
-/// The settings with what was found in place of what was assumed.
-fn settled(file: &FitFile, unknown: &UnknownWorld, world: &World) -> FitFile {
-    let mut file = file.clone();
-    file.hole.spin = world.get(Parameter::Spin);
-    file.observer.inclination_deg = world.get(Parameter::Inclination).to_degrees();
-    if let Some(power) = &mut file.effects.redshift_power {
-        *power = world.get(Parameter::RedshiftPower);
-    }
-    let follows = unknown.search.drag_is_spin;
-    match &mut file.motion.velocity {
-        // That of the hole that was found.
-        Velocity::Keplerian { drag } if follows => *drag = None,
-        Velocity::Infall { xi, beta_r, beta_phi, drag } => {
-            for (number, parameter) in [xi, beta_r, beta_phi].into_iter().zip(Parameter::FLOW) {
-                *number = world.get(parameter);
-            }
-            if follows {
-                *drag = None;
-            }
-        }
-        Velocity::Profile { angular, radial, .. } if unknown.knots > 0 => {
-            let times = |values: &mut [f64], of: fn(u8) -> Parameter| {
-                let factors = (0..).map(|knot| world.get(of(knot)));
-                values.iter_mut().zip(factors).for_each(|(value, factor)| *value *= factor);
-            };
-            times(angular, Parameter::Angular);
-            times(radial, Parameter::Radial);
-        }
-        _ => {}
-    }
-    file
 }
 
 /// Names and values of the free parameters, in their units.

@@ -62,7 +62,7 @@ fn settings() -> String {
 #[test]
 fn exact_a_lost_device_leaves_a_checkpoint_that_the_processor_takes_up() {
     let (text, registry) = (settings(), Registry::default());
-    let prepared = run::Prepared::new(parse(&text).unwrap(), Path::new("."), &registry).unwrap();
+    let prepared = run::problem(parse(&text).unwrap(), Path::new("."), &registry).unwrap();
     let at = tempfile::tempdir().unwrap();
     let folder =
         Folder::create(&at.path().join("run"), &text, Inputs::new(&text, Vec::new())).unwrap();

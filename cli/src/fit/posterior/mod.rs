@@ -8,7 +8,7 @@ mod summary;
 
 use super::folder::Folder;
 use super::held_out;
-use super::run::{Placed, Prepared};
+use super::run;
 use super::world_search;
 use crate::answer::Answer;
 use crate::checksum::{is_whole, sealed};
@@ -21,6 +21,7 @@ use indicatif::ProgressBar;
 use kerrlight_render::volume::{Volume, VolumeFile};
 use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, UnknownWorld};
 use kerrlight_tomo::fit::setup::WorldPosterior;
+use kerrlight_tomo::recovery::{Placed, Problem};
 use kerrlight_tomo::representation::Registry;
 use sample::{Drawn, Through};
 use serde_json::{Value, json};
@@ -61,7 +62,7 @@ impl Posterior {
         draw(&prepared, &folder, self.samples.unwrap_or(2))
     }
 
-    fn prepared<'a>(&self, text: &str, registry: &'a Registry) -> anyhow::Result<Prepared<'a>> {
+    fn prepared(&self, text: &str, registry: &Registry) -> anyhow::Result<Problem> {
         if !self.run.join("results.json").is_file() {
             let run = self.run.display();
             bail!(
@@ -69,7 +70,7 @@ impl Posterior {
             );
         }
         let file = super::parse(text).with_context(|| self.run.display().to_string())?;
-        Prepared::new(file, &super::base_dir_of(text), registry)
+        run::problem(file, &super::base_dir_of(text), registry)
     }
 
     /// Draws some, each a file of its own, and adds nothing up. Others may draw around the same run: a draw is the same
@@ -77,8 +78,8 @@ impl Posterior {
     fn some(&self, registry: &Registry, numbers: RangeInclusive<u32>) -> anyhow::Result<Answer> {
         let (folder, text) = Folder::look(&self.run)?;
         let prepared = self.prepared(&text, registry)?;
-        check(&prepared.file)?;
-        let unknown = prepared.file.unknown_world()?;
+        check(&prepared.settings)?;
+        let unknown = prepared.settings.unknown_world()?;
         let path = folder.path().join(FOLDER);
         std::fs::create_dir_all(&path)
             .with_context(|| format!("cannot make {}", path.display()))?;
@@ -140,12 +141,12 @@ pub fn check(file: &FitFile) -> anyhow::Result<()> {
 }
 
 /// Draws so many times, those that are there included, and writes what follows.
-pub fn draw(prepared: &Prepared<'_>, folder: &Folder, samples: u32) -> anyhow::Result<Answer> {
-    check(&prepared.file)?;
+pub fn draw(prepared: &Problem, folder: &Folder, samples: u32) -> anyhow::Result<Answer> {
+    check(&prepared.settings)?;
     let recorder = Recorder::of_process();
     let path = folder.path().join(FOLDER);
     std::fs::create_dir_all(&path).with_context(|| format!("cannot make {}", path.display()))?;
-    let unknown = prepared.file.unknown_world()?;
+    let unknown = prepared.settings.unknown_world()?;
     let drawing = Drawing::new(prepared, folder, (unknown.as_ref(), samples), &path)?;
     let bar = progress::samples(u64::from(samples));
     let keeper = Keeper::brief(format!("stopping; resume with: {}", again(folder, samples)));
@@ -168,15 +169,15 @@ pub fn draw(prepared: &Prepared<'_>, folder: &Folder, samples: u32) -> anyhow::R
 
 /// Writes what follows from draws.
 fn add_up(
-    prepared: &Prepared<'_>,
+    prepared: &Problem,
     folder: &Folder,
     path: &Path,
     all: &[Kept],
 ) -> anyhow::Result<Answer> {
     let world = world_search::found(folder)?;
     let truth = prepared.measured.truth.as_ref();
-    let truth = truth.map(|t| super::results::true_volume(&prepared.file, t)).transpose()?;
-    let found = summary::Summary::new(&prepared.file, world.as_ref(), all, truth)?;
+    let truth = truth.map(|t| super::results::true_volume(&prepared.settings, t)).transpose()?;
+    let found = summary::Summary::new(&prepared.settings, world.as_ref(), all, truth)?;
     page::write(&found, prepared, (folder, path))?;
     let numbers = found.numbers();
     output::Output::new(&path.join(NUMBERS), "")?.write(sealed(numbers.clone()).as_bytes())?;
@@ -192,24 +193,24 @@ fn again(folder: &Folder, samples: u32) -> String {
 
 /// Worlds about the one that the run has found.
 fn worlds<'a>(
-    prepared: &'a Prepared<'_>,
+    prepared: &'a Problem,
     unknown: &'a UnknownWorld,
     (folder, world): (&Folder, &Value),
 ) -> anyhow::Result<WorldPosterior<'a>> {
     let free = unknown.free()?;
-    let best = world_search::world_of(&prepared.file, &free, world)?;
+    let best = world_search::world_of(&prepared.settings, &free, world)?;
     let noise = world["noise_factor"].as_f64().unwrap_or(1.0);
     let is_finer = unknown.search.finest.is_some();
-    if prepared.file.change.is_some() || is_finer {
+    if prepared.settings.change.is_some() || is_finer {
         let spread = world_search::spread_of(&free, best, world)?;
-        let about = (&prepared.file, &prepared.measured);
+        let about = (&prepared.settings, &prepared.measured);
         // Residuals at the end of the finer steps, but no less than the errors that these assumed.
         let left = world["chi2_per_datum"].as_f64().unwrap_or(1.0);
         let factor = if is_finer { noise.max(left.sqrt()) } else { noise_of(folder)? };
         return Ok(WorldPosterior::around(about, unknown, (best, &spread), factor)?);
     }
     eprintln!("the best world, once more");
-    let (file, measured) = (&prepared.file, &prepared.measured);
+    let (file, measured) = (&prepared.settings, &prepared.measured);
     Ok(WorldPosterior::new(file, measured, unknown, (best, noise))?)
 }
 
@@ -223,7 +224,7 @@ fn noise_of(folder: &Folder) -> anyhow::Result<f64> {
 
 /// What draws are made of.
 struct Drawing<'a> {
-    prepared: &'a Prepared<'a>,
+    prepared: &'a Problem,
     /// Settings, with what the run has chosen.
     file: FitFile,
     unknown: Option<&'a UnknownWorld>,
@@ -235,7 +236,7 @@ struct Drawing<'a> {
 impl<'a> Drawing<'a> {
     /// Of draws around the run in `folder`, of which there are to be so many in `path`.
     fn new(
-        prepared: &'a Prepared<'a>,
+        prepared: &'a Problem,
         folder: &Folder,
         (unknown, samples): (Option<&'a UnknownWorld>, u32),
         path: &Path,
@@ -252,7 +253,7 @@ impl<'a> Drawing<'a> {
             Some(worlds) => worlds.factor(),
             None => noise_of(folder)?,
         };
-        let file = held_out::settled(&prepared.file, folder)?;
+        let file = held_out::settled(&prepared.settings, folder)?;
         Ok(Self { prepared, file, unknown, worlds, factor })
     }
 
@@ -278,7 +279,7 @@ impl<'a> Drawing<'a> {
         keeper: &Keeper,
         told: &dyn Fn(&str),
     ) -> anyhow::Result<Option<(Drawn, Value)>> {
-        let Prepared { instrument, measured, motion, registry, .. } = self.prepared;
+        let Problem { instrument, measured, motion, registry, .. } = self.prepared;
         let mut file = self.file.clone();
         file.seed = file.seed.wrapping_add(number);
         let has_prior = file.linear.as_ref().is_some_and(|linear| linear.prior.is_some());
@@ -297,7 +298,7 @@ impl<'a> Drawing<'a> {
         let data = worlds.data(noise)?;
         let world = worlds.draw(number);
         let Placed { file, instrument, motion, .. } =
-            world_search::placed(&file, unknown, instrument, measured, &world, number)?;
+            Placed::in_world(self.prepared, &file, (unknown, &world, number))?;
         let through =
             Through { file: &file, instrument: &instrument, motion: &motion, registry, measured };
         let drawn = sample::draw(&through, &data, keeper, told)?;

@@ -2,7 +2,6 @@
 
 use super::super::folder::Folder;
 use super::super::results::stores;
-use super::super::run::Prepared;
 use super::PAGE;
 use super::predictive;
 use super::summary::{Interval, Summary};
@@ -11,13 +10,14 @@ use crate::report::{self, Drawing, Report, Triangle, Variable};
 use kerrlight_render::volume::ranks::Ranks;
 use kerrlight_render::volume::slices::{Outlines, Through};
 use kerrlight_render::volume::{Shown, Volume, VolumeFile, vti};
+use kerrlight_tomo::recovery::Problem;
 use std::path::Path;
 
 /// Writes mean.npz, deviation.npz, posterior.vti, posterior.zarr, worlds.csv, triangle.svg and the page of draws about the
 /// run in `run`.
 pub fn write(
     found: &Summary,
-    prepared: &Prepared<'_>,
+    prepared: &Problem,
     (run, folder): (&Folder, &Path),
 ) -> anyhow::Result<()> {
     let file = |name: &str| Output::new(&folder.join(name), "");
@@ -44,7 +44,7 @@ pub fn write(
     }
     let hole_radius = prepared.instrument.hole.horizon();
     let report = Report {
-        title: format!("{}: how sure", prepared.file.title),
+        title: format!("{}: how sure", prepared.settings.title),
         summary: found.sentences(),
         details: details(found),
         figures: figures(found, &noise, hole_radius)?,

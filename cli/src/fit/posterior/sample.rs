@@ -122,7 +122,7 @@ fn begin(
     let grid = (nodes, stride, Some(prior_seed(file)));
     let about = (state.now.axis, change);
     let solution = setup::draw_linear(file, &mut trainer.objective, about, grid, &mut watch);
-    let solution = solution.map_err(failed::linear).context("linear")?;
+    let solution = solution.map_err(failed::failed).context("linear")?;
     if keeper.stopped() {
         return Ok(false);
     }

@@ -4,40 +4,13 @@ use super::Estimate;
 use crate::fit::band_plots;
 use crate::report::{Axis, LinePlot, Marks, Series};
 use kerrlight_common::frames::Frames;
-use kerrlight_tomo::fit::{Batch, FrameTerm, Seen, State, Trainer};
-use kerrlight_tomo::representation::Workspace;
+use kerrlight_tomo::fit::FrameTerm;
 use std::fmt::Write;
 
 /// The table of data and model.
 pub const TABLE: &str = "light_curve.csv";
 
 impl Estimate<'_> {
-    /// Images of all frames, whatever data see of them.
-    pub fn pictured(
-        &self,
-        trainer: &Trainer<'_, f32>,
-        state: &State<f32>,
-        seen: &Frames<f32>,
-    ) -> anyhow::Result<Frames<f32>> {
-        if self.instrument.seen == Seen::Images {
-            return Ok(seen.clone());
-        }
-        let mut model = self.instrument.pictured::<f32>(self.motion)?;
-        let now = &state.now;
-        model.weigh(now.axis);
-        let field = now.field(trainer.representation);
-        let (mut batch, mut workspace) = (Batch::default(), Workspace::new());
-        let mut image = vec![0.0; model.pixels()];
-        let quiescent = self.quiescent_light(trainer, state);
-        Ok(Frames::made((model.frames(), model.pixels()), |sink| {
-            (0..model.frames()).try_for_each(|frame| {
-                model.movie(field, &[frame], &mut batch, &mut workspace, &mut image);
-                image.iter_mut().zip(&quiescent).for_each(|(pixel, light)| *pixel += light);
-                sink(&image)
-            })
-        })?)
-    }
-
     /// χ² per datum of the samples that were not fitted, if there are any.
     pub fn validation(&self, seen: &Frames<f32>) -> anyhow::Result<Option<f64>> {
         let Some(curve) = &self.measured.curve else { return Ok(None) };

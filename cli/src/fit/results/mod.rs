@@ -1,6 +1,5 @@
 //! What a run leaves: the volume, the movie, numbers, pictures and the report.
 
-mod fields;
 pub mod gains;
 pub mod leakage;
 mod light_curve;
@@ -17,10 +16,9 @@ pub mod stores;
 mod units;
 pub mod verdict;
 
-pub use fields::{compare, recovered, true_volume};
+pub use kerrlight_tomo::recovery::{recovered, true_volume};
 pub use light_curve::TABLE as LIGHT_CURVE;
 
-use super::failed;
 use super::folder::Folder;
 use crate::checksum::sealed;
 use gains::Gains;
@@ -29,7 +27,8 @@ use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_render::volume::{Volume, VolumeFile, vti};
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::setup::{self, Instrument, Measured, Still, StillView};
-use kerrlight_tomo::fit::{Loss, Motion, State, Trainer};
+use kerrlight_tomo::fit::{Loss, Motion, State};
+use kerrlight_tomo::recovery::Fit;
 use kerrlight_vlbi::files::images;
 use leakage::Leakage;
 use over_time::Changes;
@@ -56,24 +55,34 @@ pub struct Estimate<'a> {
     pub device: Option<String>,
 }
 
+impl<'a> Estimate<'a> {
+    /// Of a fit, in its folder.
+    pub fn new<'b: 'a>(fit: &mut Fit<'b, '_>, folder: &'a Folder) -> Self {
+        let Fit { file, instrument, motion, measured, .. } = *fit;
+        let device = fit.trainer.device.take().map(|device| device.name().to_owned());
+        let true_volume = fit.true_volume.clone();
+        Self { file, folder, instrument, motion, measured, true_volume, device }
+    }
+}
+
 impl Estimate<'_> {
     /// Writes all of them: a line with the quality of the fit, and results.json.
     pub fn write(
         &self,
-        trainer: &mut Trainer<'_, f32>,
+        fit: &mut Fit<'_, '_>,
         state: &State<f32>,
         begun: Instant,
     ) -> anyhow::Result<(String, Value)> {
+        let seen = fit.seen(state)?;
+        let movie = fit.pictured(state, &seen)?;
+        let trainer = &mut fit.trainer;
         let volume = recovered(self.file, trainer, state)?;
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
-        let seen = trainer.images(&state.now, &frames, true)?;
-        failed::check(self.file, &trainer.objective, &frames, &seen)?;
         let leakage = self.leakage(&seen)?;
         let quiescent = self.quiescent(trainer, state)?;
         let loss = trainer.objective.loss_of(&frames, &seen)?;
         let mask = numbers::mask_error(trainer, state, &seen)?;
         let quadrature = self.quadrature_error(trainer, state)?;
-        let movie = self.pictured(trainer, state, &seen)?;
         self.volumes(&volume, state)?;
         self.movies(&movie)?;
         let changes = self.changes(trainer, state)?;

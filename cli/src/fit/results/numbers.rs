@@ -1,6 +1,6 @@
 //! What was found, in numbers.
 
-use super::{Estimate, Found, quadrature};
+use super::{Estimate, Found, quadrature, verdict};
 use crate::fit::{
     band_search, closures, held_out, linear, rotation_search, world_results, world_search,
 };
@@ -58,7 +58,7 @@ impl Estimate<'_> {
             "chi2_per_datum": chi2,
             "axis": now.axis.vector(),
             "inputs": self.folder.inputs().files,
-            "verdict": found.judged.json(),
+            "verdict": verdict::json(&found.judged),
         });
         if let Some(device) = &self.device {
             results["device"] = json!(device);

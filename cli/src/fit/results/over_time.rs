@@ -1,9 +1,10 @@
 //! The emission at the times of the frames: what changes while matter carries it is not told by one volume.
 
-use super::{Estimate, fields};
+use super::Estimate;
 use crate::report::{Axis, LinePlot, Marks, Series};
 use kerrlight_render::volume::{OverTime, Volume};
 use kerrlight_tomo::fit::{State, Trainer};
+use kerrlight_tomo::recovery::{recovered_at, true_volume_at};
 
 /// Emission in the region over time.
 pub struct Changes {
@@ -37,10 +38,10 @@ impl Estimate<'_> {
         };
         for time in times {
             let since = time - self.motion.reference;
-            let volume = fields::recovered_at(self.file, (trainer, self.motion), state, since)?;
+            let volume = recovered_at(self.file, (trainer, self.motion), state, since)?;
             found.recovered.push(integral(&volume));
             if let (Some(truth), Some(curve)) = (known, &mut found.truth) {
-                let truth = fields::true_volume_at(self.file, truth, since)?;
+                let truth = true_volume_at(self.file, truth, since)?;
                 curve.push(integral(&truth));
                 found.closeness.add(&volume, &truth)?;
             }

@@ -6,6 +6,7 @@ use super::medium;
 use super::numbers::outcomes;
 use super::over_time::Changes;
 use super::quiescent::Quiescent;
+use super::verdict;
 use super::{Estimate, Found, quadrature};
 use crate::fit::curves::{loss_plot, psnr_plot};
 use crate::fit::{
@@ -48,14 +49,19 @@ impl Estimate<'_> {
         let leakage = found.leakage.as_ref().map(Leakage::details);
         let report = Report {
             title: self.file.title.clone(),
-            notice: Some(found.judged.notice()),
+            notice: Some(verdict::notice(&found.judged)),
             summary: self.summary(found, results),
             parts: band_words::parts(self.file, self.measured),
             results: outcomes(results),
-            details: [Some(found.judged.table()), found.judged.by_station(), details, leakage]
-                .into_iter()
-                .flatten()
-                .collect(),
+            details: [
+                Some(verdict::table(&found.judged)),
+                verdict::parts::by_station(&found.judged),
+                details,
+                leakage,
+            ]
+            .into_iter()
+            .flatten()
+            .collect(),
             view: Some(self.view(found)),
             figures: self.figures(found)?,
             drawings: world_scan::drawing(self.folder)?.into_iter().collect(),

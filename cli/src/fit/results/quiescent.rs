@@ -5,7 +5,7 @@ use crate::report::{self, Figure, enlarged};
 use kerrlight_render::image::{Channel, Picture, exr};
 use kerrlight_render::polarization::StokesParameter;
 use kerrlight_tomo::fit::setup::Truth;
-use kerrlight_tomo::fit::{Seen, State, Trainer};
+use kerrlight_tomo::fit::{State, Trainer};
 use kerrlight_vlbi::files::images;
 use serde_json::{Value, json};
 
@@ -107,15 +107,6 @@ impl Estimate<'_> {
         let figure = report::images(&shown, n * zoom, &what)?;
         self.folder.file(PICTURE)?.write(&figure.png)?;
         Ok(Some(figure))
-    }
-
-    /// The light of what does not move in the images of total intensity.
-    pub fn quiescent_light(&self, trainer: &Trainer<'_, f32>, state: &State<f32>) -> Vec<f32> {
-        let is_image = matches!(self.instrument.seen, Seen::Images | Seen::StokesImages(_));
-        match trainer.objective.model.quiescent().filter(|_| is_image) {
-            Some(image) => image.images(&state.now.parameters)[..image.pixels].to_vec(),
-            None => Vec::new(),
-        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Residuals on the sky and on baselines.
 
-use super::verdict::Judged;
+use super::verdict::{Judged, parts};
 use super::{Estimate, Found};
 use crate::report::{self, Figure, LinePlot};
 use kerrlight_tomo::fit::settings::LossKind;
@@ -68,7 +68,10 @@ impl Estimate<'_> {
 pub fn plots(judged: &Judged, measured: &Measured) -> Vec<LinePlot> {
     let lengths = baselines(measured);
     let length = |[a, b]: [u16; 2]| lengths.get(&[a.min(b), a.max(b)]).copied();
-    [judged.over_time(), judged.over_baselines(length)].into_iter().flatten().collect()
+    [parts::over_time(judged), parts::over_baselines(judged, length)]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// Mean lengths of baselines, 10⁹ wavelengths.

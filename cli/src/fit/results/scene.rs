@@ -1,6 +1,6 @@
 //! A scene of what was recovered, with its motion: `kerrlight render` and `kerrlight movie` show it.
 
-use super::{Estimate, fields};
+use super::Estimate;
 use anyhow::Context;
 use kerrlight_common::frames::Frames;
 use kerrlight_common::toml_file;
@@ -8,6 +8,7 @@ use kerrlight_render::scene::{Scene, VolumeRegion};
 use kerrlight_render::volume::VolumeFile;
 use kerrlight_tomo::fit::{Sampling, setup};
 use kerrlight_tomo::fit::{State, Trainer};
+use kerrlight_tomo::recovery::carried;
 
 /// The scene, and the volume that it names.
 const SCENE: &str = "scene.toml";
@@ -33,7 +34,7 @@ impl Estimate<'_> {
             return Ok(());
         }
         let axis = state.now.axis;
-        let volume = fields::carried(self.file, trainer, state)?;
+        let volume = carried(self.file, trainer, state)?;
         let file = VolumeFile { volume, axis: Some(axis.vector()) };
         self.folder.file(VOLUME)?.write(&file.to_npz())?;
         self.folder.file(SCENE)?.write(text.as_bytes())

@@ -1,230 +1,157 @@
 //! Whether a fit explains its data: from the residuals of its last state, in words and for other programs.
 
-mod expected;
-mod parts;
+pub mod parts;
 #[cfg(test)]
 mod tests;
-mod words;
 
-use anyhow::Context;
-use kerrlight_common::frames::Frames;
-use kerrlight_tomo::fit::settings::{DataFiles, FitFile, Loss, LossKind, Noise};
-use kerrlight_tomo::fit::setup::Measured;
-use kerrlight_tomo::fit::verdict::{
-    Errors, Outcome, Statistics, Tested, Verdict, ZeroSpacing, judge, worst,
-};
-use kerrlight_vlbi::products::debiased_amplitude;
+use crate::report::{Notice, Table, Tone};
+use kerrlight_tomo::fit::verdict::{Errors, Expected, Outcome, Tested, worst};
+use kerrlight_tomo::recovery::short;
+pub use kerrlight_tomo::recovery::{Evidence, Judged};
 use serde_json::{Value, json};
 
-/// A verdict with all that it is made of.
-pub struct Judged {
-    /// What came out.
-    pub verdict: Verdict,
-    /// The kinds of data with their names.
-    pub terms: Vec<(String, Tested)>,
-    /// Flux at zero spacing, where short baselines have measured it.
-    pub flux: Option<ZeroSpacing>,
-    /// Names of the stations.
-    stations: Vec<String>,
-    /// Times of the frames: M; hours of UTC of a static image.
-    times: Vec<f64>,
-    /// Whether they are those of a static image.
-    is_static: bool,
-}
-
-/// Baselines shorter than this part of 1/(field of view) see the whole flux: within 0.3 % for a source whose standard
-/// deviation is a quarter of the field.
-const SHORT: f64 = 0.05;
-
-/// Losses in the order of the objective's terms: the image first.
-fn ordered(losses: &[Loss]) -> impl Iterator<Item = &Loss> {
-    let of = |image: bool| losses.iter().filter(move |l| (l.data == LossKind::Image) == image);
-    of(true).chain(of(false))
-}
-
-/// What σ of a kind of data is.
-fn errors(file: &FitFile, kind: LossKind) -> Errors {
-    let of_pixels = matches!(kind, LossKind::Image | LossKind::LightCurve);
-    match (&file.data, &file.observation) {
-        (Some(DataFiles::Movie { .. }), _) => Errors::Assumed,
-        (Some(DataFiles::Visibilities { .. } | DataFiles::LightCurve(_)), _) => Errors::Stated,
-        _ if file.light_curve.as_ref().is_some_and(|curve| curve.noise == Noise::Thermal) => {
-            Errors::Known
-        }
-        (None, Some(seen)) if !of_pixels && seen.noise == Noise::Thermal => match seen.systematic {
-            Some(part) if part > 0.0 => Errors::Stated,
-            _ => Errors::Known,
-        },
-        _ => Errors::Weight,
-    }
-}
-
-/// Data, and what they are to the fit.
-#[derive(Clone, Copy)]
-pub struct Evidence<'a> {
-    /// Settings; none of a static image, whose errors are those that its data state.
-    pub file: Option<&'a FitFile>,
-    /// What is compared.
-    pub losses: &'a [Loss],
-    /// Seed of the settings.
-    pub seed: u64,
-    /// Data.
-    pub measured: &'a Measured,
-}
-
-/// Kinds of data with their names, in the order of the losses, images first.
-pub type Compared<'a> = (Vec<&'a str>, Vec<Statistics>);
-
-impl Evidence<'_> {
-    /// Of images of all frames.
-    pub fn judged(&self, compared: Compared<'_>, movie: &Frames<f32>) -> anyhow::Result<Judged> {
-        self.judged_beside(compared, movie, Vec::new())
-    }
-
-    /// The same with kinds of data that are not in the losses.
-    pub fn judged_beside(
-        &self,
-        (names, statistics): Compared<'_>,
-        movie: &Frames<f32>,
-        others: Vec<(String, Tested)>,
-    ) -> anyhow::Result<Judged> {
-        let model = self.model_visibilities(movie)?;
-        let mut terms = Vec::new();
-        for ((loss, name), statistics) in ordered(self.losses).zip(names).zip(statistics) {
-            let has_background =
-                self.measured.curve.as_ref().is_some_and(|curve| curve.background.is_some());
-            let shared = has_background || self.measured.varies;
-            let errors = match self.file {
-                _ if shared => Errors::Shared,
-                Some(file) => errors(file, loss.data),
-                None => Errors::Stated,
-            };
-            let mut tested = Tested::gaussian(statistics, errors);
-            if tested.errors != Errors::Weight
-                && let Some(model) = &model
-                && let Some(draws) = self.draws(loss, model)
-            {
-                tested = tested.among(&draws);
-            }
-            terms.push((name.to_owned(), tested));
-        }
-        terms.extend(others);
-        let tested: Vec<Tested> = terms.iter().map(|(_, tested)| tested.clone()).collect();
-        let flux = self.zero_spacing(movie)?;
-        let knows_flux =
-            |loss: &Loss| loss.data.is_visibilities() || loss.data == LossKind::Amplitudes;
-        // Gains that are free may be what is missing.
-        let knows = self.measured.gains.is_none() && self.losses.iter().any(knows_flux);
-        let judged = flux.filter(|_| knows);
-        let observation = self.measured.visibilities.as_ref().map(|(observation, _)| observation);
-        let stations = observation.map(|o| o.stations.iter().map(|s| s.name.clone()).collect());
-        Ok(Judged {
-            verdict: judge(&tested, judged),
-            terms,
-            flux,
-            stations: stations.unwrap_or_default(),
-            times: self.measured.times.clone(),
-            is_static: self.file.is_none(),
-        })
-    }
-
-    /// What baselines have measured that resolve nothing of the field of view.
-    fn zero_spacing(&self, movie: &Frames<f32>) -> anyhow::Result<Option<ZeroSpacing>> {
-        let (Some((observation, frames)), Some(sky)) =
-            (&self.measured.visibilities, self.measured.sky)
-        else {
-            return Ok(None);
-        };
-        let shortest = SHORT / (sky.pixel_rad * sky.width as f64);
-        let flux = movie.sums()?;
-        let (mut count, mut weights, mut sums) = (0, 0.0, [0.0; 2]);
-        for (row, frame) in observation.rows.iter().zip(frames) {
-            let Some(i) = row.stokes_i(observation.basis) else { continue };
-            if row.uv[0].hypot(row.uv[1]) > shortest || i.noise_sigma <= 0.0 {
-                continue;
-            }
-            let weight = i.noise_sigma.powi(-2);
-            count += 1;
-            weights += weight;
-            sums[0] += weight * debiased_amplitude(&i);
-            sums[1] += weight * flux.get(*frame).context("a frame without an image")?;
-        }
-        let [measured_jy, model_jy] = sums.map(|sum| sum / weights);
-        let error_jy = weights.powf(-0.5);
-        Ok((count > 0).then_some(ZeroSpacing { measured_jy, error_jy, model_jy, count }))
-    }
-}
-
-impl Judged {
-    /// For results.json.
-    pub fn json(&self) -> Value {
-        let outcome = match self.verdict.outcome {
-            Outcome::Explained => "explained",
-            Outcome::Reproduced => "reproduced",
-            Outcome::FitsNoise => "fits-noise",
-            Outcome::Unexplained => "unexplained",
-        };
-        let reasons: Vec<String> = self.reasons();
-        let mut all = json!({
-            "outcome": outcome,
-            "text": self.headline(),
-            "reasons": reasons,
-            "data": self.terms.iter().map(|(name, tested)| self.term(name, tested)).collect::<Vec<_>>(),
+/// For results.json.
+pub fn json(judged: &Judged) -> Value {
+    let outcome = match judged.verdict.outcome {
+        Outcome::Explained => "explained",
+        Outcome::Reproduced => "reproduced",
+        Outcome::FitsNoise => "fits-noise",
+        Outcome::Unexplained => "unexplained",
+    };
+    let reasons: Vec<String> = judged.reasons();
+    let mut all = json!({
+        "outcome": outcome,
+        "text": judged.headline(),
+        "reasons": reasons,
+        "data": judged.terms.iter().map(|(name, tested)| term(judged, name, tested)).collect::<Vec<_>>(),
+    });
+    if let Some(flux) = &judged.flux {
+        all["zero_spacing"] = json!({
+            "measured_jy": flux.measured_jy,
+            "error_jy": flux.error_jy,
+            "model_jy": flux.model_jy,
+            "visibilities": flux.count,
         });
-        if let Some(flux) = &self.flux {
-            all["zero_spacing"] = json!({
-                "measured_jy": flux.measured_jy,
-                "error_jy": flux.error_jy,
-                "model_jy": flux.model_jy,
-                "visibilities": flux.count,
-            });
-        }
-        all
     }
+    all
+}
 
-    fn term(&self, name: &str, tested: &Tested) -> Value {
-        let Tested { statistics, errors, expected } = tested;
-        let errors = match errors {
-            Errors::Known => "noise",
-            Errors::Stated => "stated",
-            Errors::Shared => "shared",
-            Errors::Assumed => "assumed",
-            Errors::Weight => "weight",
+fn term(judged: &Judged, name: &str, tested: &Tested) -> Value {
+    let Tested { statistics, errors, expected } = tested;
+    let errors = match errors {
+        Errors::Known => "noise",
+        Errors::Stated => "stated",
+        Errors::Shared => "shared",
+        Errors::Assumed => "assumed",
+        Errors::Weight => "weight",
+    };
+    let mut term = json!({
+        "data": name,
+        "count": statistics.all.count,
+        "chi2_per_datum": statistics.chi2(),
+        "sigma_is": errors,
+        "mean": statistics.mean(),
+        "misfit": statistics.misfit(),
+        "correlation_in_time": statistics.in_time.correlation(),
+        "correlation_in_space": statistics.in_space.correlation(),
+    });
+    if tested.errors != Errors::Weight {
+        term["expected"] = json!({ "mean": expected.chi2, "deviation": expected.spread });
+    }
+    if let Some((frame, part, chi2)) = worst(statistics.frames.iter().enumerate()) {
+        let time = judged.times.get(frame);
+        term["worst_frame"] =
+            json!({ "frame": frame, "time": time, "chi2_per_datum": chi2, "count": part.count });
+    }
+    if let Some((stations, part, chi2)) = worst(statistics.groups.iter()) {
+        let names = judged.names(stations);
+        term["worst_group"] =
+            json!({ "stations": names, "chi2_per_datum": chi2, "count": part.count });
+    }
+    if let Some((station, part, chi2)) = worst(statistics.stations.iter()) {
+        let name = judged.names(&[*station]);
+        term["worst_station"] =
+            json!({ "station": name, "chi2_per_datum": chi2, "count": part.count });
+        term["stations"] = json!(parts::station_values(judged, tested));
+    }
+    term
+}
+
+/// What stands first on the page.
+pub fn notice(judged: &Judged) -> Notice {
+    let tone = match judged.verdict.outcome {
+        Outcome::Explained => Tone::Good,
+        Outcome::Reproduced => Tone::Plain,
+        Outcome::FitsNoise | Outcome::Unexplained => Tone::Bad,
+    };
+    let mut text = Vec::new();
+    if judged.verdict.outcome == Outcome::Unexplained {
+        let wrong = match judged.is_static {
+            true => {
+                "the source changed, the field is too small, penalties are too strong, or the error bars are wrong"
+            }
+            false => {
+                "the settings (spin, inclination, motion, region), the error bars or the training are wrong"
+            }
         };
-        let mut term = json!({
-            "data": name,
-            "count": statistics.all.count,
-            "chi2_per_datum": statistics.chi2(),
-            "sigma_is": errors,
-            "mean": statistics.mean(),
-            "misfit": statistics.misfit(),
-            "correlation_in_time": statistics.in_time.correlation(),
-            "correlation_in_space": statistics.in_space.correlation(),
-        });
-        if tested.errors != Errors::Weight {
-            term["expected"] = json!({ "mean": expected.chi2, "deviation": expected.spread });
-        }
-        if let Some((frame, part, chi2)) = worst(statistics.frames.iter().enumerate()) {
-            let time = self.times.get(frame);
-            term["worst_frame"] = json!({ "frame": frame, "time": time, "chi2_per_datum": chi2, "count": part.count });
-        }
-        if let Some((stations, part, chi2)) = worst(statistics.groups.iter()) {
-            let names = self.names(stations);
-            term["worst_group"] =
-                json!({ "stations": names, "chi2_per_datum": chi2, "count": part.count });
-        }
-        if let Some((station, part, chi2)) = worst(statistics.stations.iter()) {
-            let name = self.names(&[*station]);
-            term["worst_station"] =
-                json!({ "station": name, "chi2_per_datum": chi2, "count": part.count });
-            term["stations"] = json!(self.station_values(tested));
-        }
-        term
+        text.push(format!(
+            "What follows is the best solution of this fit, but not a description of the source: {wrong}."
+        ));
     }
+    if judged.terms.iter().any(|(_, tested)| tested.errors == Errors::Assumed) {
+        text.push("σ is assumed in the settings, not measured; χ² depends on it.".to_owned());
+    }
+    Notice { tone, headline: judged.headline(), text }
+}
 
-    /// `AA–LM`.
-    fn names(&self, stations: &[u16]) -> String {
-        let name = |k: &u16| self.stations.get(usize::from(*k)).map_or("?", String::as_str);
-        stations.iter().map(name).collect::<Vec<_>>().join("–")
+/// Residuals of all kinds of data.
+pub fn table(judged: &Judged) -> Table {
+    let head = [
+        "data",
+        "number",
+        "χ² per data point",
+        "expected",
+        "mean, σ",
+        "correlation in time",
+        "worst",
+    ];
+    let row = |(name, tested): &(String, Tested)| {
+        let Tested { statistics, errors, expected: Expected { chi2: mean, spread, .. } } = tested;
+        let number = |x: Option<f64>| x.map_or("–".to_owned(), |x| format!("{x:.2}"));
+        let expected = match errors {
+            Errors::Weight => "no noise".to_owned(),
+            _ => format!("{mean:.2} ± {spread:.2}"),
+        };
+        vec![
+            name.clone(),
+            statistics.all.count.to_string(),
+            statistics.chi2().map_or("–".to_owned(), short),
+            expected,
+            number(statistics.mean()),
+            number(statistics.in_time.correlation()),
+            worst_parts(judged, tested),
+        ]
+    };
+    Table {
+        title: "Residuals".to_owned(),
+        caption: "Model minus data in units of σ, over all frames. With the right model and errors χ² per data point is as \
+                  expected, and the mean and the correlation between frames vanish. Fitted parameters lower χ².\
+                  "
+            .to_owned(),
+        head: head.map(str::to_owned).to_vec(),
+        rows: judged.terms.iter().map(row).collect(),
+        links: Vec::new(),
     }
+}
+
+/// The worst station, group of stations and frame with their χ² per data point.
+fn worst_parts(judged: &Judged, tested: &Tested) -> String {
+    let statistics = &tested.statistics;
+    let station = worst(statistics.stations.iter())
+        .map(|(station, _, chi2)| format!("{} {}", judged.names(&[*station]), short(chi2)));
+    let group = worst(statistics.groups.iter())
+        .map(|(stations, _, chi2)| format!("{} {}", judged.names(stations), short(chi2)));
+    let frame = worst(statistics.frames.iter().enumerate())
+        .map(|(frame, _, chi2)| format!("frame {} {}", frame + 1, short(chi2)));
+    [station, group, frame].into_iter().flatten().collect::<Vec<_>>().join(", ")
 }

@@ -1,25 +1,26 @@
 //! What a run says of its steps.
 
-use super::{Run, results};
+use super::kept::Kept;
 use indicatif::ProgressBar;
 use kerrlight_tomo::fit::settings::AxisSearch;
-use kerrlight_tomo::fit::{Loss, Outcome, State};
+use kerrlight_tomo::fit::{Loss, Outcome};
+use kerrlight_tomo::recovery::{Now, compare};
 use serde_json::{Value, json};
 
-impl Run<'_> {
+impl Kept<'_> {
     /// Logs what a step has done, and tells of what is unusual.
-    pub(super) fn record(
-        &mut self,
-        state: &mut State<f32>,
+    pub(super) fn step(
+        &self,
+        now: Now<'_, '_>,
         outcome: Outcome,
         bar: &ProgressBar,
     ) -> anyhow::Result<()> {
-        let (step, training) = (state.now.step, &self.file.training);
+        let (step, training) = (now.state.now.step, &now.settings.training);
         let line = match outcome {
             Outcome::Done(loss)
                 if step.is_multiple_of(training.log_every) || step == training.steps =>
             {
-                self.line(state, &loss)
+                self.line(now, &loss)
             }
             Outcome::Done(_) => return Ok(()),
             Outcome::SteppedBack { loss, to, caution } => {
@@ -30,18 +31,19 @@ impl Run<'_> {
             }
             Outcome::Converged => {
                 bar.println(format!("converged at step {step}: no further decrease of the loss"));
-                json!({"step": step, "converged": true, "loss": state.now.loss})
+                json!({"step": step, "converged": true, "loss": now.state.now.loss})
             }
         };
         self.folder.log(&line)
     }
 
-    fn line(&mut self, state: &State<f32>, loss: &Loss) -> Value {
+    fn line(&self, of: Now<'_, '_>, loss: &Loss) -> Value {
+        let Now { settings, measured, true_volume, trainer, state, .. } = of;
         let map = |names: Vec<&str>, values: &[f64]| -> serde_json::Map<String, Value> {
             let pairs = names.into_iter().zip(values);
             pairs.map(|(name, value)| (name.to_owned(), json!(value))).collect()
         };
-        let chi2 = map(self.trainer.objective.names(), &loss.terms);
+        let chi2 = map(trainer.objective.names(), &loss.terms);
         let now = &state.now;
         let mut line = json!({
             "step": now.step,
@@ -50,21 +52,21 @@ impl Run<'_> {
             "chi2_per_datum": chi2,
             "evaluations": loss.points,
         });
-        let penalties = self.trainer.training.penalty_names();
+        let penalties = trainer.training.penalty_names();
         if !penalties.is_empty() {
             line["penalties"] = json!(map(penalties, &loss.penalties));
         }
-        if !matches!(self.file.axis, AxisSearch::Known {}) {
+        if !matches!(settings.axis, AxisSearch::Known {}) {
             line["axis"] = json!(now.axis.vector());
         }
         if let Some(mask) = &now.occupancy {
             line["occupied"] = json!(mask.fraction());
         }
-        if let Some(truth) = &self.measured.truth {
+        if let Some(truth) = &measured.truth {
             line["axis_dot_truth"] = json!(now.axis.dot(truth.axis()));
         }
-        if let Some(truth) = &self.true_volume
-            && let Some(found) = results::compare(self.file, &mut self.trainer, state, truth)
+        if let Some(truth) = true_volume
+            && let Some(found) = compare(settings, trainer, state, truth)
         {
             line["psnr_db"] = json!(found.psnr_db);
             line["nrmse"] = json!(found.nrmse);

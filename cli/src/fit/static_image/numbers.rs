@@ -2,6 +2,7 @@
 
 use super::Found;
 use crate::fit::closures;
+use crate::fit::results::verdict;
 use crate::usage::usage;
 use kerrlight_tomo::fit::static_image::{Candidate, Ring, Survey};
 use serde_json::{Map, Value, json};
@@ -91,7 +92,7 @@ impl Found<'_> {
             "chi2_not_fitted": beside,
             "chi2_of_draws": of_draws,
             "inputs": self.folder.inputs().files,
-            "verdict": self.judged.json(),
+            "verdict": verdict::json(&self.judged),
             "flux_jy": found.solution.image.iter().sum::<f64>(),
             "flux_error_jy": self.flux_error(),
             "strength": self.survey.strength,

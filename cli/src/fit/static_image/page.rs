@@ -7,7 +7,7 @@ use super::words;
 use crate::fit::results::gains::Gains;
 use crate::fit::results::leakage::Leakage;
 use crate::fit::results::page::settings;
-use crate::fit::results::verdict::Evidence;
+use crate::fit::results::verdict::{self, Evidence};
 use crate::fit::results::{plots, residuals};
 use crate::report::{Axis, LinePlot, Marks, Outcome, Report, Series, Table};
 use kerrlight_tomo::fit::static_image::Candidate;
@@ -66,10 +66,15 @@ impl Found<'_> {
         let leakage = self.polarized.as_ref().and_then(|polarized| polarized.leakage.as_ref());
         all_plots.extend(leakage.map(Leakage::plot));
         let leakage = leakage.map(Leakage::details);
-        let details = [Some(self.judged.table()), self.judged.by_station(), details, leakage];
+        let details = [
+            Some(verdict::table(&self.judged)),
+            verdict::parts::by_station(&self.judged),
+            details,
+            leakage,
+        ];
         let report = Report {
             title: self.file.title.clone(),
-            notice: Some(self.judged.notice()),
+            notice: Some(verdict::notice(&self.judged)),
             summary: words::ring(&self.survey)
                 .into_iter()
                 .chain(self.polarized.as_ref().map(Polarized::sentence))

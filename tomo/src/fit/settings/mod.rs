@@ -14,6 +14,7 @@ mod instrument;
 mod light_curve;
 mod medium;
 mod penalties;
+mod plain;
 mod quiescent;
 mod ranges;
 mod recovery;

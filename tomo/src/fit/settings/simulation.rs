@@ -17,7 +17,7 @@ pub struct Movie {
 }
 
 /// What is simulated.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Truth {
     /// Gaussian spots at the reference time.
@@ -38,7 +38,7 @@ pub struct Truth {
 }
 
 /// A Gaussian spot.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spot {
     /// Where it was when it was round, M.

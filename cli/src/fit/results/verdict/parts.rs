@@ -1,9 +1,9 @@
 //! Residuals by frame, by baseline and by station.
 
 use super::Judged;
-use super::words::short;
 use crate::report::{Axis, LinePlot, Marks, Series, Table};
 use kerrlight_tomo::fit::verdict::{Errors, Part, Tested};
+use kerrlight_tomo::recovery::short;
 use std::collections::BTreeSet;
 
 /// χ² per data point of parts at x, with the scatter of chance √(2/n).
@@ -54,78 +54,79 @@ fn plot(
     })
 }
 
-impl Judged {
-    /// Where χ² of the first data with errors is expected.
-    fn expected(&self) -> Option<f64> {
-        let noisy = |tested: &&Tested| tested.errors != Errors::Weight;
-        self.terms.iter().map(|(_, tested)| tested).find(noisy).map(|tested| tested.expected.chi2)
-    }
+/// Where χ² of the first data with errors is expected.
+fn expected(judged: &Judged) -> Option<f64> {
+    let noisy = |tested: &&Tested| tested.errors != Errors::Weight;
+    judged.terms.iter().map(|(_, tested)| tested).find(noisy).map(|tested| tested.expected.chi2)
+}
 
-    /// Residuals of each frame; nothing of a single one.
-    pub fn over_time(&self) -> Option<LinePlot> {
-        let of = |(name, tested): &(String, Tested)| {
-            series(name, self.times.iter().copied().zip(&tested.statistics.frames))
-        };
-        let caption = "χ² per data point of each frame. Bars are the scatter of chance, √(2/n) for n data points. A frame that \
-                       stands out, or a trend, is something that the model cannot do at that time.";
-        let series = self.terms.iter().map(of).collect();
-        let unit = if self.is_static { "h UTC" } else { "GM/c³" };
-        plot(["Residuals over time", caption], ["time", unit], series, self.expected())
-    }
+/// Residuals of each frame; nothing of a single one.
+pub fn over_time(judged: &Judged) -> Option<LinePlot> {
+    let of = |(name, tested): &(String, Tested)| {
+        series(name, judged.times.iter().copied().zip(&tested.statistics.frames))
+    };
+    let caption = "χ² per data point of each frame. Bars are the scatter of chance, √(2/n) for n data points. A frame that \
+                   stands out, or a trend, is something that the model cannot do at that time.";
+    let series = judged.terms.iter().map(of).collect();
+    let unit = if judged.is_static { "h UTC" } else { "GM/c³" };
+    plot(["Residuals over time", caption], ["time", unit], series, expected(judged))
+}
 
-    /// Residuals of each baseline, triangle and quadrangle against its longest baseline, whose length the caller knows.
-    pub fn over_baselines(&self, length: impl Fn([u16; 2]) -> Option<f64>) -> Option<LinePlot> {
-        let longest = |stations: &[u16]| {
-            let pairs = stations.iter().flat_map(|a| stations.iter().map(|b| [*a, *b]));
-            pairs.filter_map(&length).reduce(f64::max)
-        };
-        let of = |(name, tested): &(String, Tested)| {
-            let groups = tested.statistics.groups.iter();
-            series(name, groups.filter_map(|(stations, part)| Some((longest(stations)?, part))))
-        };
-        let caption = "χ² per data point of each pair of stations, triangle and quadrangle over all frames, against the mean \
-                       length of its longest baseline. Bars are the scatter of chance. What rises to long baselines is \
-                       detail that the model lacks; single points far up are stations that are not calibrated.";
-        let series = self.terms.iter().map(of).collect();
-        let axis = ["longest baseline", "10⁹ wavelengths"];
-        plot(["Residuals of baselines", caption], axis, series, self.expected())
-    }
+/// Residuals of each baseline, triangle and quadrangle against its longest baseline, whose length the caller knows.
+pub fn over_baselines(
+    judged: &Judged,
+    length: impl Fn([u16; 2]) -> Option<f64>,
+) -> Option<LinePlot> {
+    let longest = |stations: &[u16]| {
+        let pairs = stations.iter().flat_map(|a| stations.iter().map(|b| [*a, *b]));
+        pairs.filter_map(&length).reduce(f64::max)
+    };
+    let of = |(name, tested): &(String, Tested)| {
+        let groups = tested.statistics.groups.iter();
+        series(name, groups.filter_map(|(stations, part)| Some((longest(stations)?, part))))
+    };
+    let caption = "χ² per data point of each pair of stations, triangle and quadrangle over all frames, against the mean \
+                   length of its longest baseline. Bars are the scatter of chance. What rises to long baselines is \
+                   detail that the model lacks; single points far up are stations that are not calibrated.";
+    let series = judged.terms.iter().map(of).collect();
+    let axis = ["longest baseline", "10⁹ wavelengths"];
+    plot(["Residuals of baselines", caption], axis, series, expected(judged))
+}
 
-    /// Residuals of all data that a station is part of; nothing without stations.
-    pub fn by_station(&self) -> Option<Table> {
-        let measured: Vec<_> =
-            self.terms.iter().filter(|(_, t)| !t.statistics.stations.is_empty()).collect();
-        let stations: BTreeSet<u16> =
-            measured.iter().flat_map(|(_, t)| t.statistics.stations.keys().copied()).collect();
-        let cells = |station: u16, tested: &Tested| {
-            let part = tested.statistics.stations.get(&station).copied().unwrap_or_default();
-            let chi2 = part.per_datum().map_or("–".to_owned(), short);
-            [chi2, part.count.to_string()]
-        };
-        let row = |station: u16| {
-            let cells = measured.iter().flat_map(|(_, tested)| cells(station, tested));
-            [self.names(&[station])].into_iter().chain(cells).collect()
-        };
-        let heads =
-            measured.iter().flat_map(|(name, _)| [format!("χ² of {name}"), "number".to_owned()]);
-        (!stations.is_empty()).then(|| Table {
-            title: "Residuals of stations".to_owned(),
-            caption: "χ² per data point of all data that a station is part of, and their number."
-                .to_owned(),
-            head: ["station".to_owned()].into_iter().chain(heads).collect(),
-            rows: stations.iter().map(|station| row(*station)).collect(),
-            links: Vec::new(),
-        })
-    }
+/// Residuals of all data that a station is part of; nothing without stations.
+pub fn by_station(judged: &Judged) -> Option<Table> {
+    let measured: Vec<_> =
+        judged.terms.iter().filter(|(_, t)| !t.statistics.stations.is_empty()).collect();
+    let stations: BTreeSet<u16> =
+        measured.iter().flat_map(|(_, t)| t.statistics.stations.keys().copied()).collect();
+    let cells = |station: u16, tested: &Tested| {
+        let part = tested.statistics.stations.get(&station).copied().unwrap_or_default();
+        let chi2 = part.per_datum().map_or("–".to_owned(), short);
+        [chi2, part.count.to_string()]
+    };
+    let row = |station: u16| {
+        let cells = measured.iter().flat_map(|(_, tested)| cells(station, tested));
+        [judged.names(&[station])].into_iter().chain(cells).collect()
+    };
+    let heads =
+        measured.iter().flat_map(|(name, _)| [format!("χ² of {name}"), "number".to_owned()]);
+    (!stations.is_empty()).then(|| Table {
+        title: "Residuals of stations".to_owned(),
+        caption: "χ² per data point of all data that a station is part of, and their number."
+            .to_owned(),
+        head: ["station".to_owned()].into_iter().chain(heads).collect(),
+        rows: stations.iter().map(|station| row(*station)).collect(),
+        links: Vec::new(),
+    })
+}
 
-    /// For results.json: χ² per data point by station.
-    pub(super) fn station_values(
-        &self,
-        tested: &Tested,
-    ) -> serde_json::Map<String, serde_json::Value> {
-        let of = |(station, part): (&u16, &Part)| {
-            (self.names(&[*station]), serde_json::json!(part.per_datum()))
-        };
-        tested.statistics.stations.iter().map(of).collect()
-    }
+/// For results.json: χ² per data point by station.
+pub(super) fn station_values(
+    judged: &Judged,
+    tested: &Tested,
+) -> serde_json::Map<String, serde_json::Value> {
+    let of = |(station, part): (&u16, &Part)| {
+        (judged.names(&[*station]), serde_json::json!(part.per_datum()))
+    };
+    tested.statistics.stations.iter().map(of).collect()
 }

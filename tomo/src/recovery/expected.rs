@@ -1,10 +1,11 @@
 //! χ² that a right model has, where data are no linear functions of visibilities: amplitudes lose their Gaussian errors at
 //! low signal to noise, closure quantities more so. Noise is drawn anew about the model, and data are made of that.
 
-use super::Evidence;
+use super::evidence::Evidence;
+use crate::Error;
+use crate::fit::settings::{Loss, LossKind};
+use crate::fit::verdict::Statistics;
 use kerrlight_common::frames::Frames;
-use kerrlight_tomo::fit::settings::{Loss, LossKind};
-use kerrlight_tomo::fit::verdict::Statistics;
 use kerrlight_vlbi::data_terms::{AmplitudeTerm, ClosureTerm, DataTerm};
 use kerrlight_vlbi::noise::add_thermal_noise;
 use kerrlight_vlbi::observation::Observation;
@@ -17,10 +18,13 @@ const DRAWS: u64 = 12;
 
 impl Evidence<'_> {
     /// Visibilities of a movie for all rows of the data that have Stokes I, in their order; none without any.
+    ///
+    /// # Errors
+    /// If the movie cannot be read, or a transform is out of range.
     pub fn model_visibilities(
         &self,
         movie: &Frames<f32>,
-    ) -> anyhow::Result<Option<Vec<Complex<f64>>>> {
+    ) -> Result<Option<Vec<Complex<f64>>>, Error> {
         let (Some((observation, frames)), Some(sky)) =
             (&self.measured.visibilities, self.measured.sky)
         else {

@@ -1,10 +1,11 @@
 //! The recovered and the true emission on the nodes of a box, and how well they agree.
 
+use crate::Error;
+use crate::fit::settings::FitFile;
+use crate::fit::setup::Truth;
+use crate::fit::{Motion, State, Trainer};
 use kerrlight_render::volume::Volume;
 use kerrlight_render::volume::metrics::{self, Comparison};
-use kerrlight_tomo::fit::settings::FitFile;
-use kerrlight_tomo::fit::setup::Truth;
-use kerrlight_tomo::fit::{Motion, State, Trainer};
 
 /// The nodes of the volume.
 struct Box3 {
@@ -17,7 +18,7 @@ impl Box3 {
         Self { nodes: [file.output.nodes; 3], half: file.region.r_max }
     }
 
-    fn volume(&self, values: Vec<f32>) -> anyhow::Result<Volume> {
+    fn volume(&self, values: Vec<f32>) -> Result<Volume, Error> {
         Ok(Volume::new(self.nodes, [-self.half; 3], [self.half; 3], values)?)
     }
 
@@ -29,22 +30,28 @@ impl Box3 {
 }
 
 /// The field at the reference time, zero outside the region.
+///
+/// # Errors
+/// If the volume is larger than memory, or out of range.
 pub fn recovered(
     file: &FitFile,
     trainer: &mut Trainer<'_, f32>,
     state: &State<f32>,
-) -> anyhow::Result<Volume> {
+) -> Result<Volume, Error> {
     let region = file.region.limits();
     on_nodes(file, (trainer, None), state, &|x| region.holds(x))
 }
 
 /// The field at the reference time at all nodes whose matter passes the region at some time, or next to it: what a
 /// scene needs that carries it along.
+///
+/// # Errors
+/// If the volume is larger than memory, or out of range.
 pub fn carried(
     file: &FitFile,
     trainer: &mut Trainer<'_, f32>,
     state: &State<f32>,
-) -> anyhow::Result<Volume> {
+) -> Result<Volume, Error> {
     let (region, axis) = (file.region.limits(), state.now.axis.vector());
     let nodes = Box3::new(file);
     // The diagonal of a cell: values between nodes of the region need their neighbours.
@@ -58,7 +65,7 @@ fn on_nodes(
     (trainer, at): (&mut Trainer<'_, f32>, Option<(&Motion, f64)>),
     state: &State<f32>,
     wanted: &dyn Fn([f64; 3]) -> bool,
-) -> anyhow::Result<Volume> {
+) -> Result<Volume, Error> {
     let nodes = Box3::new(file);
     let positions = nodes.positions();
     let inside: Vec<usize> = (0..positions.len()).filter(|k| wanted(positions[*k])).collect();
@@ -74,25 +81,34 @@ fn on_nodes(
 }
 
 /// The field at another time, M since the reference time; zero outside the region.
+///
+/// # Errors
+/// If the volume is larger than memory, or out of range.
 pub fn recovered_at(
     file: &FitFile,
     (trainer, motion): (&mut Trainer<'_, f32>, &Motion),
     state: &State<f32>,
     since: f64,
-) -> anyhow::Result<Volume> {
+) -> Result<Volume, Error> {
     let region = file.region.limits();
     on_nodes(file, (trainer, Some((motion, since))), state, &|x| region.holds(x))
 }
 
 /// The truth at a time since the reference time, M.
-pub fn true_volume_at(file: &FitFile, truth: &Truth, since: f64) -> anyhow::Result<Volume> {
+///
+/// # Errors
+/// If the volume is larger than memory, or out of range.
+pub fn true_volume_at(file: &FitFile, truth: &Truth, since: f64) -> Result<Volume, Error> {
     let nodes = Box3::new(file);
     let light = |x: &[f64; 3]| truth.seen_at(*x, since) as f32;
     nodes.volume(nodes.positions().iter().map(light).collect())
 }
 
 /// The truth at the reference time.
-pub fn true_volume(file: &FitFile, truth: &Truth) -> anyhow::Result<Volume> {
+///
+/// # Errors
+/// If the volume is larger than memory, or out of range.
+pub fn true_volume(file: &FitFile, truth: &Truth) -> Result<Volume, Error> {
     let nodes = Box3::new(file);
     nodes.volume(nodes.positions().iter().map(|x| truth.at(*x) as f32).collect())
 }

@@ -1,8 +1,7 @@
 //! The verdict in sentences.
 
-use super::Judged;
-use crate::report::{Notice, Table, Tone};
-use kerrlight_tomo::fit::verdict::{Errors, Expected, Fault, Outcome, Reason, Tested, worst};
+use super::evidence::Judged;
+use crate::fit::verdict::{Errors, Expected, Fault, Outcome, Reason, Tested};
 
 impl Judged {
     /// The verdict with χ² of all data that have errors, whatever the verdict rests on.
@@ -94,84 +93,10 @@ impl Judged {
         }
     }
 
-    /// What stands first on the page.
-    pub fn notice(&self) -> Notice {
-        let tone = match self.verdict.outcome {
-            Outcome::Explained => Tone::Good,
-            Outcome::Reproduced => Tone::Plain,
-            Outcome::FitsNoise | Outcome::Unexplained => Tone::Bad,
-        };
-        let mut text = Vec::new();
-        if self.verdict.outcome == Outcome::Unexplained {
-            let wrong = match self.is_static {
-                true => {
-                    "the source changed, the field is too small, penalties are too strong, or the error bars are wrong"
-                }
-                false => {
-                    "the settings (spin, inclination, motion, region), the error bars or the training are wrong"
-                }
-            };
-            text.push(format!(
-                "What follows is the best solution of this fit, but not a description of the source: {wrong}."
-            ));
-        }
-        if self.terms.iter().any(|(_, tested)| tested.errors == Errors::Assumed) {
-            text.push("σ is assumed in the settings, not measured; χ² depends on it.".to_owned());
-        }
-        Notice { tone, headline: self.headline(), text }
-    }
-
-    /// Residuals of all kinds of data.
-    pub fn table(&self) -> Table {
-        let head = [
-            "data",
-            "number",
-            "χ² per data point",
-            "expected",
-            "mean, σ",
-            "correlation in time",
-            "worst",
-        ];
-        let row = |(name, tested): &(String, Tested)| {
-            let Tested { statistics, errors, expected: Expected { chi2: mean, spread, .. } } =
-                tested;
-            let number = |x: Option<f64>| x.map_or("–".to_owned(), |x| format!("{x:.2}"));
-            let expected = match errors {
-                Errors::Weight => "no noise".to_owned(),
-                _ => format!("{mean:.2} ± {spread:.2}"),
-            };
-            vec![
-                name.clone(),
-                statistics.all.count.to_string(),
-                statistics.chi2().map_or("–".to_owned(), short),
-                expected,
-                number(statistics.mean()),
-                number(statistics.in_time.correlation()),
-                self.worst(tested),
-            ]
-        };
-        Table {
-            title: "Residuals".to_owned(),
-            caption: "Model minus data in units of σ, over all frames. With the right model and errors χ² per data point is as \
-                      expected, and the mean and the correlation between frames vanish. Fitted parameters lower χ².\
-                      "
-                .to_owned(),
-            head: head.map(str::to_owned).to_vec(),
-            rows: self.terms.iter().map(row).collect(),
-            links: Vec::new(),
-        }
-    }
-
-    /// The worst station, group of stations and frame with their χ² per data point.
-    fn worst(&self, tested: &Tested) -> String {
-        let statistics = &tested.statistics;
-        let station = worst(statistics.stations.iter())
-            .map(|(station, _, chi2)| format!("{} {}", self.names(&[*station]), short(chi2)));
-        let group = worst(statistics.groups.iter())
-            .map(|(stations, _, chi2)| format!("{} {}", self.names(stations), short(chi2)));
-        let frame = worst(statistics.frames.iter().enumerate())
-            .map(|(frame, _, chi2)| format!("frame {} {}", frame + 1, short(chi2)));
-        [station, group, frame].into_iter().flatten().collect::<Vec<_>>().join(", ")
+    /// Names of stations, joined: `AA–LM`.
+    pub fn names(&self, stations: &[u16]) -> String {
+        let name = |k: &u16| self.stations.get(usize::from(*k)).map_or("?", String::as_str);
+        stations.iter().map(name).collect::<Vec<_>>().join("–")
     }
 }
 
@@ -187,8 +112,8 @@ fn chi2_of(name: &str, tested: &Tested) -> String {
     format!("χ² {chi2} per data point of {name} ({expected})")
 }
 
-/// Three digits.
-pub(super) fn short(x: f64) -> String {
+/// A number with three digits.
+pub fn short(x: f64) -> String {
     match x.abs() {
         size if !(1e-3..1e5).contains(&size) => format!("{x:.2e}"),
         size if size >= 100.0 => format!("{x:.0}"),

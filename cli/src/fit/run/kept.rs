@@ -1,0 +1,346 @@
+//! What follows a fit on the terminal and keeps it in its folder.
+
+use super::folder::{self, Folder};
+use crate::devices::FitDevice;
+use crate::fit::journal::Journal;
+use crate::fit::{
+    axis_scan, band_search, closures, delegate, held_out, labels, leakage, linear, rotation_search,
+    world_search,
+};
+use crate::interrupt::Keeper;
+use crate::progress;
+use anyhow::{Context, bail};
+use indicatif::ProgressBar;
+use kerrlight_tomo::Error;
+use kerrlight_tomo::fit::settings::{FitFile, Kind};
+use kerrlight_tomo::fit::setup;
+use kerrlight_tomo::fit::{Delegate, Outcome, State, Trainer, checkpoint, journal};
+use kerrlight_tomo::recovery::{At, Choice, Event, Found, Now, Problem, Progress, Stage};
+use kerrlight_vlbi::polarimetry::LeakageTable;
+use std::time::Instant;
+
+/// A fit in its folder.
+pub struct Kept<'a> {
+    problem: &'a Problem,
+    text: &'a str,
+    pub(super) folder: &'a Folder,
+    resume: bool,
+    device: Option<FitDevice>,
+    pub(super) begun: Instant,
+    /// The work that goes on: how it is stopped, and its bar.
+    work: Option<(Keeper, Option<(&'static str, ProgressBar)>)>,
+}
+
+/// An error of the folder, as one of the fit.
+fn kept(error: anyhow::Error) -> Error {
+    Error::Kept(error.into())
+}
+
+/// What goes on.
+fn name(at: At<'_>) -> &'static str {
+    match at {
+        At::World { .. } => "world",
+        At::Band(_) => "band",
+        At::Rotation(..) => "rotation",
+        At::HeldOut(..) => "held out",
+        At::Axis(..) => "axis",
+        At::Linear(_) => "linear",
+        _ => "steps",
+    }
+}
+
+impl<'a> Kept<'a> {
+    /// Of a run of these settings.
+    pub fn new(
+        problem: &'a Problem,
+        text: &'a str,
+        (folder, resume): (&'a Folder, bool),
+        device: Option<FitDevice>,
+    ) -> Self {
+        Self { problem, text, folder, resume, device, begun: Instant::now(), work: None }
+    }
+
+    /// Ends the work that went on.
+    fn end(&mut self) {
+        if let Some((_, Some((_, bar)))) = self.work.take() {
+            bar.finish_and_clear();
+        }
+    }
+
+    /// What stops work of this kind.
+    fn keeper(&self, at: At<'_>) -> Keeper {
+        match at {
+            At::Step(_) => {
+                Keeper::saving("stopping after this step; a second signal quits at once")
+            }
+            At::Axis(..) => {
+                Keeper::brief("stopped while axes were being scanned: nothing is kept of that")
+            }
+            At::Linear(_) => Keeper::brief(
+                "stopped while the linear grid was being solved: nothing is kept of that",
+            ),
+            At::Rotation(..) => {
+                Keeper::brief("stopped while rotations were compared: nothing is kept of that")
+            }
+            _ => Keeper::brief(self.folder.stopped()),
+        }
+    }
+
+    fn bar(&self, at: At<'_>) -> ProgressBar {
+        let settings = &self.problem.settings;
+        match at {
+            At::World { .. } => progress::worlds(world_search::planned(settings).unwrap_or(0)),
+            At::Band(_) => {
+                let count = settings.band.as_ref().map_or(0, |band| {
+                    band.inclinations_deg.values().len() * band.rotation_factors.len()
+                });
+                progress::worlds(count as u64)
+            }
+            At::Rotation(_, of) => progress::rotations(of as u64),
+            At::HeldOut(..) => {
+                let held = settings.held_out.as_ref();
+                progress::held_out(held.map_or(0, |held| held.values.len() * held.folds) as u64)
+            }
+            At::Axis(_, of) => progress::axes(of as u64),
+            At::Linear(_) => progress::waiting("linear grid"),
+            _ => progress::steps(settings.training.steps),
+        }
+    }
+
+    fn shows(&self, at: At<'_>, bar: &ProgressBar) {
+        let settings = &self.problem.settings;
+        match at {
+            At::World { search, of, worlds, least } => {
+                let each = world_search::each(settings).unwrap_or(0);
+                bar.set_position((search * each + worlds) as u64);
+                bar.set_message(format!("search {} of {of}, least chi2/2 {least:.5e}", search + 1));
+            }
+            At::Band(done) => bar.set_position(done as u64),
+            At::Rotation(done, of) | At::Axis(done, of) => {
+                bar.set_length(of as u64);
+                bar.set_position(done as u64);
+            }
+            At::HeldOut(value, fold) => {
+                if let Some(held) = &settings.held_out {
+                    bar.set_position((fold * held.values.len() + value) as u64);
+                    bar.set_message(format!("{} = {}", held.setting.name(), held.values[value]));
+                }
+            }
+            At::Linear(now) => {
+                bar.set_message(format!(
+                    "round {}, {} evaluations, {} nodes, loss {:.4e}",
+                    now.round, now.evaluations, now.nodes, now.value
+                ));
+                bar.tick();
+            }
+            At::Step(step) => bar.set_position(step),
+            _ => {}
+        }
+    }
+
+    fn describe(now: &Now<'_, '_>) -> String {
+        let objective = &now.trainer.objective;
+        let (model, names) = (&objective.model, objective.names().join(", "));
+        let dark = match objective.observed().len() {
+            seen if seen < model.frames() => format!(" ({seen} of them with data)"),
+            _ => String::new(),
+        };
+        format!(
+            "{}: {names}; {} frames{dark} of {} rays, {} nodes; {} with {} parameters",
+            now.settings.title,
+            model.frames(),
+            model.rays(),
+            now.instrument.lines.points(),
+            labels::representation(&now.settings.representation.kind),
+            now.trainer.representation.parameters(),
+        )
+    }
+
+    fn record(&self, event: Event<'_>) -> anyhow::Result<()> {
+        let folder = self.folder;
+        match event {
+            Event::Axis(found) => {
+                folder.file("axis_scan.csv")?.write(axis_scan::table(&found.scan).as_bytes())?;
+                folder.file("axis_scan.png")?.write(&axis_scan::picture(&found.scan)?)?;
+                folder.log(&axis_scan::line(found))
+            }
+            Event::Linear(solution) => {
+                folder.log(&linear::solved(solution))?;
+                if self.problem.settings.representation.kind == Kind::LinearGrid {
+                    eprintln!("{}", linear::statement(solution));
+                }
+                Ok(())
+            }
+            Event::Imprinted(found) => folder.log(&linear::imprinted(found)),
+            Event::Round(round, found) => {
+                let moved = found.moved;
+                eprintln!("leakage, round {round}: the largest change is {moved:.2e}");
+                Ok(())
+            }
+            Event::Leakage(step, found) => leakage::keep(folder, step, found),
+            _ => Ok(()),
+        }
+    }
+
+    /// The state of a checkpoint of the same settings, what was written beside it, and the log up to it.
+    fn restored(
+        &self,
+        start: &State<f32>,
+    ) -> anyhow::Result<Option<(State<f32>, Option<LeakageTable>)>> {
+        let Some(bytes) = self.folder.checkpoint()? else { return Ok(None) };
+        let state = self.state(&bytes, start).with_context(|| {
+            let path = self.folder.path().join(folder::CHECKPOINT);
+            format!("{} (restore it, or remove it to start over)", path.display())
+        })?;
+        let leakage = leakage::kept(&self.problem.measured, self.folder)?;
+        self.folder.cut_log(state.now.step)?;
+        Ok(Some((state, leakage)))
+    }
+
+    fn state(&self, bytes: &[u8], start: &State<f32>) -> anyhow::Result<State<f32>> {
+        let state = checkpoint::decode(bytes, start)?;
+        if checkpoint::header(bytes)?.settings != self.text {
+            bail!("it belongs to a run with other settings");
+        }
+        Ok(state)
+    }
+
+    fn written(&self, found: &Found<'_>) -> anyhow::Result<Option<Choice>> {
+        let folder = self.folder;
+        match found {
+            Found::World(problem, unknown, found) => {
+                world_search::write(folder, problem, unknown, found)?;
+                world_search::chosen(folder, &problem.settings)
+            }
+            Found::Band(problem, scan) => {
+                band_search::write(folder, problem, scan)?;
+                band_search::chosen(folder)
+            }
+            Found::Rotation(problem, rotation) => {
+                rotation_search::write(folder, problem, rotation)?;
+                rotation_search::chosen(folder)
+            }
+            Found::Weight(file, held) => {
+                held_out::write(folder, file, held)?;
+                held_out::chosen(folder)
+            }
+            _ => Ok(Some(found.choice())),
+        }
+    }
+}
+
+impl Progress for Kept<'_> {
+    fn goes_on(&mut self, at: At<'_>) -> bool {
+        let (keeper, bar) = match self.work.take() {
+            Some((keeper, Some((kind, bar)))) if kind == name(at) => (keeper, bar),
+            Some((keeper, None)) => (keeper, self.bar(at)),
+            other => {
+                // There is one keeper at a time.
+                drop(other);
+                (self.keeper(at), self.bar(at))
+            }
+        };
+        self.shows(at, &bar);
+        let goes_on = !keeper.stopped();
+        self.work = Some((keeper, Some((name(at), bar))));
+        goes_on
+    }
+
+    fn journal(&mut self) -> Result<Box<dyn journal::Journal>, Error> {
+        self.end();
+        self.work = Some((Keeper::brief(self.folder.stopped()), None));
+        Ok(Box::new(Journal::open(self.folder).map_err(kept)?))
+    }
+
+    fn chosen(&mut self, stage: Stage) -> Result<Option<Choice>, Error> {
+        let folder = self.folder;
+        let found = match stage {
+            Stage::World => world_search::chosen(folder, &self.problem.settings),
+            Stage::Band => band_search::chosen(folder),
+            Stage::Rotation => rotation_search::chosen(folder),
+            Stage::Weight => held_out::chosen(folder),
+            _ => Ok(None),
+        };
+        found.map_err(kept)
+    }
+
+    fn keep(&mut self, found: &Found<'_>) -> Result<Choice, Error> {
+        self.end();
+        // What is read is what a resumed run will read, to the bit.
+        let choice = self.written(found).map_err(kept)?;
+        Journal::remove(self.folder);
+        Ok(choice.unwrap_or_else(|| found.choice()))
+    }
+
+    fn found(&mut self, event: Event<'_>) -> Result<(), Error> {
+        // Leakage between steps ends no work.
+        if !matches!(event, Event::Leakage(Some(_), _)) {
+            self.end();
+        }
+        self.record(event).map_err(kept)
+    }
+
+    fn device(
+        &mut self,
+        file: &FitFile,
+        trainer: &Trainer<'_, f32>,
+    ) -> Result<Option<Delegate<f32>>, Error> {
+        let device = self.device.take();
+        let delegate = |device| delegate::delegate(device, file, trainer, self.folder);
+        device.map(delegate).transpose().map_err(kept)
+    }
+
+    fn begins(&mut self, now: Now<'_, '_>) {
+        self.end();
+        eprintln!("{}", Self::describe(&now));
+        for used in closures::sentences(now.measured, &now.settings.loss) {
+            eprintln!("{used}");
+        }
+        let caution = setup::caution(now.settings).map(str::to_owned);
+        for note in caution.into_iter().chain(now.settings.unknowns()) {
+            eprintln!("note: {note}");
+        }
+    }
+
+    fn resumed(
+        &mut self,
+        start: &State<f32>,
+    ) -> Result<Option<(State<f32>, Option<LeakageTable>)>, Error> {
+        if !self.resume {
+            return Ok(None);
+        }
+        let restored = self.restored(start).map_err(kept)?;
+        if restored.is_some() {
+            self.work = Some((self.keeper(At::Step(0)), None));
+        }
+        Ok(restored)
+    }
+
+    fn starts(&mut self) -> Result<(), Error> {
+        let log = self.folder.file(folder::LOG);
+        log.and_then(|log| log.write(b"")).map_err(kept)
+    }
+
+    fn save(&mut self, state: &State<f32>) -> Result<(), Error> {
+        let bytes = checkpoint::encode(state, self.text)?;
+        self.folder.save(&bytes).map_err(kept)?;
+        if state.now.step == 0 {
+            self.end();
+            self.work = Some((self.keeper(At::Step(0)), None));
+        }
+        Ok(())
+    }
+
+    fn stepped(&mut self, now: Now<'_, '_>, outcome: Outcome) -> Result<(), Error> {
+        let Some((_, Some((_, bar)))) = &self.work else { return Ok(()) };
+        let bar = bar.clone();
+        bar.set_message(format!("loss {:.4e}", now.state.now.loss));
+        self.step(now, outcome, &bar).map_err(kept)
+    }
+}
+
+impl Drop for Kept<'_> {
+    fn drop(&mut self) {
+        self.end();
+    }
+}

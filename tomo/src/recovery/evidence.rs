@@ -1,0 +1,154 @@
+//! Whether a fit explains its data: what its residuals are judged by.
+
+use crate::Error;
+use crate::fit::settings::{DataFiles, FitFile, Loss, LossKind, Noise};
+use crate::fit::setup::Measured;
+use crate::fit::verdict::{Errors, Statistics, Tested, Verdict, ZeroSpacing, judge};
+use kerrlight_common::frames::Frames;
+use kerrlight_vlbi::products::debiased_amplitude;
+
+/// A verdict with all that it is made of.
+#[derive(Clone, Debug)]
+pub struct Judged {
+    /// What came out.
+    pub verdict: Verdict,
+    /// The kinds of data with their names.
+    pub terms: Vec<(String, Tested)>,
+    /// Flux at zero spacing, where short baselines have measured it.
+    pub flux: Option<ZeroSpacing>,
+    /// Names of the stations.
+    pub stations: Vec<String>,
+    /// Times of the frames: M; hours of UTC of a static image.
+    pub times: Vec<f64>,
+    /// Whether they are those of a static image.
+    pub is_static: bool,
+}
+
+/// Baselines shorter than this part of 1/(field of view) see the whole flux: within 0.3 % for a source whose standard
+/// deviation is a quarter of the field.
+const SHORT: f64 = 0.05;
+
+/// Losses in the order of the objective's terms: the image first.
+fn ordered(losses: &[Loss]) -> impl Iterator<Item = &Loss> {
+    let of = |image: bool| losses.iter().filter(move |l| (l.data == LossKind::Image) == image);
+    of(true).chain(of(false))
+}
+
+/// What σ of a kind of data is.
+fn errors(file: &FitFile, kind: LossKind) -> Errors {
+    let of_pixels = matches!(kind, LossKind::Image | LossKind::LightCurve);
+    match (&file.data, &file.observation) {
+        (Some(DataFiles::Movie { .. }), _) => Errors::Assumed,
+        (Some(DataFiles::Visibilities { .. } | DataFiles::LightCurve(_)), _) => Errors::Stated,
+        _ if file.light_curve.as_ref().is_some_and(|curve| curve.noise == Noise::Thermal) => {
+            Errors::Known
+        }
+        (None, Some(seen)) if !of_pixels && seen.noise == Noise::Thermal => match seen.systematic {
+            Some(part) if part > 0.0 => Errors::Stated,
+            _ => Errors::Known,
+        },
+        _ => Errors::Weight,
+    }
+}
+
+/// Data, and what they are to the fit.
+#[derive(Clone, Copy)]
+pub struct Evidence<'a> {
+    /// Settings; none of a static image, whose errors are those that its data state.
+    pub file: Option<&'a FitFile>,
+    /// What is compared.
+    pub losses: &'a [Loss],
+    /// Seed of the settings.
+    pub seed: u64,
+    /// Data.
+    pub measured: &'a Measured,
+}
+
+/// Kinds of data with their names, in the order of the losses, images first.
+pub type Compared<'a> = (Vec<&'a str>, Vec<Statistics>);
+
+impl Evidence<'_> {
+    /// Judges images of all frames.
+    ///
+    /// # Errors
+    /// If images cannot be read.
+    pub fn judged(&self, compared: Compared<'_>, movie: &Frames<f32>) -> Result<Judged, Error> {
+        self.judged_beside(compared, movie, Vec::new())
+    }
+
+    /// The same with kinds of data that are not in the losses.
+    ///
+    /// # Errors
+    /// If images cannot be read.
+    pub fn judged_beside(
+        &self,
+        (names, statistics): Compared<'_>,
+        movie: &Frames<f32>,
+        others: Vec<(String, Tested)>,
+    ) -> Result<Judged, Error> {
+        let model = self.model_visibilities(movie)?;
+        let mut terms = Vec::new();
+        for ((loss, name), statistics) in ordered(self.losses).zip(names).zip(statistics) {
+            let has_background =
+                self.measured.curve.as_ref().is_some_and(|curve| curve.background.is_some());
+            let shared = has_background || self.measured.varies;
+            let errors = match self.file {
+                _ if shared => Errors::Shared,
+                Some(file) => errors(file, loss.data),
+                None => Errors::Stated,
+            };
+            let mut tested = Tested::gaussian(statistics, errors);
+            if tested.errors != Errors::Weight
+                && let Some(model) = &model
+                && let Some(draws) = self.draws(loss, model)
+            {
+                tested = tested.among(&draws);
+            }
+            terms.push((name.to_owned(), tested));
+        }
+        terms.extend(others);
+        let tested: Vec<Tested> = terms.iter().map(|(_, tested)| tested.clone()).collect();
+        let flux = self.zero_spacing(movie)?;
+        let knows_flux =
+            |loss: &Loss| loss.data.is_visibilities() || loss.data == LossKind::Amplitudes;
+        // Gains that are free may be what is missing.
+        let knows = self.measured.gains.is_none() && self.losses.iter().any(knows_flux);
+        let judged = flux.filter(|_| knows);
+        let observation = self.measured.visibilities.as_ref().map(|(observation, _)| observation);
+        let stations = observation.map(|o| o.stations.iter().map(|s| s.name.clone()).collect());
+        Ok(Judged {
+            verdict: judge(&tested, judged),
+            terms,
+            flux,
+            stations: stations.unwrap_or_default(),
+            times: self.measured.times.clone(),
+            is_static: self.file.is_none(),
+        })
+    }
+
+    /// What baselines have measured that resolve nothing of the field of view.
+    fn zero_spacing(&self, movie: &Frames<f32>) -> Result<Option<ZeroSpacing>, Error> {
+        let (Some((observation, frames)), Some(sky)) =
+            (&self.measured.visibilities, self.measured.sky)
+        else {
+            return Ok(None);
+        };
+        let shortest = SHORT / (sky.pixel_rad * sky.width as f64);
+        let flux = movie.sums()?;
+        let (mut count, mut weights, mut sums) = (0, 0.0, [0.0; 2]);
+        for (row, frame) in observation.rows.iter().zip(frames) {
+            let Some(i) = row.stokes_i(observation.basis) else { continue };
+            if row.uv[0].hypot(row.uv[1]) > shortest || i.noise_sigma <= 0.0 {
+                continue;
+            }
+            let weight = i.noise_sigma.powi(-2);
+            count += 1;
+            weights += weight;
+            sums[0] += weight * debiased_amplitude(&i);
+            sums[1] += weight * flux.get(*frame).copied().unwrap_or(f64::NAN);
+        }
+        let [measured_jy, model_jy] = sums.map(|sum| sum / weights);
+        let error_jy = weights.powf(-0.5);
+        Ok((count > 0).then_some(ZeroSpacing { measured_jy, error_jy, model_jy, count }))
+    }
+}

@@ -1,0 +1,214 @@
+//! A fit as a function: from settings and data to the emission, its movie and a verdict.
+//!
+//! [`Problem`] (settings, rays, data) → searches for what of the world is not known → start → steps → [`Recovery`].
+//! [`Progress`] follows a fit, stops it and keeps what it finds.
+
+mod evidence;
+mod expected;
+mod fields;
+mod pictured;
+mod problem;
+mod progress;
+mod search;
+mod start;
+mod steps;
+#[cfg(test)]
+mod tests;
+mod words;
+
+pub use evidence::{Compared, Evidence, Judged};
+pub use fields::{carried, compare, recovered, recovered_at, true_volume, true_volume_at};
+pub use problem::Problem;
+pub use progress::{At, Event, Now, Progress, Silent};
+pub use search::{Choice, Found, Placed, Searched, Stage, settled};
+pub use start::FoundAxis;
+pub use words::short;
+
+use crate::Error;
+use crate::fit::settings::{FitFile, Kind};
+use crate::fit::setup::{self, HeldData, Instrument, Measured};
+use crate::fit::{Loss, Motion, State, Trainer};
+use kerrlight_common::frames::Frames;
+use kerrlight_render::volume::Volume;
+use kerrlight_render::volume::metrics::{self, Comparison, Mask};
+
+/// Why a fit ended before its end: it was told to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Stopped {
+    /// In a search that goes on where it was.
+    #[error("stopped")]
+    Kept,
+    /// In work of which nothing is kept.
+    #[error("stopped while {0}: nothing is kept of that")]
+    Lost(&'static str),
+    /// After this step.
+    #[error("stopped after step {0}")]
+    After(u64),
+}
+
+/// A fit that has come to its end, with all that it is made of.
+pub struct Fit<'a, 't> {
+    /// Settings, with what was found of the world.
+    pub file: &'a FitFile,
+    /// Rays.
+    pub instrument: &'a Instrument,
+    /// Motion.
+    pub motion: &'a Motion,
+    /// Data.
+    pub measured: &'a Measured,
+    /// The truth at the reference time, where data are simulated.
+    pub true_volume: Option<Volume>,
+    /// What a search for the world has found in this call.
+    pub searched: Option<Searched>,
+    /// The fit with its memory.
+    pub trainer: Trainer<'t, f32>,
+}
+
+/// What a fit recovers.
+#[derive(Debug)]
+pub struct Recovery {
+    /// Settings, with what was found of the world in place of what was assumed.
+    pub settings: FitFile,
+    /// What a search for the world has found; none if the world was known.
+    pub searched: Option<Searched>,
+    /// Emission at the reference time, dimensionless, zero outside the region of recovery.
+    pub volume: Volume,
+    /// Images at the times of the data, Jy/pixel, rows from the top.
+    pub movie: Frames<f32>,
+    /// Times of its images, M.
+    pub times: Vec<f64>,
+    /// The loss of all data, without penalties.
+    pub loss: Loss,
+    /// Residuals of each kind of data, and whether the model explains them.
+    pub judged: Judged,
+    /// How close the volume is to the truth inside the region, where data are simulated.
+    pub closeness: Option<Comparison>,
+    /// Parameters of the representation, and the axis.
+    pub state: State<f32>,
+}
+
+/// Recovers the emission of a problem.
+///
+/// # Errors
+/// If a setting is missing or out of range, a problem has no solution, the loss grows whatever the rate, or `progress`
+/// stops it.
+pub fn fit(problem: &Problem, progress: &mut dyn Progress) -> Result<Recovery, Error> {
+    fit_with(problem, progress, |fit, state| fit.recovery(state))
+}
+
+/// The same, with all that the fit is made of in place of the recovery alone.
+///
+/// # Errors
+/// As [`fit`], and those of `finish`.
+pub fn fit_with<R, E: From<Error>>(
+    problem: &Problem,
+    progress: &mut dyn Progress,
+    finish: impl FnOnce(&mut Fit<'_, '_>, &State<f32>) -> Result<R, E>,
+) -> Result<R, E> {
+    let (placed, searched) = search::placed(problem, progress)?.unzip();
+    let (file, instrument, motion, measured) = match &placed {
+        Some(Placed { file, instrument, motion, measured }) => {
+            (file, instrument, motion, measured.as_ref().unwrap_or(&problem.measured))
+        }
+        None => (&problem.settings, &problem.instrument, &problem.motion, &problem.measured),
+    };
+    let mut objective = problem.objective(instrument, motion, measured)?;
+    let times = setup::emission_times(instrument, motion);
+    let (axis, axis_rate) = setup::axis(file)?;
+    let data = HeldData { objective: &mut objective, measured };
+    let file = &search::weighed_before_steps(file, data, (axis, times), progress)?;
+    let representation = setup::representation(file, &problem.registry, times)?;
+    let training = setup::training(file, axis_rate, times)?;
+    let mut state = State::new(&*representation, axis, &training);
+    let mut trainer = Trainer::new(objective, &*representation, training);
+    trainer.device = progress.device(file, &trainer)?;
+    let truth = measured.truth.as_ref();
+    let true_volume = truth.map(|truth| true_volume(file, truth)).transpose()?;
+    let searched = searched.flatten();
+    let mut fit = Fit { file, instrument, motion, measured, true_volume, searched, trainer };
+    progress.begins(fit.now(&state));
+    match progress.resumed(&state)? {
+        Some((earlier, leakage)) => {
+            state = earlier;
+            leakage.iter().for_each(|table| measured.restore_leakage(table));
+        }
+        None => {
+            progress.starts()?;
+            fit.start(&mut state, (motion, times), progress)?;
+            progress.save(&state)?;
+        }
+    }
+    if file.representation.kind != Kind::LinearGrid {
+        fit.steps(&mut state, progress)?;
+    }
+    finish(&mut fit, &state)
+}
+
+impl<'t> Fit<'_, 't> {
+    /// The fit as it is.
+    fn now<'b>(&'b mut self, state: &'b State<f32>) -> Now<'b, 't> {
+        Now {
+            settings: self.file,
+            instrument: self.instrument,
+            measured: self.measured,
+            true_volume: self.true_volume.as_ref(),
+            trainer: &mut self.trainer,
+            state,
+        }
+    }
+
+    /// All frames as the data see them: images, images of Stokes parameters, or fluxes.
+    ///
+    /// # Errors
+    /// If residuals are not finite, or everything is dark where dark is no result.
+    pub fn seen(&mut self, state: &State<f32>) -> Result<Frames<f32>, Error> {
+        let frames: Vec<usize> = (0..self.measured.times.len()).collect();
+        let seen = self.trainer.images(&state.now, &frames, true)?;
+        self.check(&frames, &seen)?;
+        Ok(seen)
+    }
+
+    /// What the residuals are judged by.
+    pub fn evidence(&self) -> Evidence<'_> {
+        let Fit { file, measured, .. } = *self;
+        Evidence { file: Some(file), losses: &file.loss, seed: file.seed, measured }
+    }
+
+    /// Whether the model explains its data, of which it sees `seen` in `movie`.
+    ///
+    /// # Errors
+    /// If images cannot be read.
+    pub fn judged(&self, seen: &Frames<f32>, movie: &Frames<f32>) -> Result<Judged, Error> {
+        let objective = &self.trainer.objective;
+        self.evidence().judged((objective.names(), objective.statistics(seen)?), movie)
+    }
+
+    fn recovery(&mut self, state: &State<f32>) -> Result<Recovery, Error> {
+        let volume = recovered(self.file, &mut self.trainer, state)?;
+        let seen = self.seen(state)?;
+        let frames: Vec<usize> = (0..self.measured.times.len()).collect();
+        let loss = self.trainer.objective.loss_of(&frames, &seen)?;
+        let movie = self.pictured(state, &seen)?;
+        let judged = self.judged(&seen, &movie)?;
+        let closeness = self.closeness(&volume)?;
+        Ok(Recovery {
+            settings: self.file.clone(),
+            searched: self.searched.take(),
+            volume,
+            movie,
+            times: self.measured.times.clone(),
+            loss,
+            judged,
+            closeness,
+            state: state.clone(),
+        })
+    }
+
+    /// How close a volume is to the truth inside the region; none without a truth.
+    fn closeness(&self, volume: &Volume) -> Result<Option<Comparison>, Error> {
+        let Some(truth) = &self.true_volume else { return Ok(None) };
+        let region = self.file.region.limits();
+        let mask = Mask::new(region.r_min, region.r_max, region.z_width)?;
+        Ok(Some(metrics::compare(volume, truth, Some(&mask))?))
+    }
+}

@@ -1,0 +1,131 @@
+//! What is fitted: settings with their data.
+
+use crate::Error;
+use crate::fit::settings::{AxisSearch, FitError, FitFile};
+use crate::fit::setup::{self, Instrument, Measured};
+use crate::fit::{Motion, Objective};
+use crate::representation::Registry;
+use kerrlight_vlbi::array::Array;
+use kerrlight_vlbi::light_curve::LightCurve;
+use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::simulate::Movie;
+
+/// A fit with its data: all that can be found wrong is, before anything is computed for long.
+pub struct Problem {
+    /// Settings.
+    pub settings: FitFile,
+    /// Representations beside kerrlight's own.
+    pub registry: Registry,
+    /// Rays.
+    pub instrument: Instrument,
+    /// Data.
+    pub measured: Measured,
+    /// Motion.
+    pub motion: Motion,
+}
+
+impl Problem {
+    /// Simulates the data: what `settings.truth` shines, seen by `array` where there is an observation.
+    ///
+    /// # Errors
+    /// If settings are missing, out of range or contradict each other.
+    pub fn simulated(settings: FitFile, array: Option<&Array>) -> Result<Self, Error> {
+        let measure = |settings: &FitFile, instrument: &Instrument| {
+            Measured::simulated(settings, instrument, array)
+        };
+        Self::new(settings, Registry::new(), measure)
+    }
+
+    /// Takes measured visibilities, whose preparation `settings.data` describes.
+    ///
+    /// # Errors
+    /// As [`Problem::simulated`], and if visibilities lack errors, mass or distance.
+    pub fn of_visibilities(settings: FitFile, observation: Observation) -> Result<Self, Error> {
+        let measure = |settings: &FitFile, _: &Instrument| {
+            Measured::of_visibilities(settings, observation, "the observation")
+        };
+        Self::new(settings, Registry::new(), measure)
+    }
+
+    /// Takes images in Jy/pixel, rows from the top.
+    ///
+    /// # Errors
+    /// As [`Problem::simulated`], and if there are other frames or pixels than the settings say.
+    pub fn of_movie(settings: FitFile, movie: Movie) -> Result<Self, Error> {
+        let measure = |settings: &FitFile, _: &Instrument| {
+            let Movie { grid, pixels } = movie;
+            let frames = kerrlight_common::frames::Frames::of(pixels, grid.pixels());
+            Measured::of_movie(settings, (frames, [grid.width, grid.height]), "the movie")
+        };
+        Self::new(settings, Registry::new(), measure)
+    }
+
+    /// Takes the light curve of an unresolved source, which `settings.data` describes.
+    ///
+    /// # Errors
+    /// As [`Problem::simulated`], and if a Stokes parameter or an error is missing.
+    pub fn of_light_curve(settings: FitFile, curve: LightCurve) -> Result<Self, Error> {
+        let measure = |settings: &FitFile, _: &Instrument| {
+            Measured::of_light_curve(settings, curve, "the light curve")
+        };
+        Self::new(settings, Registry::new(), measure)
+    }
+
+    /// Checks settings, traces rays and takes the data that `measure` makes.
+    ///
+    /// # Errors
+    /// If settings are missing, out of range or contradict each other or the data; and those of `measure`.
+    pub fn new<E: From<Error>>(
+        settings: FitFile,
+        registry: Registry,
+        measure: impl FnOnce(&FitFile, &Instrument) -> Result<Measured, E>,
+    ) -> Result<Self, E> {
+        setup::afford_all(&settings, &registry)?;
+        setup::check(&settings, &registry)?;
+        let instrument = Instrument::new(&settings)?;
+        Measured::check_origin(&settings)?;
+        let measured = measure(&settings, &instrument)?;
+        let motion = setup::motion(&settings, measured.times.clone())?;
+        let problem = Self { settings, registry, instrument, measured, motion };
+        problem.check()?;
+        Ok(problem)
+    }
+
+    /// Refuses what settings and data do not allow together.
+    fn check(&self) -> Result<(), Error> {
+        let Self { settings, registry, instrument, measured, motion } = self;
+        if let Some(band) = &settings.band {
+            setup::check_band(settings, measured, band)?;
+        }
+        // Times at which emission may change are those of the rays.
+        setup::representation(settings, registry, setup::emission_times(instrument, motion))?;
+        if let Some(unknown) = settings.unknown_world()? {
+            let world = setup::known_world(settings);
+            setup::in_world(settings, &unknown, instrument, measured, &world, 0)?;
+        }
+        let seen = self.objective(instrument, motion, measured)?.observed().len();
+        if let Some(held_out) = &settings.held_out {
+            setup::check_folds(held_out, seen, measured)?;
+        }
+        if matches!(settings.axis, AxisSearch::Scan(_)) && seen < 2 {
+            let why = "axis.scan needs at least 2 frame times: a single frame does not constrain the axis";
+            return Err(FitError::Conflict(why.to_owned()).into());
+        }
+        Ok(())
+    }
+
+    /// What is minimised, seen through these rays.
+    ///
+    /// # Errors
+    /// If a loss needs data that are not there.
+    pub fn objective(
+        &self,
+        instrument: &Instrument,
+        motion: &Motion,
+        measured: &Measured,
+    ) -> Result<Objective<f32>, Error> {
+        let pixels = self.settings.screen.pixels * self.settings.screen.pixels;
+        let data = measured.terms(&self.settings.loss, pixels)?;
+        Ok(Objective { model: setup::forward_model(instrument, motion)?, data })
+    }
+}

@@ -1,0 +1,170 @@
+//! What a fit tells while it runs, and what it keeps.
+
+use super::search::{Choice, Found, Stage};
+use super::start::FoundAxis;
+use crate::Error;
+use crate::fit::journal::{Forgetful, Journal};
+use crate::fit::linear::{LinearProgress, LinearSolution};
+use crate::fit::settings::FitFile;
+use crate::fit::setup::{Imprinted, Instrument, Measured, SolvedLeakage};
+use crate::fit::{Delegate, Outcome, State, Trainer};
+use kerrlight_render::volume::Volume;
+use kerrlight_vlbi::polarimetry::LeakageTable;
+
+/// How far a fit has come.
+#[derive(Clone, Copy)]
+#[non_exhaustive]
+pub enum At<'a> {
+    /// The search for the world.
+    World {
+        /// Which search, from 0.
+        search: usize,
+        /// Of so many.
+        of: usize,
+        /// Worlds that it has evaluated.
+        worlds: usize,
+        /// Least χ²/2 so far.
+        least: f64,
+    },
+    /// Worlds that were weighed by the light curve of a band.
+    Band(usize),
+    /// Rotations of position angles that were compared, of about so many.
+    Rotation(usize, usize),
+    /// A value, and a part of the data that is held out, from 0.
+    HeldOut(usize, usize),
+    /// Axes that were compared, of about so many.
+    Axis(usize, usize),
+    /// The linear problem.
+    Linear(&'a LinearProgress<'a>),
+    /// Steps that were taken.
+    Step(u64),
+}
+
+/// What a fit has found on its way.
+#[derive(Clone, Copy)]
+#[non_exhaustive]
+pub enum Event<'a> {
+    /// The axis, from a scan of the whole sphere.
+    Axis(&'a FoundAxis),
+    /// The linear problem is solved.
+    Linear(&'a LinearSolution<f32>),
+    /// The representation has learnt that solution.
+    Imprinted(&'a Imprinted),
+    /// Leakage, in a round of the linear problem.
+    Round(usize, &'a SolvedLeakage),
+    /// Leakage of the last round, or before a step.
+    Leakage(Option<u64>, &'a SolvedLeakage),
+}
+
+/// A fit before its first step, or after one.
+pub struct Now<'a, 't> {
+    /// Settings, with what was found of the world.
+    pub settings: &'a FitFile,
+    /// Rays.
+    pub instrument: &'a Instrument,
+    /// Data.
+    pub measured: &'a Measured,
+    /// The truth at the reference time, where data are simulated.
+    pub true_volume: Option<&'a Volume>,
+    /// The fit with its memory.
+    pub trainer: &'a mut Trainer<'t, f32>,
+    /// Where it is.
+    pub state: &'a State<f32>,
+}
+
+/// Follows a fit, stops it, and keeps what it finds, so that it can go on after an interruption. Every method does
+/// nothing unless it is overridden.
+pub trait Progress: Send {
+    /// Told how far the fit has come; `false` stops it.
+    fn goes_on(&mut self, _: At<'_>) -> bool {
+        true
+    }
+
+    /// The journal of the search that begins.
+    ///
+    /// # Errors
+    /// If it cannot be opened.
+    fn journal(&mut self) -> Result<Box<dyn Journal>, Error> {
+        Ok(Box::new(Forgetful))
+    }
+
+    /// What an interrupted fit has chosen in a stage.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    fn chosen(&mut self, _: Stage) -> Result<Option<Choice>, Error> {
+        Ok(None)
+    }
+
+    /// Keeps what a search has found; what it returns is what [`Progress::chosen`] will, to the bit.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    fn keep(&mut self, found: &Found<'_>) -> Result<Choice, Error> {
+        Ok(found.choice())
+    }
+
+    /// Told what was found.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    fn found(&mut self, _: Event<'_>) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// A device that takes the steps.
+    ///
+    /// # Errors
+    /// If there is one, and it cannot.
+    fn device(
+        &mut self,
+        _: &FitFile,
+        _: &Trainer<'_, f32>,
+    ) -> Result<Option<Delegate<f32>>, Error> {
+        Ok(None)
+    }
+
+    /// Told what is fitted, before anything is.
+    fn begins(&mut self, _: Now<'_, '_>) {}
+
+    /// The state of an interrupted fit, with the leakage that it had found; `start` is that of a new one.
+    ///
+    /// # Errors
+    /// If it cannot be read, or is that of another fit.
+    fn resumed(
+        &mut self,
+        _: &State<f32>,
+    ) -> Result<Option<(State<f32>, Option<LeakageTable>)>, Error> {
+        Ok(None)
+    }
+
+    /// Told before a fit starts that resumes no other.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    fn starts(&mut self) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// Keeps a state.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    fn save(&mut self, _: &State<f32>) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// Told of a step.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    fn stepped(&mut self, _: Now<'_, '_>, _: Outcome) -> Result<(), Error> {
+        Ok(())
+    }
+}
+
+/// Tells nothing and keeps nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Progress for Silent {}

@@ -1,0 +1,307 @@
+//! Searches that come before the emission: the world, a band, a rotation of position angles, a weight.
+
+use super::progress::{At, Progress};
+use super::{Problem, Stopped};
+use crate::Error;
+use crate::fit::settings::{FitFile, Kind, UnknownWorld};
+use crate::fit::setup::{
+    self, BandScan, FoundWorld, Held, HeldData, Instrument, Measured, Rotation,
+};
+use crate::fit::world::{Parameter, World};
+use crate::fit::{FluxDatum, Motion};
+use kerrlight_render::dynamics::{Axis, Velocity};
+use std::sync::{Mutex, PoisonError};
+
+/// What is looked for before the emission is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Stage {
+    /// The parameters of the world that are not known.
+    World,
+    /// The same, by the light curve of a flare in an orbital band.
+    Band,
+    /// A rotation of all position angles.
+    Rotation,
+    /// A weight, by data that are held out.
+    Weight,
+}
+
+/// What a search has found.
+#[derive(Clone, Copy)]
+#[non_exhaustive]
+pub enum Found<'a> {
+    /// The world, of these settings and data.
+    World(&'a Problem, &'a UnknownWorld, &'a FoundWorld),
+    /// Worlds and bands.
+    Band(&'a Problem, &'a BandScan),
+    /// A rotation.
+    Rotation(&'a Problem, &'a Rotation),
+    /// Values of a weight.
+    Weight(&'a FitFile, &'a [Held]),
+}
+
+/// What a search has found, of its own.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum Searched {
+    /// The world, with its errors.
+    World(FoundWorld),
+    /// Worlds and bands, with their probabilities.
+    Band(BandScan),
+    /// A rotation.
+    Rotation(Rotation),
+}
+
+/// What of it the rest of the fit goes on with.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Choice {
+    /// The world.
+    World(World),
+    /// The best band.
+    Band {
+        /// Degrees.
+        inclination_deg: f64,
+        /// Degrees east of north.
+        position_angle_deg: f64,
+        /// Of the angular velocity.
+        rotation_factor: f64,
+        /// What the background is expected to be, Jy with its standard deviation.
+        background: Option<Vec<FluxDatum>>,
+    },
+    /// Degrees.
+    Rotation(f64),
+    /// Dimensionless, in the unit of its setting.
+    Weight(f64),
+}
+
+impl Found<'_> {
+    /// What the fit goes on with.
+    pub fn choice(&self) -> Choice {
+        match self {
+            Found::World(_, _, found) => Choice::World(found.world),
+            Found::Band(_, scan) => {
+                let best = &scan.worlds[scan.best];
+                Choice::Band {
+                    inclination_deg: best.inclination_deg,
+                    position_angle_deg: best.position_angle_deg,
+                    rotation_factor: best.rotation_factor,
+                    background: scan.background.clone(),
+                }
+            }
+            Found::Rotation(_, rotation) => Choice::Rotation(rotation.angle_deg),
+            Found::Weight(_, held) => {
+                Choice::Weight(setup::best_held(held).map_or(f64::NAN, |best| best.value))
+            }
+        }
+    }
+}
+
+/// Settings, rays, motion and data in the world that was found.
+pub struct Placed {
+    /// Settings with what was found in place of what was assumed.
+    pub file: FitFile,
+    /// Rays.
+    pub instrument: Instrument,
+    /// Motion.
+    pub motion: Motion,
+    /// The data, where they are not those that were read.
+    pub measured: Option<Measured>,
+}
+
+impl Placed {
+    /// In a world; rays are those of this number near the critical curve.
+    ///
+    /// # Errors
+    /// If the world is out of range.
+    pub fn in_world(
+        problem: &Problem,
+        file: &FitFile,
+        (unknown, world, rays): (&UnknownWorld, &World, u64),
+    ) -> Result<Self, Error> {
+        let Problem { instrument, measured, .. } = problem;
+        let (instrument, motion) =
+            setup::in_world(file, unknown, instrument, measured, world, rays)?;
+        Ok(Self { file: settled(file, unknown, world), instrument, motion, measured: None })
+    }
+
+    fn of(problem: &Problem, choice: &Choice) -> Result<Option<Self>, Error> {
+        let Problem { settings, measured, .. } = problem;
+        let placed = match choice {
+            Choice::World(world) => {
+                let unknown = settings.unknown_world()?;
+                let unknown = unknown
+                    .as_ref()
+                    .map(|unknown| Self::in_world(problem, settings, (unknown, world, 0)));
+                return unknown.transpose();
+            }
+            Choice::Band { inclination_deg, position_angle_deg, rotation_factor, background } => {
+                let mut file = setup::in_band_world(settings, *inclination_deg);
+                if let Some(law) = &mut file.polarization {
+                    law.turn_deg += position_angle_deg;
+                }
+                let motion = setup::band_motion(&file, measured, *rotation_factor)?;
+                let instrument = Instrument::new(&file)?;
+                let measured = background.as_ref().map(|values| measured.before(values.clone()));
+                Self { file, instrument, motion, measured }
+            }
+            Choice::Rotation(angle) => {
+                let mut file = settings.clone();
+                if let Some(law) = &mut file.polarization {
+                    law.turn_deg += angle;
+                }
+                let motion = setup::motion(settings, measured.times.clone())?;
+                let instrument = Instrument::new(&file)?;
+                Self { file, instrument, motion, measured: None }
+            }
+            Choice::Weight(_) => return Ok(None),
+        };
+        Ok(Some(placed))
+    }
+}
+
+/// Looks for what of the world is not known; none if all of it is.
+pub(super) fn placed(
+    problem: &Problem,
+    progress: &mut dyn Progress,
+) -> Result<Option<(Placed, Option<Searched>)>, Error> {
+    let settings = &problem.settings;
+    let unknown = settings.unknown_world()?;
+    let stage = match (&unknown, &settings.band, &settings.faraday) {
+        (Some(_), ..) => Stage::World,
+        (_, Some(_), _) => Stage::Band,
+        (.., Some(_)) => Stage::Rotation,
+        _ => return Ok(None),
+    };
+    let (choice, searched) = match (progress.chosen(stage)?, stage, &unknown) {
+        (Some(choice), ..) => (choice, None),
+        (None, Stage::World, Some(unknown)) => {
+            let found = world(problem, unknown, progress)?;
+            let choice = progress.keep(&Found::World(problem, unknown, &found))?;
+            (choice, Some(Searched::World(found)))
+        }
+        (None, Stage::Band, _) => {
+            let found = band(problem, progress)?;
+            (progress.keep(&Found::Band(problem, &found))?, Some(Searched::Band(found)))
+        }
+        _ => {
+            let found = rotation(problem, progress)?;
+            (progress.keep(&Found::Rotation(problem, &found))?, Some(Searched::Rotation(found)))
+        }
+    };
+    Ok(Placed::of(problem, &choice)?.map(|placed| (placed, searched)))
+}
+
+fn world(
+    problem: &Problem,
+    unknown: &UnknownWorld,
+    progress: &mut dyn Progress,
+) -> Result<FoundWorld, Error> {
+    let journal = progress.journal()?;
+    let mut watch = |(search, of): (usize, usize), worlds: usize, least: f64| {
+        progress.goes_on(At::World { search, of, worlds, least })
+    };
+    let Problem { settings, measured, .. } = problem;
+    let found = setup::find_world(settings, measured, unknown, &*journal, &mut watch)
+        .map_err(|error| error.while_in("world.search"))?;
+    Ok(found.ok_or(Stopped::Kept)?)
+}
+
+fn band(problem: &Problem, progress: &mut dyn Progress) -> Result<BandScan, Error> {
+    let Problem { settings, measured, .. } = problem;
+    let Some(band) = &settings.band else { return Err(Stopped::Kept.into()) };
+    let journal = progress.journal()?;
+    let told = Mutex::new(&mut *progress);
+    let watch =
+        |done: usize| told.lock().unwrap_or_else(PoisonError::into_inner).goes_on(At::Band(done));
+    let scan = setup::scan_band(settings, measured, band, &*journal, &watch)
+        .map_err(|error| error.while_in("band"))?;
+    Ok(scan.ok_or(Stopped::Kept)?)
+}
+
+fn rotation(problem: &Problem, progress: &mut dyn Progress) -> Result<Rotation, Error> {
+    let Problem { settings, instrument, measured, .. } = problem;
+    let Some(faraday) = &settings.faraday else {
+        return Err(Stopped::Lost("rotations were compared").into());
+    };
+    let motion = setup::motion(settings, measured.times.clone())?;
+    let mut objective = problem.objective(instrument, &motion, measured)?;
+    let (axis, _) = setup::axis(settings)?;
+    objective.model.weigh(axis);
+    let mut watch = |done: usize, of: usize| progress.goes_on(At::Rotation(done, of));
+    let seen = (axis, &instrument.seen);
+    let found = setup::find_rotation((settings, faraday), &objective, seen, &mut watch)
+        .map_err(|error| error.while_in("faraday"))?;
+    Ok(found.ok_or(Stopped::Lost("rotations were compared"))?)
+}
+
+/// The settings with the weight that held-out data choose.
+pub(super) fn weighed(
+    file: &FitFile,
+    data: HeldData<'_>,
+    about: (Axis, [f64; 2]),
+    progress: &mut dyn Progress,
+) -> Result<FitFile, Error> {
+    let Some(settings) = &file.held_out else { return Ok(file.clone()) };
+    let choice = match progress.chosen(Stage::Weight)? {
+        Some(choice) => choice,
+        None => {
+            let journal = progress.journal()?;
+            let mut watch = |value: usize, fold: usize| progress.goes_on(At::HeldOut(value, fold));
+            let held = setup::hold_out(file, settings, data, about, &*journal, &mut watch)
+                .map_err(|error| error.while_in("held_out"))?;
+            progress.keep(&Found::Weight(file, &held.ok_or(Stopped::Kept)?))?
+        }
+    };
+    Ok(match choice {
+        Choice::Weight(chosen) => settings.setting.put(file.clone(), chosen),
+        _ => file.clone(),
+    })
+}
+
+/// The same for a representation that is learnt in steps, whose price of change is part of every step. What a linear
+/// grid chooses is chosen where it is solved.
+pub(super) fn weighed_before_steps(
+    file: &FitFile,
+    data: HeldData<'_>,
+    about: (Axis, [f64; 2]),
+    progress: &mut dyn Progress,
+) -> Result<FitFile, Error> {
+    match file.representation.kind {
+        Kind::LinearGrid => Ok(file.clone()),
+        _ => weighed(file, data, about, progress),
+    }
+}
+
+/// The settings with what was found in place of what was assumed.
+pub fn settled(file: &FitFile, unknown: &UnknownWorld, world: &World) -> FitFile {
+    let mut file = file.clone();
+    file.hole.spin = world.get(Parameter::Spin);
+    file.observer.inclination_deg = world.get(Parameter::Inclination).to_degrees();
+    if let Some(power) = &mut file.effects.redshift_power {
+        *power = world.get(Parameter::RedshiftPower);
+    }
+    let follows = unknown.search.drag_is_spin;
+    match &mut file.motion.velocity {
+        // That of the hole that was found.
+        Velocity::Keplerian { drag } if follows => *drag = None,
+        Velocity::Infall { xi, beta_r, beta_phi, drag } => {
+            for (number, parameter) in [xi, beta_r, beta_phi].into_iter().zip(Parameter::FLOW) {
+                *number = world.get(parameter);
+            }
+            if follows {
+                *drag = None;
+            }
+        }
+        Velocity::Profile { angular, radial, .. } if unknown.knots > 0 => {
+            let times = |values: &mut [f64], of: fn(u8) -> Parameter| {
+                let factors = (0..).map(|knot| world.get(of(knot)));
+                values.iter_mut().zip(factors).for_each(|(value, factor)| *value *= factor);
+            };
+            times(angular, Parameter::Angular);
+            times(radial, Parameter::Radial);
+        }
+        _ => {}
+    }
+    file
+}

@@ -1,0 +1,170 @@
+//! What a fit starts from: an axis, the solution of a linear problem, leakage.
+
+use super::progress::{At, Event, Progress};
+use super::search::weighed;
+use super::{Fit, Stopped};
+use crate::Error;
+use crate::fit::linear::{Change, Ending, LinearProgress, LinearSolution, Voxels};
+use crate::fit::scan::{
+    AxisLoss, AxisProblem, AxisScan, AxisSettings, Effort, refine_axis, scan_axis,
+};
+use crate::fit::settings::{AxisScan as AxisScanSettings, AxisSearch, FitFile, Kind, Start};
+use crate::fit::setup::{self, CoarseView, Given, HeldData, Measured, SolvedLeakage};
+use crate::fit::{Batch, Beside, Field, Motion, State, Trainer};
+use crate::representation::{Representation, Workspace};
+use core::ops::ControlFlow;
+use kerrlight_render::dynamics::Axis;
+use std::sync::{Mutex, PoisonError};
+
+/// The axis that a scan has found.
+#[derive(Clone, Debug)]
+pub struct FoundAxis {
+    /// On the whole sphere.
+    pub scan: AxisScan,
+    /// Near the best one, with a finer grid.
+    pub refined: Option<AxisLoss>,
+}
+
+impl FoundAxis {
+    /// The best axis.
+    pub fn axis(&self) -> Axis {
+        self.refined.unwrap_or(self.scan.best).axis
+    }
+}
+
+/// First step of the refinement: half of what lattice points of 200 are apart by, and its halvings.
+const STEP: f64 = 0.06;
+const HALVINGS: usize = 3;
+
+/// Iterations of the refinement's grids: with few, a wrong axis is as good as the right one.
+fn fine(nodes: usize) -> Effort {
+    Effort { nodes, iterations: 40 }
+}
+
+/// The loss over the whole sphere of axes, and the best one.
+fn scan(
+    (file, settings): (&FitFile, &AxisScanSettings),
+    measured: &Measured,
+    motion: &Motion,
+    progress: &mut dyn Progress,
+) -> Result<FoundAxis, Error> {
+    let AxisScanSettings { directions, frames, pixels, refine, .. } = *settings;
+    let stopped = || Error::from(Stopped::Lost("axes were being scanned"));
+    let view = CoarseView::new(file, measured, pixels)?;
+    let settings = AxisSettings { directions, ..AxisSettings::default() };
+    let told = Mutex::new(progress);
+    let watch = |solved: usize, expected: usize| {
+        let mut progress = told.lock().unwrap_or_else(PoisonError::into_inner);
+        progress.goes_on(At::Axis(solved, expected))
+    };
+    let whole = |problem: &AxisProblem<'_, f32>| scan_axis(problem, &settings, &watch);
+    let scan = view.search(motion, frames, whole)?.ok_or_else(stopped)?;
+    let refined = refine.map(|nodes| -> Result<AxisLoss, Error> {
+        let view = CoarseView::new(file, measured, file.screen.pixels)?;
+        let effort = (fine(nodes), HALVINGS);
+        let near = |problem: &AxisProblem<'_, f32>| {
+            refine_axis(problem, scan.best.axis, STEP, effort, &watch)
+        };
+        view.search(motion, frames, near)?.ok_or_else(stopped)
+    });
+    Ok(FoundAxis { refined: refined.transpose()?, scan })
+}
+
+impl Fit<'_, '_> {
+    /// The axis and the parameters that a scan and the linear problem give to begin with.
+    pub(super) fn start(
+        &mut self,
+        state: &mut State<f32>,
+        (motion, times): (&Motion, [f64; 2]),
+        progress: &mut dyn Progress,
+    ) -> Result<(), Error> {
+        let file = self.file;
+        if let AxisSearch::Scan(settings) = &file.axis {
+            let found = scan((file, settings), self.measured, motion, progress)
+                .map_err(|error| error.while_in("axis.scan"))?;
+            state.now.axis = found.axis();
+            progress.found(Event::Axis(&found))?;
+        }
+        let axis = state.now.axis;
+        let measured = self.measured;
+        let trainer = &mut self.trainer;
+        if file.representation.kind == Kind::LinearGrid {
+            let nodes = file.representation.grid_nodes();
+            let data = HeldData { objective: &mut trainer.objective, measured };
+            let file = weighed(file, data, (axis, times), progress)?;
+            let change = setup::change(&file, times)?;
+            let of = (&file, measured, (axis, change), (nodes, 1));
+            let solution = solve_linear(of, trainer, progress)?;
+            state.now.parameters = solution.parameters();
+        } else if let Start::Linear { nodes, stride, steps, .. } = file.training.start {
+            let change = setup::change(file, times)?;
+            let of = (file, measured, (axis, change), (nodes, stride));
+            let solution = solve_linear(of, trainer, progress)?;
+            let given = Given { solution: &solution, nodes, knots: change.knots };
+            let imprinted = setup::imprint(file, trainer.representation, &given, steps, state)?;
+            progress.found(Event::Imprinted(&imprinted))?;
+        }
+        Ok(())
+    }
+}
+
+/// Settings, data, axis and change, nodes and stride of a linear problem.
+type Linear<'a> = (&'a FitFile, &'a Measured, (Axis, Change), (usize, usize));
+
+/// The grid that fits every so many frames best; where leakage is solved for, both in turn.
+fn solve_linear(
+    (file, measured, about, nodes): Linear<'_>,
+    trainer: &mut Trainer<'_, f32>,
+    progress: &mut dyn Progress,
+) -> Result<LinearSolution<f32>, Error> {
+    let voxels = Voxels::cube(nodes.0, file.region.r_max, setup::linear(file)?.degree).field()?;
+    let voxels: Box<dyn Representation<f32>> = match trainer.objective.model.quiescent() {
+        Some(image) => Box::new(Beside::new(Box::new(voxels), image)),
+        None => Box::new(voxels),
+    };
+    let grid = match file.representation.kind {
+        Kind::LinearGrid => trainer.representation,
+        _ => &*voxels,
+    };
+    let objective = &mut trainer.objective;
+    let mut solution = None;
+    let told = Mutex::new(&mut *progress);
+    let tell = |event: Event<'_>| told.lock().unwrap_or_else(PoisonError::into_inner).found(event);
+    let images = || -> Result<Vec<f32>, Error> {
+        let mut watch = |now: &LinearProgress<'_>| {
+            let mut progress = told.lock().unwrap_or_else(PoisonError::into_inner);
+            match progress.goes_on(At::Linear(now)) {
+                true => ControlFlow::Continue(()),
+                false => ControlFlow::Break(()),
+            }
+        };
+        let found = setup::solve_linear(file, objective, about, nodes, &mut watch)
+            .map_err(|error| error.while_in("linear"))?;
+        if found.ending == Ending::Cancelled {
+            return Err(Stopped::Lost("the linear grid was being solved").into());
+        }
+        let parameters = &found.parameters();
+        let field = Field { representation: grid, parameters, axis: about.0, occupancy: None };
+        let frames: Vec<usize> = match measured.leakage {
+            Some(_) => (0..measured.times.len()).collect(),
+            None => Vec::new(),
+        };
+        let mut movie = vec![0.0; frames.len() * objective.model.pixels()];
+        let (batch, workspace) = (&mut Batch::default(), &mut Workspace::new());
+        objective.model.movie(field, &frames, batch, workspace, &mut movie);
+        solution = Some(found);
+        Ok(movie)
+    };
+    let mut refused = Ok(());
+    let rounds = |round: usize, found: &SolvedLeakage| {
+        refused = tell(Event::Round(round, found));
+    };
+    let leakage = measured.in_turn(images, rounds)?;
+    refused?;
+    if let Some(found) = &leakage {
+        progress.found(Event::Leakage(None, found))?;
+    }
+    let solution = solution.ok_or(Stopped::Lost("the linear grid was being solved"))?;
+    progress.found(Event::Linear(&solution))?;
+    Ok(solution)
+}

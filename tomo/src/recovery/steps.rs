@@ -1,0 +1,93 @@
+//! The steps of a representation that is learnt.
+
+use super::progress::{At, Event, Progress};
+use super::{Fit, Stopped};
+use crate::Error;
+use crate::fit::linear::LinearError;
+use crate::fit::settings::FitFile;
+use crate::fit::{Outcome, State, Trainer};
+use std::time::Instant;
+
+impl Fit<'_, '_> {
+    /// All of them; an error if it was stopped, after its state was kept.
+    pub(super) fn steps(
+        &mut self,
+        state: &mut State<f32>,
+        progress: &mut dyn Progress,
+    ) -> Result<(), Error> {
+        let steps = self.file.training.steps;
+        let mut saved = Instant::now();
+        while state.now.step < steps {
+            self.solve_leakage(state, progress)?;
+            let outcome = match self.trainer.step(state) {
+                Ok(outcome) => outcome,
+                Err(Error::Device(error)) => {
+                    progress.save(state)?;
+                    return Err(error.into());
+                }
+                Err(error) => return Err(diverged(&mut self.trainer, state, &error)),
+            };
+            let step = state.now.step;
+            let stop = !progress.goes_on(At::Step(step));
+            let converged = outcome == Outcome::Converged;
+            progress.stepped(self.now(state), outcome)?;
+            let late = saved.elapsed().as_secs_f64() > self.file.training.checkpoint_seconds;
+            if stop || late || converged || step == steps {
+                progress.save(state)?;
+                saved = Instant::now();
+            }
+            if stop {
+                return Err(Stopped::After(step).into());
+            }
+            if converged {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Solves for the leakage beside the present emission before steps at equal intervals, as often as settings say.
+    fn solve_leakage(
+        &mut self,
+        state: &State<f32>,
+        progress: &mut dyn Progress,
+    ) -> Result<(), Error> {
+        let step = state.now.step;
+        let due = |interval: u64| step > 0 && step.is_multiple_of(interval);
+        if !interval(self.file).is_some_and(due) {
+            return Ok(());
+        }
+        // What comes before cannot be resumed with the leakage that is found now.
+        progress.save(state)?;
+        let frames: Vec<usize> = (0..self.measured.times.len()).collect();
+        let movie = self.trainer.movie(&state.now, &frames, true);
+        match self.measured.solve_leakage(&movie)? {
+            Some(found) => progress.found(Event::Leakage(Some(step), &found)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Steps of training from one solution for the leakage to the next; none where it is not solved for.
+fn interval(file: &FitFile) -> Option<u64> {
+    let settings = file.instrument.as_ref()?.leakage?;
+    Some(file.training.steps.div_ceil(settings.rounds as u64 + 1).max(1))
+}
+
+/// A fit that cannot go on, with the data that are the reason where one can tell.
+fn diverged(trainer: &mut Trainer<'_, f32>, state: &State<f32>, error: &Error) -> Error {
+    let frames = trainer.objective.observed();
+    if let Some(fault) = trainer.objective.fault() {
+        return Error::Failed(fault.to_owned());
+    }
+    let movie = trainer.images(&state.now, &frames, true).ok();
+    let found = movie.and_then(|movie| trainer.objective.not_finite(&frames, &movie).ok());
+    let named = found.flatten().map(named);
+    let why = named.map_or(String::new(), |named| format!(": {named}"));
+    Error::Failed(format!("{error}{why}"))
+}
+
+/// A datum whose residual is not finite, in words.
+pub(super) fn named((data, frame, value): (String, usize, f64)) -> String {
+    LinearError::NotFinite { data, frame, value }.to_string()
+}
