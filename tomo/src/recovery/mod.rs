@@ -19,7 +19,7 @@ mod words;
 pub use evidence::{Compared, Evidence, Judged};
 pub use fields::{carried, compare, recovered, recovered_at, true_volume, true_volume_at};
 pub use problem::Problem;
-pub use progress::{At, Event, Now, Progress, Silent};
+pub use progress::{At, Event, Now, Progress, Resumed, Silent};
 pub use search::{Choice, Found, Placed, Searched, Stage, settled};
 pub use start::FoundAxis;
 pub use words::short;

@@ -72,6 +72,9 @@ pub struct Now<'a, 't> {
     pub state: &'a State<f32>,
 }
 
+/// The state of an interrupted fit, with the leakage of stations that it had found.
+pub type Resumed = (State<f32>, Option<LeakageTable>);
+
 /// Follows a fit, stops it, and keeps what it finds, so that it can go on after an interruption. Every method does
 /// nothing unless it is overridden.
 pub trait Progress: Send {
@@ -127,14 +130,11 @@ pub trait Progress: Send {
     /// Told what is fitted, before anything is.
     fn begins(&mut self, _: Now<'_, '_>) {}
 
-    /// The state of an interrupted fit, with the leakage that it had found; `start` is that of a new one.
+    /// What an interrupted fit has left; `start` is the state of a new one.
     ///
     /// # Errors
     /// If it cannot be read, or is that of another fit.
-    fn resumed(
-        &mut self,
-        _: &State<f32>,
-    ) -> Result<Option<(State<f32>, Option<LeakageTable>)>, Error> {
+    fn resumed(&mut self, _: &State<f32>) -> Result<Option<Resumed>, Error> {
         Ok(None)
     }
 

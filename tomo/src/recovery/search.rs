@@ -45,7 +45,7 @@ pub enum Found<'a> {
 #[non_exhaustive]
 pub enum Searched {
     /// The world, with its errors.
-    World(FoundWorld),
+    World(Box<FoundWorld>),
     /// Worlds and bands, with their probabilities.
     Band(BandScan),
     /// A rotation.
@@ -178,7 +178,7 @@ pub(super) fn placed(
         (None, Stage::World, Some(unknown)) => {
             let found = world(problem, unknown, progress)?;
             let choice = progress.keep(&Found::World(problem, unknown, &found))?;
-            (choice, Some(Searched::World(found)))
+            (choice, Some(Searched::World(Box::new(found))))
         }
         (None, Stage::Band, _) => {
             let found = band(problem, progress)?;

@@ -3,7 +3,6 @@
 use super::*;
 use crate::fit::BatchSize;
 use crate::fit::settings::{Spot, Start, Truth};
-use kerrlight_vlbi::polarimetry::LeakageTable;
 use kerrlight_vlbi::simulate::Movie;
 
 fn settings(kind: Kind) -> FitFile {
@@ -34,10 +33,7 @@ impl Progress for Stopping {
         !matches!(at, At::Step(step) if step >= self.after)
     }
 
-    fn resumed(
-        &mut self,
-        _: &State<f32>,
-    ) -> Result<Option<(State<f32>, Option<LeakageTable>)>, Error> {
+    fn resumed(&mut self, _: &State<f32>) -> Result<Option<Resumed>, Error> {
         Ok(self.kept.take().map(|state| (state, None)))
     }
 

@@ -15,8 +15,7 @@ use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
 use kerrlight_tomo::fit::setup;
 use kerrlight_tomo::fit::{Delegate, Outcome, State, Trainer, checkpoint, journal};
-use kerrlight_tomo::recovery::{At, Choice, Event, Found, Now, Problem, Progress, Stage};
-use kerrlight_vlbi::polarimetry::LeakageTable;
+use kerrlight_tomo::recovery::{At, Choice, Event, Found, Now, Problem, Progress, Resumed, Stage};
 use std::time::Instant;
 
 /// A fit in its folder.
@@ -183,10 +182,7 @@ impl<'a> Kept<'a> {
     }
 
     /// The state of a checkpoint of the same settings, what was written beside it, and the log up to it.
-    fn restored(
-        &self,
-        start: &State<f32>,
-    ) -> anyhow::Result<Option<(State<f32>, Option<LeakageTable>)>> {
+    fn restored(&self, start: &State<f32>) -> anyhow::Result<Option<Resumed>> {
         let Some(bytes) = self.folder.checkpoint()? else { return Ok(None) };
         let state = self.state(&bytes, start).with_context(|| {
             let path = self.folder.path().join(folder::CHECKPOINT);
@@ -302,10 +298,7 @@ impl Progress for Kept<'_> {
         }
     }
 
-    fn resumed(
-        &mut self,
-        start: &State<f32>,
-    ) -> Result<Option<(State<f32>, Option<LeakageTable>)>, Error> {
+    fn resumed(&mut self, start: &State<f32>) -> Result<Option<Resumed>, Error> {
         if !self.resume {
             return Ok(None);
         }
