@@ -236,7 +236,8 @@ fn exact_an_array_of_slurm_runs_each_case_once() {
         assert!(clock.elapsed() < Duration::from_secs(500));
         std::thread::sleep(Duration::from_millis(500));
     }
-    slurm.says(at, "sh -c \"$(head -n 1 commands)\"");
+    let told = slurm.says(at, &format!("scontrol show job {job}_1"));
+    assert!(told.contains("Restarts=1"), "{told}");
     assert_eq!(counts(at, "out"), [4, 0, 0, 0]);
     succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
     assert_eq!(volumes(&at.join("out")), volumes(&at.join("alone")));
@@ -262,8 +263,8 @@ fn exact_snakemake_runs_each_case_once() {
         "exec snakemake --snakefile {snakefile:?} --cores 2 --retries 3 \
          --config experiment=seeds.toml folder=out 'options=--threads 1'"
     );
-    let mut engine =
-        shell(at, &script).stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+    let said = std::fs::File::create(at.join("said")).unwrap();
+    let mut engine = shell(at, &script).stderr(said).stdout(Stdio::null()).spawn().unwrap();
     let clock = Instant::now();
     while counts_if_begun(at)[1] == 0 {
         assert!(clock.elapsed() < Duration::from_secs(120) && engine.try_wait().unwrap().is_none());
@@ -279,6 +280,8 @@ fn exact_snakemake_runs_each_case_once() {
     .status()
     .unwrap();
     assert!(engine.wait().unwrap().success());
+    let said = std::fs::read_to_string(at.join("said")).unwrap();
+    assert!(said.contains("Trying to restart job"), "{said}");
     assert_eq!(counts(at, "out"), [4, 0, 0, 0]);
     succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
     assert_eq!(volumes(&at.join("out")), volumes(&at.join("alone")));
