@@ -82,8 +82,7 @@ impl Recipe {
         variants.retain_mut(|variant| {
             let is_wanted = recipe.is_wanted(&variant.chosen, &kept);
             let levels = variant.chosen.iter().copied().enumerate();
-            variant.is_new =
-                is_wanted && levels.fold(false, |new, level| seen.insert(level) || new);
+            variant.is_new = is_wanted && levels.filter(|level| seen.insert(*level)).count() > 0;
             is_wanted
         });
         recipe.variants = variants;
@@ -287,10 +286,10 @@ fn kept(experiment: &Experiment, only: &[String]) -> anyhow::Result<Kept> {
 /// Every combination of levels by number, the last factor fastest.
 fn combinations(levels: &[Vec<Level>]) -> Vec<Box<[u32]>> {
     levels.iter().fold(vec![Box::default()], |all, levels| {
-        let with = |before: &Box<[u32]>| -> Vec<Box<[u32]>> {
+        let with = |before: &[u32]| -> Vec<Box<[u32]>> {
             (0..levels.len() as u32).map(|k| [before, [k].as_slice()].concat().into()).collect()
         };
-        all.iter().flat_map(with).collect()
+        all.iter().flat_map(|before| with(before)).collect()
     })
 }
 
