@@ -16,6 +16,11 @@ pub struct Answer {
 /// What a person reads.
 enum Body {
     Text(String),
+    /// Lines of so many entries that they are made one by one, and printed at once; for a script a list called `name`.
+    Lines {
+        name: &'static str,
+        entries: Box<dyn Iterator<Item = (String, Value)> + Send>,
+    },
     /// A table of so many rows: CSV for a person, an object of columns called `name` for a script.
     Table {
         name: &'static str,
@@ -55,6 +60,15 @@ impl Answer {
             text.push_str(more);
         }
         self
+    }
+
+    /// Lines with their line ends that are printed as they are made, each with its entry of a list in the JSON object.
+    pub fn lines_of(
+        name: &'static str,
+        entries: impl Iterator<Item = (String, Value)> + Send + 'static,
+    ) -> Self {
+        let entries = Box::new(entries);
+        Answer { text: Body::Lines { name, entries }, ..Self::default() }
     }
 
     /// The last two lines of a command: a figure of merit, and where to look.
@@ -121,24 +135,36 @@ impl Answer {
         let failure = self.failure.take();
         match form {
             Form::Json => output::print(&format!("{:#}\n", self.into_json()))?,
-            Form::Text => output::print(&self.into_text()?)?,
-            Form::Aside => eprint!("{}", self.into_text()?),
+            Form::Text => self.each_text(output::print)?,
+            Form::Aside => self.each_text(|text| {
+                eprint!("{text}");
+                Ok(())
+            })?,
         }
         failure.map_or(Ok(()), Err)
     }
 
-    fn into_text(self) -> anyhow::Result<String> {
+    /// Hands out the text, in parts where it is long.
+    fn each_text(self, mut out: impl FnMut(&str) -> anyhow::Result<()>) -> anyhow::Result<()> {
         match self.text {
-            Body::Text(text) => Ok(text),
+            Body::Text(text) => out(&text),
             Body::Table { groups, rows, .. } => {
-                Ok(String::from_utf8(columns::csv(&groups, rows)?)?)
+                out(std::str::from_utf8(&columns::csv(&groups, rows)?)?)
             }
+            Body::Lines { mut entries, .. } => entries.try_for_each(|(line, _)| out(&line)),
         }
     }
 
     fn into_json(mut self) -> Value {
-        if let Body::Table { name, groups, .. } = self.text {
-            self.json.insert(name.to_owned(), columns::json(&groups));
+        match self.text {
+            Body::Text(_) => {}
+            Body::Table { name, groups, .. } => {
+                self.json.insert(name.to_owned(), columns::json(&groups));
+            }
+            Body::Lines { name, entries } => {
+                let entries: Vec<Value> = entries.map(|(_, entry)| entry).collect();
+                self.json.insert(name.to_owned(), entries.into());
+            }
         }
         Value::Object(self.json)
     }

@@ -1,7 +1,7 @@
 //! Checksums: of bytes, and of texts that carry their own.
 
 use serde::{Deserialize, Serialize};
-use std::io::BufRead;
+use std::io::{BufRead, Write};
 
 /// What tells bytes from others.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,6 +46,45 @@ pub fn sealed(mut object: serde_json::Value) -> String {
     text.replacen(&format!("{KEY}{NONE}"), &format!("{KEY}{sum:08x}"), 1)
 }
 
+/// Writes what [`sealed`] makes of an object with a list under `name`, before `checksum` in the alphabet: of the list,
+/// whose entries come as [`listed`], one entry at a time is in memory.
+pub fn seal_list(
+    out: &mut impl Write,
+    (mut object, name): (serde_json::Value, &str),
+    mut entries: impl Iterator<Item = String>,
+) -> std::io::Result<()> {
+    let Some(first) = entries.next() else {
+        object[name] = serde_json::json!([]);
+        return out.write_all(sealed(object).as_bytes());
+    };
+    object["checksum"] = serde_json::json!(NONE);
+    object[name] = serde_json::json!([0]);
+    let text = format!("{object:#}\n");
+    let (before, behind) = text.split_once("\n    0\n").unwrap_or((&text, ""));
+    let mut sum = crc32fast::Hasher::new();
+    let mut put = |text: &str| {
+        sum.update(text.as_bytes());
+        out.write_all(text.as_bytes())
+    };
+    put(before)?;
+    put("\n    ")?;
+    put(&first)?;
+    for entry in entries {
+        put(",\n    ")?;
+        put(&entry)?;
+    }
+    let behind = format!("\n{behind}");
+    sum.update(behind.as_bytes());
+    let sum = sum.finalize();
+    let behind = behind.replacen(&format!("{KEY}{NONE}"), &format!("{KEY}{sum:08x}"), 1);
+    out.write_all(behind.as_bytes())
+}
+
+/// An entry for [`seal_list`].
+pub fn listed(entry: &serde_json::Value) -> String {
+    format!("{entry:#}").replace('\n', "\n    ")
+}
+
 /// Whether a text is as [`sealed`] has written it.
 pub fn is_whole(text: &str) -> bool {
     let Some(at) = text.find(KEY).map(|at| at + KEY.len()) else { return false };
@@ -58,6 +97,23 @@ pub fn is_whole(text: &str) -> bool {
 mod tests {
     use super::*;
     use serde_json::json;
+
+    #[test]
+    fn exact_a_list_is_sealed_entry_by_entry() {
+        let entry = |k: i32| json!({"k": k, "checksum": "00000000", "of": [k, "a\nb"]});
+        for count in 0..3 {
+            let entries: Vec<_> = (0..count).map(entry).collect();
+            let object = json!({"title": "t", "quick": false});
+            let mut text = Vec::new();
+            let each = entries.iter().map(listed);
+            seal_list(&mut text, (object.clone(), "cases"), each).unwrap();
+            let text = String::from_utf8(text).unwrap();
+            let mut whole = object;
+            whole["cases"] = json!(entries);
+            assert!(is_whole(&text));
+            assert_eq!(text, sealed(whole));
+        }
+    }
 
     #[test]
     fn exact_every_flipped_bit_of_a_sealed_text_is_found() {

@@ -49,7 +49,7 @@ END
 export SLURM_CONF=$folder/slurm.conf
 slurmctld -c > "$folder/slurmctld.out" 2>&1
 slurmd -c > "$folder/slurmd.out" 2>&1
-for _ in $(seq 100); do
+for _ in $(seq 300); do
     if sinfo -h -o %t 2> /dev/null | grep -q idle; then exit 0; fi
     sleep 0.2
 done

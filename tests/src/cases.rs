@@ -2,7 +2,7 @@
 
 use crate::support::{binary, fail, kerrlight, root, succeed};
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -88,6 +88,48 @@ fn exact_xargs_runs_each_case_once() {
     succeed(at, &["compare", "out", "--collect"]);
     let table = |name: &str| std::fs::read_to_string(at.join(name).join("results.csv")).unwrap();
     assert_eq!(table("out").lines().count(), table("alone").lines().count());
+}
+
+/// Ten thousand cases of which one was run, and two thousand have its results.
+#[test]
+fn exact_many_cases_are_listed_counted_and_collected() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    experiment(at, 10_000, 20);
+    let listed = succeed(at, &["compare", "seeds.toml", "-o", "out", "--list"]);
+    let ids: Vec<&str> = listed.lines().map(|line| line.split('\t').next().unwrap()).collect();
+    assert_eq!(ids.iter().collect::<BTreeSet<_>>().len(), 10_000);
+    assert!(ids[4321].starts_with("0.1_seed4322_"), "{}", ids[4321]);
+    succeed(at, &["compare", "seeds.toml", "-o", "out", "--case", ids[0]]);
+    let run = |id: &str| at.join("out/cases").join(id);
+    for id in &ids[1..2000] {
+        std::fs::create_dir(run(id)).unwrap();
+        for name in ["results.json", "inputs.json", "report.html"] {
+            std::fs::copy(run(ids[0]).join(name), run(id).join(name)).unwrap();
+        }
+    }
+    std::fs::write(at.join("out/cases").join(format!("{}.failed", ids[2000])), "why").unwrap();
+    assert_eq!(counts(at, "out"), [2000, 0, 1, 7999]);
+    succeed(at, &["compare", "out", "--collect"]);
+    let read =
+        |path: PathBuf| -> Value { serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap() };
+    let all = read(at.join("out/results.json"));
+    let one = read(run(ids[0]).join("results.json"));
+    let cases = all["cases"].as_array().unwrap();
+    assert_eq!(cases.len(), 10_000);
+    for (k, (case, id)) in cases.iter().zip(&ids).enumerate() {
+        assert_eq!(case["folder"], format!("cases/{id}"));
+        assert_eq!(case["settings"]["seed"], k + 1);
+        let is_one = case.get("results") == Some(&one);
+        let is_expected = match k {
+            0..2000 => case["status"] == "done" && is_one,
+            2000 => case["status"] == "failed" && case["error"] == "why",
+            _ => case["status"] == "open" && !is_one,
+        };
+        assert!(is_expected, "{case}");
+    }
+    let table = std::fs::read_to_string(at.join("out/results.csv")).unwrap();
+    assert_eq!(table.lines().count(), 10_001);
 }
 
 fn start(folder: &Path, words: &[&str]) -> Child {
@@ -194,7 +236,8 @@ fn exact_an_array_of_slurm_runs_each_case_once() {
         assert!(clock.elapsed() < Duration::from_secs(500));
         std::thread::sleep(Duration::from_millis(500));
     }
-    slurm.says(at, "sh -c \"$(head -n 1 commands)\"");
+    let told = slurm.says(at, &format!("scontrol show job {job}_1"));
+    assert!(told.contains("Restarts=1"), "{told}");
     assert_eq!(counts(at, "out"), [4, 0, 0, 0]);
     succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
     assert_eq!(volumes(&at.join("out")), volumes(&at.join("alone")));
@@ -220,8 +263,8 @@ fn exact_snakemake_runs_each_case_once() {
         "exec snakemake --snakefile {snakefile:?} --cores 2 --retries 3 \
          --config experiment=seeds.toml folder=out 'options=--threads 1'"
     );
-    let mut engine =
-        shell(at, &script).stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+    let said = std::fs::File::create(at.join("said")).unwrap();
+    let mut engine = shell(at, &script).stderr(said).stdout(Stdio::null()).spawn().unwrap();
     let clock = Instant::now();
     while counts_if_begun(at)[1] == 0 {
         assert!(clock.elapsed() < Duration::from_secs(120) && engine.try_wait().unwrap().is_none());
@@ -237,6 +280,8 @@ fn exact_snakemake_runs_each_case_once() {
     .status()
     .unwrap();
     assert!(engine.wait().unwrap().success());
+    let said = std::fs::read_to_string(at.join("said")).unwrap();
+    assert!(said.contains("Trying to restart job"), "{said}");
     assert_eq!(counts(at, "out"), [4, 0, 0, 0]);
     succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
     assert_eq!(volumes(&at.join("out")), volumes(&at.join("alone")));

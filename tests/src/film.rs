@@ -185,6 +185,40 @@ fn exact_second_run_goes_on() {
     assert!(fail(folder.path(), &no_time).contains("--duration"));
 }
 
+/// Parts in any order, one of them twice: the frames of the whole film, which share the scale of the first.
+#[test]
+fn exact_parts_are_frames_of_the_whole() {
+    let folder = folder();
+    let at = folder.path();
+    let film = |frames: &str, output: &str, more: &[&str]| {
+        let words = ["movie", "spot.toml", "--duration", "60", "--frames", frames, "-o", output];
+        let scale = ["--set", "screen.total_flux_jy=2.5", "--json"];
+        let said = kerrlight(at, &[&words, &scale[..], more].concat());
+        assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
+        let said: serde_json::Value = serde_json::from_slice(&said.stdout).unwrap();
+        [said["frames"].as_u64().unwrap(), said["rendered"].as_u64().unwrap()]
+    };
+    assert_eq!(film("5", "whole", &["--gif", "whole.gif"]), [5, 5]);
+    assert_eq!(film("3..4/5", "parts", &[]), [2, 2]);
+    assert!(!at.join("parts/frame_0000.exr").exists());
+    assert_eq!(film("1..3/5", "parts", &[]), [3, 2]);
+    assert_eq!(film("1..3/5", "parts", &[]), [3, 0]);
+    assert_eq!(film("0..0/5", "parts", &[]), [1, 1]);
+    assert_eq!(film("5", "parts", &["--gif", "parts.gif"]), [5, 0]);
+    let gif = |name: &str| std::fs::read(at.join(name)).unwrap();
+    assert!(gif("parts.gif") == gif("whole.gif"));
+    for k in 0..5 {
+        let read =
+            |film: &str| std::fs::read(at.join(film).join(format!("frame_{k:04}.exr"))).unwrap();
+        assert!(read("parts") == read("whole"), "frame {k}");
+    }
+    let words = ["movie", "spot.toml", "--duration", "60", "-o", "parts", "--frames"];
+    let error = fail(at, &[&words[..], &["0..1/5", "--gif", "x.gif"]].concat());
+    assert!(error.contains("show the whole film: give them with --frames 5"), "{error}");
+    let error = fail(at, &[&words[..], &["3..5/5"]].concat());
+    assert!(error.contains("A..B/N for the frames A to B of N"), "{error}");
+}
+
 /// Bad cameras name the key and the line.
 #[test]
 fn regress_errors_of_cameras() {

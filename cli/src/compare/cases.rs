@@ -1,52 +1,29 @@
-//! From an experiment to its cases: every combination of levels and seeds, with the settings of its fit.
+//! From an experiment to its cases: every combination of levels and seeds.
 
-use super::experiment::{Experiment, Factor, Level};
+use super::experiment::Experiment;
 use super::labels::called;
+use super::recipe::Recipe;
 use super::source::Source;
-use crate::fit;
-use crate::paths;
-use anyhow::{Context, anyhow, bail};
-use kerrlight_tomo::fit::settings::merge;
+use anyhow::{anyhow, bail};
 use kerrlight_tomo::representation::Registry;
-use rayon::prelude::*;
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
-use toml::{Table, Value};
+use std::collections::HashSet;
+use std::sync::Arc;
+use toml::Table;
 
-/// One fit of an experiment.
+/// One fit of an experiment: a combination of levels, and a seed.
+#[derive(Clone)]
 pub struct Case {
-    /// Factor and level.
-    pub levels: Vec<(String, String)>,
-    /// Where the levels are on axes of numbers.
-    pub numbers: Vec<Option<f64>>,
+    recipe: Arc<Recipe>,
+    variant: u32,
     /// Its seed.
     pub seed: u64,
-    /// What is wrong with its settings.
-    pub error: Option<String>,
-    /// A name for a folder: levels, seed, and a checksum of the settings.
-    pub slug: String,
-    recipe: Arc<Recipe>,
-    /// Its level of each factor, by number.
-    chosen: Vec<u32>,
-}
-
-/// What settings of cases are made of. They are made when they are wanted: a hundred thousand of them would fill the
-/// memory.
-struct Recipe {
-    experiment: Experiment,
-    source: Source,
-    choice: Choice,
-    levels: Vec<Vec<Level>>,
-    /// Fits that have been read.
-    fits: Mutex<BTreeMap<PathBuf, Table>>,
 }
 
 /// How a case ended.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Status {
+pub enum Status<R = serde_json::Value> {
     /// With these results.
-    Done(serde_json::Value),
+    Done(R),
     /// With this message.
     Failed(String),
     /// It has not been run, or was interrupted.
@@ -86,32 +63,74 @@ impl Case {
     /// # Errors
     /// What is wrong with them.
     pub fn settings(&self) -> Result<String, String> {
-        match &self.error {
-            Some(error) => Err(error.clone()),
-            None => self.recipe.text(&self.chosen, self.seed).map_err(|e| format!("{e:#}")),
+        match self.error() {
+            Some(error) => Err(error.to_owned()),
+            None => self.recipe.text(self.at(), self.seed).map_err(|e| format!("{e:#}")),
         }
+    }
+
+    /// The settings of its fit, right or wrong; none where they cannot be put together.
+    pub fn table(&self) -> Option<Table> {
+        self.recipe.table(self.at(), self.seed).ok()
+    }
+
+    /// What is wrong with its settings.
+    pub fn error(&self) -> Option<&str> {
+        self.recipe.error(self.at())
+    }
+
+    /// The same, of too many combinations of levels only where a level is new; the run of a case finds the rest.
+    pub fn early_error(&self) -> Option<&str> {
+        self.recipe.early_error(self.at())
+    }
+
+    /// A measure of its time against that of others of its kind.
+    pub fn cost(&self) -> f64 {
+        self.recipe.cost(self.at())
+    }
+
+    /// A name for a folder: levels, seed, and a checksum of the settings.
+    pub fn slug(&self) -> String {
+        let sum = self.recipe.sum(self.at(), self.seed);
+        format!("{}seed{}_{sum:08x}", self.recipe.words(self.at()), self.seed)
+    }
+
+    /// Its level of each factor.
+    pub fn levels(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.recipe.levels(self.at()).map(|(factor, level)| (factor, level.name.as_str()))
+    }
+
+    /// Its level of each factor, by number.
+    pub fn chosen(&self) -> &[u32] {
+        self.recipe.chosen(self.at())
+    }
+
+    /// The number of a level, with that of its factor.
+    pub fn place(&self, factor: &str, level: &str) -> Option<(usize, u32)> {
+        self.recipe.place(factor, level)
     }
 
     /// Its level of a factor.
     pub fn level(&self, factor: &str) -> Option<&str> {
-        self.levels.iter().find(|(name, _)| name == factor).map(|(_, level)| level.as_str())
+        self.levels().find(|(name, _)| *name == factor).map(|(_, level)| level)
     }
 
     /// Where its level of a factor is on an axis of numbers.
     pub fn number(&self, factor: &str) -> Option<f64> {
-        let at = self.levels.iter().position(|(name, _)| name == factor)?;
-        *self.numbers.get(at)?
+        self.recipe.levels(self.at()).find(|(name, _)| *name == factor)?.1.number
     }
 
     /// `scene 1, grid, seed 2`.
     pub fn name(&self) -> String {
-        let levels: Vec<(&str, &str)> =
-            self.levels.iter().map(|(factor, level)| (factor.as_str(), level.as_str())).collect();
-        let levels = called(&levels);
+        let levels = called(&self.levels().collect::<Vec<_>>());
         if levels.is_empty() {
             return format!("seed {}", self.seed);
         }
         format!("{levels}, seed {}", self.seed)
+    }
+
+    fn at(&self) -> usize {
+        self.variant as usize
     }
 }
 
@@ -121,16 +140,26 @@ pub fn expand(
     source: &Source,
     choice: &Choice,
 ) -> anyhow::Result<Vec<Case>> {
-    let (recipe, seeds, wanted) = chosen(experiment, source, choice)?;
-    let all: Vec<(u64, &Vec<u32>)> =
-        (1..=seeds).flat_map(|seed| wanted.iter().map(move |chosen| (seed, chosen))).collect();
-    if all.is_empty() {
+    let (recipe, seeds) = recipe(experiment, source, choice)?;
+    if recipe.len() == 0 {
         bail!("no case is left");
     }
-    Ok(all.into_par_iter().map(|(seed, chosen)| case(&recipe, chosen, seed)).collect())
+    let of = |seed: u64, variant: usize| Case {
+        recipe: Arc::clone(&recipe),
+        variant: variant as u32,
+        seed,
+    };
+    let of = &of;
+    Ok((1..=seeds).flat_map(|seed| (0..recipe.len()).map(move |k| of(seed, k))).collect())
 }
 
-/// The case of a name, for which settings are made of no others.
+/// Cases of which each stands for all that differ from it in the seed alone.
+pub fn without_seeds<'a>(cases: impl IntoIterator<Item = &'a Case>) -> Vec<&'a Case> {
+    let mut seen = HashSet::new();
+    cases.into_iter().filter(|case| seen.insert(case.chosen())).collect()
+}
+
+/// The case of a name.
 ///
 /// # Errors
 /// If there is none.
@@ -140,198 +169,42 @@ pub fn find(
     choice: &Choice,
     id: &str,
 ) -> anyhow::Result<Case> {
-    let (recipe, seeds, wanted) = chosen(experiment, source, choice)?;
+    let (recipe, seeds) = recipe(experiment, source, choice)?;
     let known = || {
-        let (before, sum) = id.rsplit_once('_')?;
+        let (before, _) = id.rsplit_once('_')?;
         let (words, seed) = before.rsplit_once("seed")?;
         let seed: u64 = seed.parse().ok().filter(|seed| (1..=seeds).contains(seed))?;
-        let is_named = |chosen: &&Vec<u32>| {
-            sum.len() == 8
-                && recipe.words(chosen).iter().map(|w| format!("{w}_")).collect::<String>() == words
-        };
-        let named = wanted.iter().filter(is_named);
-        named.map(|chosen| case(&recipe, chosen, seed)).find(|case| case.slug == id)
+        let case =
+            |variant: usize| Case { recipe: Arc::clone(&recipe), variant: variant as u32, seed };
+        recipe.with_words(words).map(case).find(|case| case.slug() == id)
     };
     known().ok_or_else(|| {
         anyhow!("--case {id:?}: there is no such case with these settings; --list has all that are")
     })
 }
 
-/// The recipe of all cases, seeds, and combinations of levels.
-fn chosen(
+/// What settings of all cases are made of, and the number of seeds.
+fn recipe(
     experiment: &Experiment,
     source: &Source,
     choice: &Choice,
-) -> anyhow::Result<(Arc<Recipe>, u64, Vec<Vec<u32>>)> {
+) -> anyhow::Result<(Arc<Recipe>, u64)> {
     let quick = choice.quick.then_some(&experiment.quick);
     let seeds = choice.seeds.or(quick.and_then(|q| q.seeds)).unwrap_or(experiment.seeds);
     if !(1..=1_000_000).contains(&seeds) {
         bail!("--seeds {seeds} is not allowed: 1 to 1000000");
     }
-    let asked = if choice.only.is_empty() {
-        quick.map(|quick| quick.only.clone()).unwrap_or_default()
-    } else {
-        choice.only.clone()
+    let only = match quick {
+        Some(quick) if choice.only.is_empty() => &quick.only,
+        _ => &choice.only,
     };
-    let only = kept(experiment, &asked)?;
-    let recipe = Arc::new(Recipe::new(experiment, source, choice));
-    let is_wanted = |chosen: &Vec<u32>| {
-        let of = |factor: &str| recipe.level(chosen, factor);
-        let is_skipped = experiment
-            .skip
-            .iter()
-            .any(|skip| skip.iter().all(|(factor, level)| of(factor) == Some(level.as_str())));
-        let is_kept = only.iter().all(|(factor, levels)| {
-            of(factor).is_some_and(|level| levels.iter().any(|l| l == level))
-        });
-        is_kept && !is_skipped
-    };
-    let mut wanted = combinations(&recipe.levels);
-    wanted.retain(is_wanted);
-    Ok((recipe, seeds, wanted))
-}
-
-type Kept = Vec<(String, Vec<String>)>;
-
-/// `factor=level` by factors: levels of the same factor add up.
-fn kept(experiment: &Experiment, only: &[String]) -> anyhow::Result<Kept> {
-    let mut kept: Kept = Vec::new();
-    for choice in only {
-        let (factor, level) = choice
-            .split_once('=')
-            .ok_or_else(|| anyhow!("--only {choice:?} is not allowed: factor=level"))?;
-        let known = experiment.levels(factor);
-        if known.is_empty() {
-            let names: Vec<&str> = experiment.factor.iter().map(|f| f.name.as_str()).collect();
-            bail!("--only {choice:?}: there is no factor {factor:?}, only {}", names.join(", "));
-        }
-        if !known.iter().any(|l| l.name == level) {
-            let names: Vec<String> = known.into_iter().map(|l| l.name).collect();
-            bail!("--only {choice:?}: the levels of {factor} are {}", names.join(", "));
-        }
-        match kept.iter_mut().find(|(name, _)| name == factor) {
-            Some((_, levels)) => levels.push(level.to_owned()),
-            None => kept.push((factor.to_owned(), vec![level.to_owned()])),
-        }
-    }
-    Ok(kept)
-}
-
-/// Every combination of levels by number, the last factor fastest.
-fn combinations(levels: &[Vec<Level>]) -> Vec<Vec<u32>> {
-    levels.iter().fold(vec![Vec::new()], |all, levels| {
-        let with = |before: &Vec<u32>| -> Vec<Vec<u32>> {
-            (0..levels.len() as u32).map(|k| [before.as_slice(), &[k]].concat()).collect()
-        };
-        all.iter().flat_map(with).collect()
-    })
-}
-
-fn case(recipe: &Arc<Recipe>, chosen: &[u32], seed: u64) -> Case {
-    let levels: Vec<&Level> = recipe.levels_of(chosen).collect();
-    let factors = recipe.experiment.factor.iter();
-    let named = factors.zip(&levels).map(|(f, l)| (f.name.clone(), l.name.clone())).collect();
-    let settings = recipe.text(chosen, seed).and_then(|text| {
-        fit::check(&text, &recipe.choice.registry)?;
-        Ok(text)
-    });
-    let sum = crc32fast::hash(settings.as_deref().unwrap_or_default().as_bytes());
-    let words =
-        recipe.words(chosen).into_iter().chain([format!("seed{seed}"), format!("{sum:08x}")]);
-    Case {
-        levels: named,
-        numbers: levels.iter().map(|level| level.number).collect(),
-        seed,
-        error: settings.err().map(|error| format!("{error:#}")),
-        slug: words.collect::<Vec<_>>().join("_"),
-        recipe: Arc::clone(recipe),
-        chosen: chosen.to_vec(),
-    }
-}
-
-/// A name as a file system likes it.
-fn plain(name: &str) -> String {
-    let letter = |c: char| if c.is_ascii_alphanumeric() || c == '.' { c } else { '-' };
-    name.chars().take(40).map(letter).collect()
-}
-
-impl Recipe {
-    fn new(experiment: &Experiment, source: &Source, choice: &Choice) -> Self {
-        Recipe {
-            levels: experiment.factor.iter().map(Factor::levels).collect(),
-            experiment: experiment.clone(),
-            source: source.clone(),
-            choice: choice.clone(),
-            fits: Mutex::default(),
-        }
-    }
-
-    fn levels_of(&self, chosen: &[u32]) -> impl Iterator<Item = &Level> {
-        self.levels.iter().zip(chosen).filter_map(|(levels, k)| levels.get(*k as usize))
-    }
-
-    /// Names of levels as a file system likes them.
-    fn words(&self, chosen: &[u32]) -> Vec<String> {
-        self.levels_of(chosen).map(|level| plain(&level.name)).collect()
-    }
-
-    /// The name of the level of a factor.
-    fn level(&self, chosen: &[u32], factor: &str) -> Option<&str> {
-        let at = self.experiment.factor.iter().position(|f| f.name == factor)?;
-        Some(&self.levels[at].get(*chosen.get(at)? as usize)?.name)
-    }
-
-    /// The settings of a fit, which is read once.
-    fn fit(&self, path: &Path) -> anyhow::Result<Table> {
-        let mut fits = self.fits.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(table) = fits.get(path) {
-            return Ok(table.clone());
-        }
-        let table = self.source.fit(path)?;
-        fits.insert(path.to_owned(), table.clone());
-        Ok(table)
-    }
-
-    fn text(&self, chosen: &[u32], seed: u64) -> anyhow::Result<String> {
-        let Recipe { experiment, source, choice, .. } = self;
-        let levels: Vec<&Level> = self.levels_of(chosen).collect();
-        let last = levels.iter().rev().find_map(|level| level.fit.as_ref());
-        let path = last
-            .or(experiment.fit.as_ref())
-            .ok_or_else(|| anyhow!("neither the experiment nor a level names a fit"))?;
-        let mut table = self.fit(path)?;
-        merge(&mut table, &source.anchored(&experiment.set));
-        for level in levels {
-            for key in &level.remove {
-                remove(&mut table, key).with_context(|| format!("level {:?}", level.name))?;
-            }
-            merge(&mut table, &source.anchored(&level.set));
-        }
-        if choice.quick {
-            merge(&mut table, &source.anchored(&experiment.quick.set));
-        }
-        table.insert("seed".to_owned(), Value::Integer(seed as i64));
-        let text = toml::to_string(&table).context("settings")?;
-        choice.set.iter().try_fold(text, |text, assignment| {
-            fit::assigned(&text, &paths::from_here(assignment, None)?)
-        })
-    }
-}
-
-fn remove(table: &mut Table, key: &str) -> anyhow::Result<()> {
-    let missing = || anyhow!("there is no {key} to remove");
-    match key.split_once('.') {
-        None => table.remove(key).map(drop).ok_or_else(missing),
-        Some((first, rest)) => match table.get_mut(first) {
-            Some(Value::Table(inner)) => remove(inner, rest),
-            _ => Err(missing()),
-        },
-    }
+    Ok((Arc::new(Recipe::new(experiment, source, choice, only)?), seeds))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::Path;
 
     const TEXT: &str = r#"
         title = "t"
@@ -375,8 +248,8 @@ mod tests {
         let expected = [1, 2].map(|seed| expected.map(|n| format!("{n}, seed {seed}"))).concat();
         assert_eq!(names, expected);
         assert_eq!(cases[1].number("rate"), Some(2.0));
-        assert!(cases[0].slug.starts_with("a-grid_1.0_seed1_"));
-        assert_ne!(cases[0].slug, cases[1].slug);
+        assert!(cases[0].slug().starts_with("a-grid_1.0_seed1_"));
+        assert_ne!(cases[0].slug(), cases[1].slug());
         let (grid, scan) = (table(&cases[1]), table(&cases[2]));
         assert_eq!(grid["representation"]["kind"].as_str(), Some("grid"));
         assert_eq!(grid["training"]["rate"].as_float(), Some(2e-3));
@@ -400,6 +273,38 @@ mod tests {
         assert_eq!(table(&cases[2])["seed"].as_integer(), Some(3));
     }
 
+    /// Of settings in which the seed stands once, several times and not at all.
+    #[test]
+    fn exact_ids_end_in_checksums_of_settings() {
+        for set in [vec![], vec!["title=seed 2".to_owned()], vec!["seed=7".to_owned()]] {
+            let choice = Choice { seeds: Some(30), set, ..Choice::default() };
+            for case in cases(&choice).unwrap() {
+                let sum = crc32fast::hash(case.settings().unwrap().as_bytes());
+                assert!(case.slug().ends_with(&format!("_{sum:08x}")), "{}", case.slug());
+            }
+        }
+    }
+
+    /// Of 40 × 40 combinations each level is checked once, and the others when they are run.
+    #[test]
+    fn exact_each_level_of_many_combinations_is_checked() {
+        let values = (1..=40).map(|k| if k == 40 { "-1".to_owned() } else { k.to_string() });
+        let values = values.collect::<Vec<_>>().join(", ");
+        let factor = |key: &str| {
+            format!("[[factor]]\nname = {key:?}\nkey = \"training.{key}\"\nvalues = [{values}]\n")
+        };
+        let head =
+            "title = \"t\"\nquestion = \"q\"\nseeds = 2\nfit = \"../scenes/fits/scene_1.toml\"\n";
+        let text = [head, &factor("log_every"), &factor("steps")].concat();
+        let experiment = Experiment::parse(&text).unwrap();
+        let cases = expand(&experiment, &Source::BuiltIn, &Choice::default()).unwrap();
+        assert_eq!(cases.len(), 3200);
+        let found = |of: fn(&Case) -> bool| cases.iter().filter(|case| of(case)).count();
+        // The first with a wrong step and the first with a wrong log, of both seeds.
+        assert_eq!(found(|case| case.early_error().is_some()), 4);
+        assert_eq!(found(|case| case.error().is_some()), 2 * (40 + 39));
+    }
+
     #[test]
     fn wrong_words_are_named() {
         let text = |only: &str| {
@@ -414,7 +319,7 @@ mod tests {
         let cases = expand(&experiment, &Source::BuiltIn, &Choice::default()).unwrap();
         let error = cases[0].settings().unwrap_err();
         assert!(error.contains("gird"), "{error}");
-        assert!(cases[2].error.is_none());
+        assert!(cases[2].error().is_none());
     }
 
     #[test]
@@ -427,7 +332,7 @@ mod tests {
                 let cases = expand(&experiment, &source, &choice).unwrap();
                 super::super::ran::check(&experiment, &cases).unwrap();
                 for case in cases {
-                    assert!(case.error.is_none(), "{name}: {:?}", case.error);
+                    assert!(case.error().is_none(), "{name}: {:?}", case.error());
                 }
             }
         }

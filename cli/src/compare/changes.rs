@@ -8,6 +8,7 @@ use crate::output;
 use crate::report::Table;
 use anyhow::{Context, bail};
 use serde_json::Value;
+use std::collections::HashMap;
 use std::path::Path;
 
 /// Results that are held beside each other.
@@ -48,17 +49,16 @@ fn cases(all: &Value) -> impl Iterator<Item = &Value> {
 /// Cases that both have (same levels and seed), with old and new results.
 pub fn table(new: &Value, old: &Value) -> anyhow::Result<Table> {
     let mut rows = Vec::new();
-    let (mut gone, mut added) = (0, 0);
-    let same = |a: &Value, b: &Value| a["levels"] == b["levels"] && a["seed"] == b["seed"];
-    for case in cases(old) {
-        gone += usize::from(!cases(new).any(|other| same(case, other)));
-    }
+    let mut added = 0;
+    let key = |case: &Value| format!("{} {}", case["levels"], case["seed"]);
+    let mut before: HashMap<String, &Value> = cases(old).map(|case| (key(case), case)).collect();
     for case in cases(new) {
-        match cases(old).find(|other| same(case, other)) {
+        match before.remove(&key(case)) {
             Some(before) => rows.push(row(case, before)),
             None => added += 1,
         }
     }
+    let gone = before.len();
     if rows.is_empty() {
         bail!("the two runs have no case in common");
     }

@@ -1,10 +1,11 @@
 //! What there is to run, as text and as JSON.
 
 use super::cases::Case;
+use super::runner::TOGETHER;
 use super::source;
 use crate::answer::Answer;
-use serde_json::json;
-use toml::Table;
+use rayon::prelude::*;
+use serde_json::{Value, json};
 
 /// Built-in experiments.
 pub fn experiments() -> Answer {
@@ -15,47 +16,35 @@ pub fn experiments() -> Answer {
         .with("experiments", entries.collect::<Vec<_>>())
 }
 
-/// Cases of an experiment: name of the folder, expected cost and command, with tabs between; as JSON also what is wrong
-/// with their settings, which is told on standard error besides.
-pub fn cases(cases: &[Case], command: &[String]) -> Answer {
+/// Cases of an experiment, one after the other: name of the folder, expected cost and command, with tabs between; as
+/// JSON also what is wrong with their settings, which is told on standard error besides.
+pub fn cases(cases: Vec<Case>, command: &[String]) -> Answer {
     let command = command.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ");
-    let mut text = String::new();
-    let mut entries = Vec::new();
-    for case in cases {
-        let command = format!("{command} --case {}", case.slug);
-        let cost = cost(case);
-        match &case.error {
-            None => text += &format!("{}\t{cost:.3e}\t{command}\n", case.slug),
-            Some(error) => eprintln!("cannot be run: {}: {error}", case.name()),
+    let mut lines: Vec<(String, Value)> = Vec::new();
+    let all = (0..cases.len()).map(move |k| {
+        if k % TOGETHER == 0 {
+            let next = &cases[k..cases.len().min(k + TOGETHER)];
+            lines = next.par_iter().map(|case| line(case, &command)).collect();
         }
-        entries.push(json!({
-            "id": case.slug, "name": case.name(), "cost": cost, "command": command, "error": case.error,
-        }));
-    }
-    Answer::text(text).with("cases", entries)
+        let (text, entry) = std::mem::take(&mut lines[k % TOGETHER]);
+        if let (Some(error), Some(name)) = (entry["error"].as_str(), entry["name"].as_str()) {
+            eprintln!("cannot be run: {name}: {error}");
+        }
+        (text, entry)
+    });
+    Answer::lines_of("cases", all)
 }
 
-/// Rays that the steps of a fit look at, all together: a measure of its time against that of others of its kind.
-fn cost(case: &Case) -> f64 {
-    let Some(settings) = case.settings().ok().and_then(|text| text.parse::<Table>().ok()) else {
-        return 0.0;
+fn line(case: &Case, command: &str) -> (String, Value) {
+    let (id, cost, error) = (case.slug(), case.cost(), case.early_error());
+    let command = format!("{command} --case {id}");
+    let text = match error {
+        None => format!("{id}\t{cost:.3e}\t{command}\n"),
+        Some(_) => String::new(),
     };
-    let number = |path: &[&str]| -> Option<f64> {
-        let first = settings.get(path[0])?;
-        let value = path[1..].iter().try_fold(first, |value, key| value.get(key))?;
-        value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
-    };
-    let side =
-        number(&["screen", "pixels"]).or_else(|| number(&["image", "pixels"])).unwrap_or(1.0);
-    let frames = number(&["movie", "frames"]).or_else(|| number(&["observation", "scans"]));
-    let rays = match number(&["training", "batch", "pixels"]) {
-        Some(pixels) => pixels,
-        None => {
-            let of_step = number(&["training", "batch", "frames"]).or(frames).unwrap_or(1.0);
-            of_step * side * side
-        }
-    };
-    number(&["training", "steps"]).unwrap_or(1.0) * rays
+    let entry =
+        json!({"id": id, "name": case.name(), "cost": cost, "command": command, "error": error});
+    (text, entry)
 }
 
 /// A word as a shell reads it.

@@ -12,6 +12,8 @@ mod page;
 mod plan;
 mod quick;
 mod ran;
+mod recipe;
+mod results;
 mod runner;
 mod source;
 mod status;
@@ -32,10 +34,11 @@ use experiment::Experiment;
 pub use one::Busy;
 use page::Page;
 pub use plan::Plan;
+use rayon::prelude::*;
 use runner::Runner;
 use serde_json::{Value, json};
 use source::Source;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use summary::Summary;
@@ -109,20 +112,20 @@ impl Compare {
             return self.one(id, &asked, (threads, memory), program);
         }
         let chosen = cases::expand(&asked.experiment, &asked.source, &asked.choice)?;
+        if self.status {
+            return status::show(&folder, &chosen);
+        }
         ran::split_chi2(&mut asked.experiment, &chosen);
         let Asked { experiment, choice, source, .. } = &asked;
         ran::check(experiment, &chosen).with_context(|| name.display().to_string())?;
         if let [first, ..] = &chosen[..]
-            && let Some(why) = &first.error
-            && chosen.iter().all(|case| case.error.is_some())
+            && let Some(why) = first.early_error()
+            && chosen.iter().all(|case| case.early_error().is_some())
         {
             bail!("{}: no case can be run; {}: {why}", name.display(), first.name());
         }
         if self.list {
-            return Ok(listing::cases(&chosen, &self.command(&asked, (threads, memory))));
-        }
-        if self.status {
-            return status::show(&folder, &chosen);
+            return Ok(listing::cases(chosen, &self.command(&asked, (threads, memory))));
         }
         if !self.collect {
             ran::check_data(&chosen)?;
@@ -138,8 +141,17 @@ impl Compare {
             chosen
         };
         runner.check_inputs(&cases)?;
-        let summary =
-            if self.collect { collected(&cases, &runner, &folder) } else { run(&cases, &runner) };
+        let failed = if self.collect { None } else { Some(run(&cases, &runner)) };
+        let status = |case: &Case| match runner.known(case) {
+            Status::Open => match &failed {
+                Some(failed) => failed.get(&case.slug()).cloned(),
+                // Others may still run some.
+                None => one::failure(&folder, case),
+            }
+            .map_or(Status::Open, Status::Failed),
+            status => status,
+        };
+        let summary = page::results((experiment, choice.quick), &cases, status, &folder)?;
         let page = Page { experiment, choice, summary: &summary };
         let tables = page.write(&runner, &folder, before.as_ref())?;
         recorder.write_into(&folder)?;
@@ -165,9 +177,6 @@ impl Compare {
     ) -> anyhow::Result<Answer> {
         let Asked { plan, text, experiment, source, choice, folder } = asked;
         let case = cases::find(experiment, source, choice, id)?;
-        if let Some(error) = &case.error {
-            bail!("{}: {error}", case.name());
-        }
         ran::check_data(std::slice::from_ref(&case))?;
         let lock = plan::join(plan, text, folder)?;
         let draws = experiment.samples(choice.quick);
@@ -271,51 +280,45 @@ struct Asked {
 
 /// The chosen cases, and those that an earlier run of the same folder has done beside them.
 fn with_known(chosen: Vec<Case>, all: Vec<Case>, runner: &Runner<'_>) -> Vec<Case> {
-    let is_done = |case: &Case| matches!(runner.known(case), Status::Done(_));
-    let wanted: HashSet<&str> = chosen.iter().map(|case| case.slug.as_str()).collect();
-    let is_shown = |case: &Case| wanted.contains(case.slug.as_str()) || is_done(case);
-    let mut cases: Vec<Case> = all.into_iter().filter(is_shown).collect();
-    let known: HashSet<String> = cases.iter().map(|case| case.slug.clone()).collect();
-    cases.extend(chosen.into_iter().filter(|case| !known.contains(&case.slug)));
+    let wanted: HashSet<String> = chosen.iter().map(Case::slug).collect();
+    let is_shown = |case: &Case| {
+        wanted.contains(&case.slug())
+            || (runner.run_of(case).is_dir() && matches!(runner.known(case), Status::Done(_)))
+    };
+    let mut cases: Vec<Case> = all.into_par_iter().filter(is_shown).collect();
+    let known: HashSet<String> = cases.iter().map(Case::slug).collect();
+    cases.extend(chosen.into_iter().filter(|case| !known.contains(&case.slug())));
     cases
 }
 
-/// How all cases stand, of which others may still run some.
-fn collected<'a>(cases: &'a [Case], runner: &Runner<'_>, folder: &Path) -> Summary<'a> {
-    let status = |case: &Case| match runner.known(case) {
-        Status::Open => one::failure(folder, case).map_or(Status::Open, Status::Failed),
-        status => status,
-    };
-    Summary::new(cases.iter().map(|case| (case, status(case))).collect())
-}
-
-/// Runs what is not done yet, until a signal.
-fn run<'a>(cases: &'a [Case], runner: &Runner<'_>) -> Summary<'a> {
+/// Runs what is not done yet, until a signal; why which of them failed.
+fn run(cases: &[Case], runner: &Runner<'_>) -> HashMap<String, String> {
     let keeper = Keeper::saving("stopping after the fit's step; a second signal ends at once");
-    let mut all: Vec<(&Case, Status)> =
-        cases.iter().map(|case| (case, runner.known(case))).collect();
-    let open = all.iter().filter(|(_, status)| *status == Status::Open).count();
-    eprintln!("{} cases, {open} of them to be run", cases.len());
-    for (case, status) in &all {
-        if let Status::Failed(why) = status {
-            eprintln!("failed: {}: {why}", case.name());
-        }
+    let is_to_do = |case: &&Case| !matches!(runner.known(case), Status::Done(_));
+    let is_wrong = |case: &&Case| case.early_error().is_some();
+    let (wrong, open): (Vec<&Case>, Vec<&Case>) =
+        cases.par_iter().filter(is_to_do).partition(is_wrong);
+    eprintln!("{} cases, {} of them to be run", cases.len(), open.len());
+    for case in wrong {
+        eprintln!("failed: {}: {}", case.name(), case.early_error().unwrap_or_default());
     }
-    let bar = progress::cases(open as u64);
-    for (case, status) in all.iter_mut().filter(|(_, status)| *status == Status::Open) {
+    let bar = progress::cases(open.len() as u64);
+    let mut failed = HashMap::new();
+    for case in open {
         if keeper.stopped() {
             break;
         }
         bar.set_message(case.name());
         bar.tick();
-        *status = runner.run(case, &keeper);
+        let status = runner.run(case, &keeper);
+        bar.inc(u64::from(status != Status::Open));
         if let Status::Failed(why) = status {
             bar.suspend(|| eprintln!("failed: {}: {why}", case.name()));
+            failed.insert(case.slug(), why);
         }
-        bar.inc(u64::from(*status != Status::Open));
     }
     bar.finish_and_clear();
-    Summary::new(all)
+    failed
 }
 
 /// The tables, how many cases are done and which of them are best and worst, and where to look.

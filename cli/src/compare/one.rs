@@ -17,7 +17,7 @@ pub struct Busy(String);
 /// Runs a case to its end, from where it is; one that is done is not run again.
 pub fn run(case: &Case, runner: &Runner<'_>, folder: &Path) -> anyhow::Result<Answer> {
     let Some(lock) = Lock::of_file(&lock_of(folder, case))? else {
-        return Err(Busy(case.slug.clone()).into());
+        return Err(Busy(case.slug()).into());
     };
     let keeper = Keeper::saving("stopping after the fit's step; a second signal ends at once");
     let failure = failure_of(folder, case);
@@ -29,7 +29,7 @@ pub fn run(case: &Case, runner: &Runner<'_>, folder: &Path) -> anyhow::Result<An
             let _ = std::fs::remove_file(lock_of(folder, case));
             let run = runner.run_of(case).display().to_string();
             Ok(Answer::lines(&format!("{} is done", case.name()), &run)
-                .with("case", case.slug.clone())
+                .with("case", case.slug())
                 .with("folder", run)
                 .with("results", results))
         }
@@ -51,9 +51,9 @@ pub fn failure(folder: &Path, case: &Case) -> Option<String> {
 
 /// The file that is locked while a case is run; beside its folder, which a fit may make anew.
 pub fn lock_of(folder: &Path, case: &Case) -> PathBuf {
-    folder.join(runner::CASES).join(format!("{}.lock", case.slug))
+    folder.join(runner::CASES).join(format!("{}.lock", case.slug()))
 }
 
 fn failure_of(folder: &Path, case: &Case) -> PathBuf {
-    folder.join(runner::CASES).join(format!("{}.failed", case.slug))
+    folder.join(runner::CASES).join(format!("{}.failed", case.slug()))
 }

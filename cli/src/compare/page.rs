@@ -1,11 +1,10 @@
 //! What a comparison leaves: results, tables, pictures and one page of them.
 
-use super::cases::Choice;
+use super::cases::{Case, Choice, Status};
 use super::experiment::Experiment;
 use super::runner::Runner;
 use super::summary::Summary;
 use super::{changes, figures, quick, ran, tables, verdicts};
-use crate::checksum::sealed;
 use crate::output::Output;
 use crate::report::{Figure, Part, Report, Table};
 #[cfg(not(feature = "parquet"))]
@@ -36,6 +35,21 @@ pub struct Page<'a> {
     pub summary: &'a Summary<'a>,
 }
 
+/// Reads what was found, and writes all of it, results.json.
+pub fn results<'a>(
+    (experiment, quick): (&Experiment, bool),
+    cases: &'a [Case],
+    status: impl Fn(&Case) -> Status + Sync,
+    folder: &Path,
+) -> anyhow::Result<Summary<'a>> {
+    let file = Output::new(&folder.join("results.json"), "")?;
+    if !quick {
+        return Summary::written(cases, status, (&experiment.title, quick), &file);
+    }
+    let (look, _) = quick::look(experiment);
+    Summary::written(cases, status, (&look.title, quick), &file)
+}
+
 impl Page<'_> {
     /// Writes the results, tables.md, pictures and report.html; the text of the tables.
     pub fn write(
@@ -60,11 +74,9 @@ impl Page<'_> {
     ) -> anyhow::Result<String> {
         let Page { experiment, choice, summary } = self;
         let file = |name: &str| Output::new(&folder.join(name), "");
-        let results = summary.json(&experiment.title, choice.quick);
-        file("results.json")?.write(sealed(results.clone()).as_bytes())?;
         file("results.csv")?.write(&summary.csv()?)?;
         self.parquet(folder)?;
-        let shown = self.tables(before, &results)?;
+        let shown = self.tables(before, folder)?;
         let text: String = shown.iter().map(tables::markdown).collect();
         let text = [self.heading(), text].concat();
         file("tables.md")?.write(text.as_bytes())?;
@@ -111,13 +123,13 @@ impl Page<'_> {
     }
 
     /// What ran, what the experiment asks for, and what has changed.
-    fn tables(&self, before: Option<&Value>, results: &Value) -> anyhow::Result<Vec<Table>> {
+    fn tables(&self, before: Option<&Value>, folder: &Path) -> anyhow::Result<Vec<Table>> {
         let Page { experiment, summary, .. } = self;
         let asked = experiment.table.iter();
         let asked = asked.map(|asked| tables::table(experiment, summary, asked));
         let mut shown: Vec<Table> = std::iter::once(ran::table(summary)).chain(asked).collect();
         if let Some(before) = before {
-            shown.push(changes::table(results, before)?);
+            shown.push(changes::table(&changes::read(folder)?, before)?);
         }
         Ok(shown)
     }
@@ -175,8 +187,7 @@ impl Page<'_> {
         let mut lines = vec![format!("What was asked: {}", experiment.question)];
         let (all, done, open) = (summary.all.len(), summary.done().count(), summary.open());
         let failed = summary.failed().count();
-        let seconds: f64 =
-            summary.done().filter_map(|(_, results)| results["seconds"].as_f64()).sum();
+        let seconds: f64 = summary.done().filter_map(|(_, results)| results.get("seconds")).sum();
         lines.push(format!(
             "What was run: {all} fits, of which {done} ended well, {failed} failed and {open} were not run to their end; \
              {:.1} minutes of fitting in all, on {} threads. {}",

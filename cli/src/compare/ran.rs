@@ -1,13 +1,14 @@
 //! What cases need and what they can give, from their settings; what really ran.
 
-use super::cases::Case;
+use super::cases::{Case, without_seeds};
 use super::experiment::{Experiment, FigureKind, QUALITIES, TableAsked};
 use super::labels::{ONE_CHI2, pairs};
 use super::summary::{Summary, is_at};
 use crate::paths;
 use crate::report::Table;
 use anyhow::bail;
-use std::collections::BTreeSet;
+use rayon::prelude::*;
+use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 use toml::Value;
 
@@ -41,7 +42,7 @@ const LOOKED_AT: usize = 1000;
 /// Refuses cases whose data are not there, before anything is written.
 pub fn check_data(cases: &[Case]) -> anyhow::Result<()> {
     for case in cases.iter().take(LOOKED_AT) {
-        let Some(settings) = settings(case) else { continue };
+        let Some(settings) = case.table() else { continue };
         for kind in ["visibilities", "light-curve"] {
             let Some(path) = at(&settings, &format!("data.{kind}.path")) else { continue };
             // Only a file of public data has a place of its own; the fit looks for others.
@@ -56,17 +57,15 @@ pub fn check_data(cases: &[Case]) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn settings(case: &Case) -> Option<toml::Table> {
-    case.settings().ok()?.parse().ok()
-}
-
 /// Different values with the number of cases that have them, in the order of the cases.
-fn counted(values: impl Iterator<Item = String>) -> String {
+fn counted(values: impl Iterator<Item = (String, usize)>) -> String {
     let mut all: Vec<(String, usize)> = Vec::new();
-    for value in values {
-        match all.iter_mut().find(|(known, _)| *known == value) {
-            Some((_, count)) => *count += 1,
-            None => all.push((value, 1)),
+    let mut places: HashMap<String, usize> = HashMap::new();
+    for (value, count) in values {
+        let place = *places.entry(value.clone()).or_insert(all.len());
+        match all.get_mut(place) {
+            Some((_, all)) => *all += count,
+            None => all.push((value, count)),
         }
     }
     match all.as_slice() {
@@ -88,16 +87,25 @@ pub fn table(summary: &Summary) -> Table {
     let done: Vec<&Case> = summary.done().map(|(case, _)| case).collect();
     let cases: Vec<&Case> =
         if done.is_empty() { summary.all.iter().map(|(case, _)| *case).collect() } else { done };
-    let all: Vec<toml::Table> = cases.iter().filter_map(|case| settings(case)).collect();
-    let row = |(key, name): &(&str, &str)| {
-        let values: Vec<String> = all.iter().filter_map(|settings| at(settings, key)).collect();
-        let told = || vec![(*name).to_owned(), (*key).to_owned(), counted(values.iter().cloned())];
-        (!values.is_empty()).then(told)
+    let mut counts: HashMap<&[u32], usize> = HashMap::new();
+    cases.iter().for_each(|case| *counts.entry(case.chosen()).or_default() += 1);
+    // Of each combination of levels the settings that are shown, and how many cases have them.
+    let shown = |case: &&Case| {
+        let settings = case.table()?;
+        let values = SHOWN.map(|(key, _)| at(&settings, key));
+        Some((values, counts[case.chosen()]))
     };
-    let mut rows: Vec<Vec<String>> = SHOWN.iter().filter_map(row).collect();
+    let of_levels = without_seeds(cases.iter().copied());
+    let all: Vec<_> = of_levels.par_iter().filter_map(shown).collect();
+    let row = |(k, (key, name)): (usize, &(&str, &str))| {
+        let values = all.iter().filter_map(|(values, count)| Some((values[k].clone()?, *count)));
+        let told = counted(values);
+        (!told.is_empty()).then(|| vec![(*name).to_owned(), (*key).to_owned(), told])
+    };
+    let mut rows: Vec<Vec<String>> = SHOWN.iter().enumerate().filter_map(row).collect();
     let line = |name: &str, key: &str, value: String| vec![name.to_owned(), key.to_owned(), value];
-    let steps = summary.done().filter_map(|(_, results)| results["steps"].as_u64());
-    let steps = counted(steps.map(|steps| steps.to_string()));
+    let steps = summary.done().filter_map(|(_, results)| results.get("steps"));
+    let steps = counted(steps.map(|steps| (steps.to_string(), 1)));
     if !steps.is_empty() {
         rows.insert(0, line("steps that were taken", "", steps));
     }
@@ -142,7 +150,8 @@ pub fn split_chi2(experiment: &mut Experiment, cases: &[Case]) {
     if experiment.table.iter().all(|table| table.value != "chi2") {
         return;
     }
-    let all: Vec<Vec<String>> = cases.iter().filter_map(settings).map(|s| kinds(&s)).collect();
+    let kinds_of = |case: &&Case| case.table().map(|settings| kinds(&settings));
+    let all: Vec<Vec<String>> = without_seeds(cases).par_iter().filter_map(kinds_of).collect();
     let several = all.iter().filter(|kinds| kinds.len() > 1);
     let divided: BTreeSet<&String> = several.flatten().collect();
     let is_whole = all.iter().any(|kinds| kinds.len() == 1);
@@ -168,10 +177,13 @@ pub fn check(experiment: &Experiment, cases: &[Case]) -> anyhow::Result<()> {
         let default = (f.kind == FigureKind::Time).then_some("psnr_db");
         Some(("figure", &f.title, f.value.as_deref().or(default)?, &f.r#where))
     });
+    let all = without_seeds(cases);
     for (what, title, value, fixed) in tables.chain(figures) {
-        let chosen = cases.iter().filter(|case| is_at(case, &pairs(fixed)));
+        let chosen = all.iter().filter(|case| is_at(case, &pairs(fixed)));
         // To the first that has it: there may be a hundred thousand.
-        let mut found = chosen.filter_map(settings).map(|settings| missing(&settings, value));
+        let settings =
+            chosen.filter(|case| case.early_error().is_none()).filter_map(|case| case.table());
+        let mut found = settings.map(|settings| missing(&settings, value));
         if let Some(Some(why)) = found.next()
             && found.all(|missing| missing.is_some())
         {

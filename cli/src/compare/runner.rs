@@ -11,6 +11,7 @@ use crate::output::{self, Output};
 use crate::program::Program;
 use crate::threads;
 use anyhow::Context;
+use rayon::prelude::*;
 use serde_json::Value;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -26,6 +27,9 @@ pub struct Runner<'a> {
     samples: Option<u32>,
     _lock: Option<Lock>,
 }
+
+/// Cases that are looked at together.
+pub const TOGETHER: usize = 1024;
 
 /// The folder of the runs in that of the results.
 pub const CASES: &str = "cases";
@@ -46,20 +50,20 @@ impl<'a> Runner<'a> {
 
     /// The run's folder of a case.
     pub fn run_of(&self, case: &Case) -> PathBuf {
-        self.folder.join(&case.slug)
+        self.folder.join(case.slug())
     }
 
     /// What is known of a case without running it.
     pub fn known(&self, case: &Case) -> Status {
         let run = &self.run_of(case);
-        if let Some(error) = &case.error {
-            return Status::Failed(error.clone());
-        }
         match results(run) {
             Some((results, true)) if is_ours(&results) && run.join("report.html").exists() => {
                 self.with_draws(results, run).map_or(Status::Open, Status::Done)
             }
-            _ => Status::Open,
+            _ => match case.early_error() {
+                Some(error) => Status::Failed(error.to_owned()),
+                None => Status::Open,
+            },
         }
     }
 
@@ -82,12 +86,14 @@ impl<'a> Runner<'a> {
     /// Refuses cases that have read files which are no longer the same: others would be compared with them.
     pub fn check_inputs(&self, cases: &[Case]) -> anyhow::Result<()> {
         let mut sums = FileSums::default();
-        for run in cases.iter().map(|case| self.run_of(case)) {
-            if let Ok(inputs) = Inputs::load(&run)
-                && inputs.version == env!("CARGO_PKG_VERSION")
-            {
-                inputs.check_files(&run, &mut sums)?;
-            }
+        let read = |case: &Case| {
+            let run = self.run_of(case);
+            let inputs = Inputs::load(&run).ok()?;
+            (inputs.version == env!("CARGO_PKG_VERSION")).then_some((run, inputs))
+        };
+        for some in cases.chunks(TOGETHER) {
+            let inputs: Vec<_> = some.par_iter().filter_map(read).collect();
+            inputs.iter().try_for_each(|(run, inputs)| inputs.check_files(run, &mut sums))?;
         }
         Ok(())
     }
@@ -98,6 +104,9 @@ impl<'a> Runner<'a> {
         match self.known(case) {
             Status::Open => {}
             known => return known,
+        }
+        if let Some(error) = case.error() {
+            return Status::Failed(error.to_owned());
         }
         match self.child(case, run, keeper) {
             Ok((status, _)) if status.success() => match self.known(case) {
@@ -120,7 +129,7 @@ impl<'a> Runner<'a> {
         keeper: &Keeper,
     ) -> anyhow::Result<(ExitStatus, String)> {
         // Paths in it start from the root.
-        let settings = self.folder.join(format!("{}.toml", case.slug));
+        let settings = self.folder.join(format!("{}.toml", case.slug()));
         // Paths start from the root: a case is the same bytes in any folder.
         let text = from_folder(&case.settings().unwrap_or_default(), Path::new("/"));
         Output::new(&settings, "toml")?.write(text.as_bytes())?;

@@ -6,6 +6,7 @@ use super::runner::CASES;
 use crate::answer::Answer;
 use crate::lock::Lock;
 use anyhow::anyhow;
+use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::collections::HashSet;
 use std::fmt::Write;
@@ -13,6 +14,15 @@ use std::path::Path;
 
 /// Failed cases that are named.
 const NAMED: usize = 10;
+
+/// How a case stands.
+enum State {
+    Done,
+    Running,
+    /// Its name, and why.
+    Failed(String, String),
+    Open,
+}
 
 /// Counts cases from what lies in the folder: it is read once, and of cases only those are looked into that have begun.
 pub fn show(folder: &Path, cases: &[Case]) -> anyhow::Result<Answer> {
@@ -26,20 +36,30 @@ pub fn show(folder: &Path, cases: &[Case]) -> anyhow::Result<Answer> {
         .flatten()
         .map(|entry| entry.file_name().to_string_lossy().into_owned())
         .collect();
-    let (mut done, mut running, mut failed) = (0, 0, Vec::new());
-    for case in cases {
-        let has = |ending: &str| there.contains(&format!("{}.{ending}", case.slug));
-        if there.contains(&case.slug) && at.join(&case.slug).join("report.html").is_file() {
-            done += 1;
+    let state = |case: &Case| {
+        let slug = case.slug();
+        let has = |ending: &str| there.contains(&format!("{slug}.{ending}"));
+        if there.contains(&slug) && at.join(&slug).join("report.html").is_file() {
+            State::Done
         } else if has("lock") && Lock::is_held(&one::lock_of(folder, case)) {
-            running += 1;
-        } else if let Some(why) = &case.error {
-            failed.push((case.name(), why.clone()));
+            State::Running
+        } else if let Some(why) = case.early_error() {
+            State::Failed(case.name(), why.to_owned())
         } else if has("failed") {
-            failed.push((case.name(), one::failure(folder, case).unwrap_or_default()));
+            State::Failed(case.name(), one::failure(folder, case).unwrap_or_default())
+        } else {
+            State::Open
+        }
+    };
+    let (mut done, mut running, mut open, mut failed) = (0, 0, 0, Vec::new());
+    for state in cases.par_iter().map(state).collect::<Vec<State>>() {
+        match state {
+            State::Done => done += 1,
+            State::Running => running += 1,
+            State::Open => open += 1,
+            State::Failed(name, why) => failed.push((name, why)),
         }
     }
-    let open = cases.len() - done - running - failed.len();
     let mut text = format!(
         "{done} of {} cases done, {running} running, {} failed, {open} open\n",
         cases.len(),

@@ -1,18 +1,31 @@
 //! What the cases of an experiment gave: all of them, and means over seeds.
 
 use super::cases::{Case, Status};
-use super::labels::{RESULTS, described, number, result};
+use super::labels::{RESULTS, described, number};
+use super::results::Results;
+use super::runner::TOGETHER;
+use crate::checksum;
+use crate::output::Output;
+use rayon::prelude::*;
 use serde_json::{Map, Value, json};
+use std::collections::{BTreeMap, HashMap};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Cases and how they ended.
 pub struct Summary<'a> {
     /// In the order of the cases.
-    pub all: Vec<(&'a Case, Status)>,
+    pub all: Vec<(&'a Case, Status<Results>)>,
     /// How many seeds there are.
     pub seeds: u64,
+    /// By the factors, by number, that cases are grouped by.
+    groups: Mutex<BTreeMap<Vec<usize>, Arc<Groups>>>,
 }
 
+/// Which cases are at the same levels of some factors, by those levels.
+type Groups = HashMap<Vec<u32>, Vec<usize>>;
+
 /// A column of the table of results.
+#[cfg(feature = "parquet")]
 pub enum Values {
     /// Words.
     Text(Vec<String>),
@@ -86,9 +99,39 @@ impl Spread {
 
 impl<'a> Summary<'a> {
     /// Of these cases.
-    pub fn new(all: Vec<(&'a Case, Status)>) -> Self {
+    pub fn new(all: Vec<(&'a Case, Status<Results>)>) -> Self {
         let seeds = all.iter().map(|(case, _)| case.seed).max().unwrap_or(1);
-        Summary { all, seeds }
+        Summary { all, seeds, groups: Mutex::default() }
+    }
+
+    /// Of these cases, whose settings and results are written for other programs as they are read.
+    pub fn written(
+        cases: &'a [Case],
+        status: impl Fn(&Case) -> Status + Sync,
+        (title, quick): (&str, bool),
+        output: &Output,
+    ) -> anyhow::Result<Self> {
+        let read = |case: &Case| {
+            let status = status(case);
+            let entry = checksum::listed(&entry(case, &status));
+            let status = match status {
+                Status::Done(results) => Status::Done(Results::of(&results)),
+                Status::Failed(why) => Status::Failed(why),
+                Status::Open => Status::Open,
+            };
+            (status, entry)
+        };
+        let mut all = Vec::with_capacity(cases.len());
+        let entries = cases.chunks(TOGETHER).flat_map(|some| {
+            let read: Vec<_> = some.par_iter().map(read).collect();
+            let (states, entries): (Vec<_>, Vec<String>) = read.into_iter().unzip();
+            all.extend(some.iter().zip(states));
+            entries
+        });
+        let version = env!("CARGO_PKG_VERSION");
+        let object = json!({"title": title, "version": version, "quick": quick});
+        output.write_with(|file| Ok(checksum::seal_list(file, (object, "cases"), entries)?))?;
+        Ok(Self::new(all))
     }
 
     /// Which seeds a plot shows.
@@ -97,11 +140,47 @@ impl<'a> Summary<'a> {
     }
 
     /// Those that succeeded.
-    pub fn done(&self) -> impl Iterator<Item = (&Case, &Value)> {
-        self.all.iter().filter_map(|(case, status)| match status {
-            Status::Done(results) => Some((*case, results)),
-            _ => None,
-        })
+    pub fn done(&self) -> impl Iterator<Item = (&Case, &Results)> {
+        self.all.iter().filter_map(done)
+    }
+
+    /// Those of them that are at all of these levels.
+    pub fn at(&self, levels: &[(&str, &str)]) -> Vec<(&Case, &Results)> {
+        let group = self.group(levels).unwrap_or_default();
+        group.into_iter().filter_map(|k| done(&self.all[k])).collect()
+    }
+
+    /// Whether any case, done or not, is at a level.
+    pub fn has(&self, factor: &str, level: &str) -> bool {
+        self.group(&[(factor, level)]).is_some()
+    }
+
+    /// Cases that are at all of these levels, by number.
+    fn group(&self, levels: &[(&str, &str)]) -> Option<Vec<usize>> {
+        let (first, _) = self.all.first()?;
+        let places = levels.iter().map(|(factor, level)| first.place(factor, level));
+        let mut places = places.collect::<Option<Vec<(usize, u32)>>>()?;
+        places.sort_unstable();
+        places.dedup();
+        let (factors, levels): (Vec<usize>, Vec<u32>) = places.into_iter().unzip();
+        self.groups_of(factors).get(&levels).cloned()
+    }
+
+    /// All cases by their levels of some factors.
+    fn groups_of(&self, factors: Vec<usize>) -> Arc<Groups> {
+        let mut known = self.groups.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(groups) = known.get(&factors) {
+            return Arc::clone(groups);
+        }
+        let mut groups = Groups::new();
+        for (k, (case, _)) in self.all.iter().enumerate() {
+            let chosen = case.chosen();
+            let levels = factors.iter().map(|factor| chosen[*factor]).collect();
+            groups.entry(levels).or_default().push(k);
+        }
+        let groups = Arc::new(groups);
+        known.insert(factors, Arc::clone(&groups));
+        groups
     }
 
     /// Those that failed, with the reason.
@@ -126,111 +205,109 @@ impl<'a> Summary<'a> {
     /// The best and the worst case by the first result that cases have: PSNR, χ² or loss.
     pub fn extremes(&self) -> Option<Extremes> {
         let of = |value: &'static str| {
-            let all = self
-                .done()
-                .filter_map(|(case, results)| Some((case.name(), result(results, value)?)));
-            let mut all: Vec<(String, f64)> = all.collect();
+            let all = self.done().filter_map(|(case, results)| Some((case, results.get(value)?)));
+            let mut all: Vec<(&Case, f64)> = all.collect();
             all.sort_by(|(_, a), (_, b)| a.total_cmp(b));
             if value == "psnr_db" {
                 all.reverse();
             }
-            let (best, worst) = (all.first()?.clone(), all.last()?.clone());
-            Some(Extremes { value, best, worst })
+            let named = |(case, x): &(&Case, f64)| (case.name(), *x);
+            Some(Extremes { value, best: named(all.first()?), worst: named(all.last()?) })
         };
         ["psnr_db", "chi2", "loss"].into_iter().find_map(of)
     }
 
     /// One result of all cases that are at these levels.
     pub fn spread(&self, value: &str, levels: &[(&str, &str)]) -> Option<Spread> {
-        let chosen = self.done().filter(|(case, _)| is_at(case, levels));
-        Spread::of(&chosen.filter_map(|(_, results)| result(results, value)).collect::<Vec<_>>())
-    }
-
-    /// Everything, for other programs.
-    pub fn json(&self, title: &str, quick: bool) -> Value {
-        let case = |(case, status): &(&Case, Status)| {
-            let levels: Map<String, Value> =
-                case.levels.iter().map(|(factor, level)| (factor.clone(), json!(level))).collect();
-            let settings = case.settings().ok();
-            let settings = settings.and_then(|text| toml::from_str::<Value>(&text).ok());
-            let mut line = json!({
-                "levels": levels,
-                "seed": case.seed,
-                "folder": format!("cases/{}", case.slug),
-                "settings": settings,
-            });
-            match status {
-                Status::Done(results) => {
-                    line["status"] = json!("done");
-                    line["results"] = results.clone();
-                }
-                Status::Failed(why) => {
-                    line["status"] = json!("failed");
-                    line["error"] = json!(why);
-                }
-                Status::Open => line["status"] = json!("open"),
-            }
-            line
-        };
-        let cases: Vec<Value> = self.all.iter().map(case).collect();
-        let version = env!("CARGO_PKG_VERSION");
-        json!({"title": title, "version": version, "quick": quick, "cases": cases})
+        let values = self.at(levels).into_iter().filter_map(|(_, results)| results.get(value));
+        Spread::of(&values.collect::<Vec<_>>())
     }
 
     /// The same as a table, a line a case.
     pub fn csv(&self) -> anyhow::Result<Vec<u8>> {
         let mut writer = csv::Writer::from_writer(Vec::new());
-        let columns = self.columns();
-        writer.write_record(columns.iter().map(|(name, _)| name))?;
-        for row in 0..self.all.len() {
-            writer.write_record(columns.iter().map(|(_, values)| match values {
-                Values::Text(all) => all[row].clone(),
-                Values::Whole(all) => all[row].to_string(),
-                Values::Number(all) => all[row].map(|x| x.to_string()).unwrap_or_default(),
-            }))?;
+        let first = self.all.first().map(|(case, _)| case.levels());
+        let factors = first.into_iter().flatten().map(|(factor, _)| factor);
+        let columns = factors.chain(["seed", "status", "folder"]);
+        writer.write_record(columns.chain(RESULTS.iter().map(|(key, ..)| *key)))?;
+        for line @ (case, status) in &self.all {
+            let levels = case.levels().map(|(_, level)| level.to_owned());
+            let of_case = [case.seed.to_string(), word(status).to_owned(), folder(case)];
+            let results = done(line).map(|(_, results)| results);
+            let number = |k: usize| results.and_then(|of| of.number(k)).map(|x| x.to_string());
+            let numbers = (0..RESULTS.len()).map(|k| number(k).unwrap_or_default());
+            writer.write_record(levels.chain(of_case).chain(numbers))?;
         }
         Ok(writer.into_inner()?)
     }
 
-    /// Levels of the factors, seed, status, folder and results of all cases.
+    /// The same column by column.
+    #[cfg(feature = "parquet")]
     pub fn columns(&self) -> Vec<(String, Values)> {
-        let first = self.all.first().map(|(case, _)| &case.levels[..]).unwrap_or_default();
+        let first = self.all.first().map(|(case, _)| case.levels());
+        let factors = first.into_iter().flatten().map(|(factor, _)| factor);
         let all = || self.all.iter();
-        let level = |k: usize| {
-            Values::Text(
-                all()
-                    .map(|(case, _)| {
-                        case.levels.get(k).map_or(String::new(), |(_, level)| level.clone())
-                    })
-                    .collect(),
-            )
-        };
-        let status = |(_, status): &(&Case, Status)| {
-            let word = match status {
-                Status::Done(_) => "done",
-                Status::Failed(_) => "failed",
-                Status::Open => "open",
-            };
-            word.to_owned()
-        };
+        let levels = factors.map(|factor| {
+            let level = |case: &Case| case.level(factor).unwrap_or_default().to_owned();
+            (factor.to_owned(), Values::Text(all().map(|(case, _)| level(case)).collect()))
+        });
         let number = |key: &str| {
-            let of = |(_, status): &(&Case, Status)| match status {
-                Status::Done(results) => result(results, key),
-                _ => None,
-            };
+            let of = |line| done(line).and_then(|(_, results)| results.get(key));
             Values::Number(all().map(of).collect())
         };
         let seeds = all().map(|(case, _)| case.seed.cast_signed()).collect();
-        let folders = all().map(|(case, _)| format!("cases/{}", case.slug)).collect();
+        let states = all().map(|(_, status)| word(status).to_owned()).collect();
         let tail = [
             ("seed".to_owned(), Values::Whole(seeds)),
-            ("status".to_owned(), Values::Text(all().map(status).collect())),
-            ("folder".to_owned(), Values::Text(folders)),
+            ("status".to_owned(), Values::Text(states)),
+            ("folder".to_owned(), Values::Text(all().map(|(case, _)| folder(case)).collect())),
         ];
-        let levels = first.iter().enumerate().map(|(k, (name, _))| (name.clone(), level(k)));
         let numbers = RESULTS.iter().map(|(key, ..)| ((*key).to_owned(), number(key)));
         levels.chain(tail).chain(numbers).collect()
     }
+}
+
+fn done<'s>((case, status): &'s (&Case, Status<Results>)) -> Option<(&'s Case, &'s Results)> {
+    match status {
+        Status::Done(results) => Some((case, results)),
+        _ => None,
+    }
+}
+
+/// How a case stands, in a word.
+fn word<R>(status: &Status<R>) -> &'static str {
+    match status {
+        Status::Done(_) => "done",
+        Status::Failed(_) => "failed",
+        Status::Open => "open",
+    }
+}
+
+/// The folder of a case in that of the results.
+fn folder(case: &Case) -> String {
+    format!("cases/{}", case.slug())
+}
+
+/// All of a case, for other programs.
+fn entry(case: &Case, status: &Status) -> Value {
+    let levels: Map<String, Value> =
+        case.levels().map(|(factor, level)| (factor.to_owned(), json!(level))).collect();
+    // Settings of what is done are right.
+    let is_right = matches!(status, Status::Done(_)) || case.early_error().is_none();
+    let settings = is_right.then(|| case.table()).flatten();
+    let mut entry = json!({
+        "levels": levels,
+        "seed": case.seed,
+        "folder": folder(case),
+        "settings": settings,
+        "status": word(status),
+    });
+    match status {
+        Status::Done(results) => entry["results"] = results.clone(),
+        Status::Failed(why) => entry["error"] = json!(why),
+        Status::Open => {}
+    }
+    entry
 }
 
 /// Whether a case is at all of these levels.

@@ -2,7 +2,8 @@
 
 use super::cases::{Case, Status};
 use super::experiment::{Beside, Experiment, Level, TableAsked};
-use super::labels::{called, combinations, described, number, pairs, result, verdict_of};
+use super::labels::{called, combinations, described, number, pairs};
+use super::results::Results;
 use super::summary::{Spread, Summary};
 use crate::report::Table;
 use toml::Value;
@@ -15,10 +16,7 @@ pub fn levels(
 ) -> Vec<(String, Vec<String>)> {
     let of = |factor: &String| {
         let all = experiment.levels(factor).into_iter().map(|level| level.name);
-        let is_there = |level: &String| {
-            summary.all.iter().any(|(case, _)| case.level(factor) == Some(level.as_str()))
-        };
-        (factor.clone(), all.filter(is_there).collect())
+        (factor.clone(), all.filter(|level| summary.has(factor, level)).collect())
     };
     factors.iter().map(of).collect()
 }
@@ -185,17 +183,17 @@ pub fn all(summary: &Summary, with_verdicts: bool) -> Table {
         head.push("data explained?".to_owned());
     }
     let columns = head.len();
-    let row = |(case, status): &(&Case, Status)| {
+    let row = |(case, status): &(&Case, Status<Results>)| {
         let mut row = vec![case.name()];
         match status {
             Status::Done(results) => {
-                let cell = |key: &&str| match result(results, key) {
+                let cell = |key: &&str| match results.get(key) {
                     Some(x) => number(x, described(key).1),
                     None => NONE.to_owned(),
                 };
                 row.extend(shown.iter().map(cell));
                 if with_verdicts {
-                    row.push(verdict_of(results).to_owned());
+                    row.push(results.verdict.to_owned());
                 }
             }
             Status::Failed(why) => row.push(format!("failed: {why}")),
@@ -212,7 +210,7 @@ pub fn all(summary: &Summary, with_verdicts: bool) -> Table {
             .to_owned(),
         head,
         rows: summary.all.iter().map(row).collect(),
-        links: summary.all.iter().map(|(case, _)| format!("cases/{}/report.html", case.slug)).collect(),
+        links: summary.all.iter().map(|(case, _)| format!("cases/{}/report.html", case.slug())).collect(),
     }
 }
 
@@ -258,14 +256,17 @@ pub mod tests {
     fn exact_cells_have_their_best_level() {
         let experiment = Experiment::parse(TEXT).unwrap();
         let cases = expand(&experiment, &Source::BuiltIn, &Choice::default()).unwrap();
-        let results =
-            [30.0, 20.0, 21.0, 25.0].map(|x| Status::Done(serde_json::json!({"psnr_db": x})));
+        let results = [30.0, 20.0, 21.0, 25.0]
+            .map(|x| Status::Done(Results::of(&serde_json::json!({"psnr_db": x}))));
         let summary = Summary::new(cases.iter().zip(results).collect());
         let table = table(&experiment, &summary, &experiment.table[0]);
         assert_eq!(table.rows, [["bhnerf", "30.00 (0.001)"], ["grid", "25.00 (0.002)"]]);
         assert_eq!(table.caption, "Of two. One seed. In brackets: the best level of rate.");
         // What no case has leaves a note.
-        let none = cases.iter().map(|case| (case, Status::Done(serde_json::json!({})))).collect();
+        let none = cases
+            .iter()
+            .map(|case| (case, Status::Done(Results::of(&serde_json::json!({})))))
+            .collect();
         let empty = super::table(&experiment, &Summary::new(none), &experiment.table[0]);
         assert!(empty.rows.is_empty() && empty.caption.contains("no case that was run to its end"));
         assert!(markdown(&empty).contains(&empty.caption), "{}", markdown(&empty));

@@ -1,7 +1,7 @@
 //! What tables of qualities say, in sentences.
 
 use super::experiment::{Experiment, QUALITIES, TableAsked};
-use super::labels::{called, combinations, described, pairs, verdict_of};
+use super::labels::{called, combinations, described, pairs};
 use super::summary::Summary;
 use super::tables::{Cell, levels};
 
@@ -36,7 +36,7 @@ impl Order {
 
 /// How many cases explain their data.
 pub fn of_all(summary: &Summary) -> Option<String> {
-    let words: Vec<&str> = summary.done().map(|(_, results)| verdict_of(results)).collect();
+    let words: Vec<&str> = summary.done().map(|(_, results)| results.verdict).collect();
     let count = |word: &str| words.iter().filter(|other| **other == word).count();
     let kinds = ["yes", "yes, without noise", "fits noise", "no", "not judged"];
     let told: Vec<String> = kinds
@@ -93,6 +93,7 @@ pub fn of_table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) 
 mod tests {
     use super::*;
     use crate::compare::cases::{Choice, Status, expand};
+    use crate::compare::results::Results;
     use crate::compare::source::Source;
     use crate::compare::tables::tests::TEXT;
 
@@ -100,8 +101,8 @@ mod tests {
     fn exact_rows_stand_in_their_order() {
         let experiment = Experiment::parse(TEXT).unwrap();
         let cases = expand(&experiment, &Source::BuiltIn, &Choice::default()).unwrap();
-        let results =
-            [30.0, 20.0, 21.0, 25.0].map(|x| Status::Done(serde_json::json!({"psnr_db": x})));
+        let results = [30.0, 20.0, 21.0, 25.0]
+            .map(|x| Status::Done(Results::of(&serde_json::json!({"psnr_db": x}))));
         let summary = Summary::new(cases.iter().zip(results).collect());
         let said = of_table(&experiment, &summary, &experiment.table[0]);
         assert_eq!(said, ["Best, by PSNR (dB): bhnerf (30.00 (0.001)) > grid (25.00 (0.002))."]);

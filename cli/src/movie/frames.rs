@@ -11,6 +11,7 @@ use kerrlight_render::picture::Rendered;
 use kerrlight_render::picture::{Film, Frame};
 use kerrlight_render::scene::{Scene, apply_override};
 use rayon::prelude::*;
+use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -18,6 +19,8 @@ use std::str::FromStr;
 pub struct Sequence {
     folder: PathBuf,
     plans: Vec<Plan>,
+    /// Those that are wanted of all.
+    part: Range<usize>,
     /// Which are there.
     done: Vec<bool>,
     /// Fluxes of those that are there, with their unit.
@@ -52,8 +55,13 @@ struct Plan {
 }
 
 impl Sequence {
-    /// The frames at `times`, in `folder`, which is made if it is not there.
-    pub fn new(folder: &Path, of: &Origin<'_>, times: &[f64]) -> anyhow::Result<Self> {
+    /// The frames at `times`, of which a part is wanted, in `folder`, which is made if it is not there.
+    pub fn new(
+        folder: &Path,
+        of: &Origin<'_>,
+        times: &[f64],
+        part: &RangeInclusive<u32>,
+    ) -> anyhow::Result<Self> {
         let Origin { name, text, files, device } = of;
         let plan = |time: &f64| -> anyhow::Result<Plan> {
             let text = apply_override(text, &format!("observer.time={time:?}"))?;
@@ -69,7 +77,8 @@ impl Sequence {
         let [files, device] = [*files, *device].map(str::to_owned);
         let folder = folder.to_owned();
         let (fluxes, unresolved) = (vec![None; plans.len()], vec![0; plans.len()]);
-        Ok(Sequence { folder, plans, done, fluxes, unresolved, factor: None, files, device })
+        let part = *part.start() as usize..*part.end() as usize + 1;
+        Ok(Sequence { folder, plans, part, done, fluxes, unresolved, factor: None, files, device })
     }
 
     /// Looks which frames are there. Frames with other settings, or beyond the last, are errors:
@@ -80,7 +89,9 @@ impl Sequence {
         self.refuse_others()?;
         let is_frame = |name: &str| number_of(name, "exr").or(number_of(name, "png")).is_some();
         output::sweep(&self.folder, is_frame);
-        for k in 0..self.plans.len() {
+        // The first frame has the scale of all.
+        let first = (self.part.start > 0).then_some(0);
+        for k in first.into_iter().chain(self.part.clone()) {
             let path = self.path(k, "exr");
             if !path.exists() {
                 continue;
@@ -137,9 +148,20 @@ impl Sequence {
         self.folder.join(format!("frame_{k:04}.{extension}"))
     }
 
-    /// The frames that are not there yet.
+    /// The frames that are wanted.
+    pub fn wanted(&self) -> Range<usize> {
+        self.part.clone()
+    }
+
+    /// Those of them that are not there yet.
     pub fn missing(&self) -> Vec<usize> {
-        (0..self.done.len()).filter(|k| !self.done[*k]).collect()
+        self.wanted().filter(|k| !self.done[*k]).collect()
+    }
+
+    /// Whether the first frame, which no batch begins with, is needed for its scale.
+    pub fn lacks_scale(&self) -> bool {
+        let is_scaled = self.plans.first().is_some_and(|p| p.scene.screen.total_flux_jy.is_some());
+        is_scaled && self.factor.is_none() && self.missing().first().is_some_and(|k| *k > 0)
     }
 
     /// Number of frames.
@@ -149,7 +171,7 @@ impl Sequence {
 
     /// Least and largest flux of the frames, with their unit.
     pub fn fluxes(&self) -> Option<(f64, f64, &str)> {
-        let mut known = self.fluxes.iter().flatten();
+        let mut known = self.fluxes[self.wanted()].iter().flatten();
         let (first, unit) = known.next()?;
         let (least, most) =
             known.fold((*first, *first), |(least, most), (x, _)| (least.min(*x), most.max(*x)));

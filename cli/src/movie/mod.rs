@@ -25,16 +25,16 @@ use rendering::Rendering;
 use std::iter;
 use std::path::PathBuf;
 use std::time::Instant;
-use times::Span;
+use times::{Frames, Span};
 
 /// Arguments of `kerrlight movie`.
 #[derive(Debug, Args)]
 pub struct Movie {
     /// Scene file (TOML)
     scene: PathBuf,
-    /// How many frames
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    frames: u32,
+    /// How many frames; A..B/N renders the frames A to B of N alone
+    #[arg(long, value_name = "N")]
+    frames: Frames,
     #[command(flatten)]
     span: Span,
     /// Folder for the frames frame_0000.exr, frame_0001.exr, …; the same command resumes an
@@ -72,13 +72,19 @@ impl Movie {
     pub fn run(&self) -> anyhow::Result<Answer> {
         let source = Source::new(Some(&self.scene))?;
         let (text, scene) = source.scene(&self.overrides)?;
-        let plans = f64::from(self.frames) * (2 * text.len() + 4096) as f64;
-        memory::afford(|| format!("the settings of {} frames", self.frames), plans)?;
-        let times = self.span.times(self.frames, &scene)?;
-        let animations = self.viewing.outputs(self.frames)?;
+        let plans = f64::from(self.frames.all) * (2 * text.len() + 4096) as f64;
+        memory::afford(|| format!("the settings of {} frames", self.frames.all), plans)?;
+        let times = self.span.times(self.frames.all, &scene)?;
+        let animations = self.viewing.outputs(self.frames.all)?;
         let files = assets::load(&scene, &source.folder, &animations.files(), self.reach)?;
         animations.files().iter().try_for_each(|output| output.spares(&self.scene))?;
         let mut film = Film::new(&scene, files.decoded).with_context(|| source.name.clone())?;
+        if animations.any() && !self.frames.are_all() {
+            bail!(
+                "--gif, --apng and --png show the whole film: give them with --frames {}",
+                self.frames.all
+            );
+        }
         if animations.any() {
             self.look.channels(&scene, &film.names())?;
             self.overlay.check(&scene, &film.names())?;
@@ -91,14 +97,14 @@ impl Movie {
         afford(&film, &scene)?;
         let device = film.device().map_or("", RayDevice::name);
         let of = Origin { name: &source.name, text: &text, files: &files.identity, device };
-        let mut sequence = Sequence::new(&self.output, &of, &times)?;
+        let mut sequence = Sequence::new(&self.output, &of, &times, &self.frames.part)?;
         for input in iter::once(&self.scene).chain(&files.paths) {
             sequence.spare(input)?;
         }
         for output in animations.files() {
             sequence.avoid(output)?;
         }
-        if !film.changes() && self.frames > 1 {
+        if !film.changes() && self.frames.all > 1 {
             eprintln!("warning: nothing in this scene moves: all frames are the same");
         }
         sequence.find()?;
@@ -129,7 +135,7 @@ impl Movie {
         });
         let worth = format!(
             "{} frames, {rendered} of them rendered in {seconds:.2} s{flux}",
-            sequence.len()
+            sequence.wanted().len()
         );
         let files = answer::written(animations.iter().copied());
         let places = iter::once(self.output.as_path()).chain(files.iter().copied());
@@ -142,7 +148,7 @@ impl Movie {
         };
         answer
             .with("folder", self.output.display().to_string())
-            .with("frames", sequence.len())
+            .with("frames", sequence.wanted().len())
             .with("rendered", rendered)
             .with("seconds", seconds)
     }

@@ -37,11 +37,16 @@ impl<'a> Rendering<'a> {
     /// Renders what is missing and counts it.
     pub fn run(mut self) -> anyhow::Result<usize> {
         let (missing, start) = (self.sequence.missing(), Instant::now());
+        if self.sequence.lacks_scale() {
+            let keeper = Keeper::brief(self.there());
+            let first = self.frames(&[self.sequence.time(0)], &keeper)?;
+            first.iter().try_for_each(|first| self.sequence.scale_like(self.film, first))?;
+        }
         let most = self.film.batch();
         missing.chunks(most).try_for_each(|batch| self.batch(batch))?;
         self.bar.finish_and_clear();
         let (count, seconds) = (missing.len(), start.elapsed().as_secs_f64());
-        let there = self.sequence.len() - count;
+        let there = self.sequence.wanted().len() - count;
         eprintln!("{count} frames rendered in {seconds:.2} s, {there} were there");
         let unresolved = self.sequence.unresolved(&missing);
         if unresolved > 0 {
@@ -81,8 +86,8 @@ impl<'a> Rendering<'a> {
 
     /// How far it is, and how to resume.
     fn there(&self) -> String {
-        let (done, all) =
-            (self.sequence.len() - self.sequence.missing().len(), self.sequence.len());
+        let all = self.sequence.wanted().len();
+        let done = all - self.sequence.missing().len();
         let folder = self.folder.display();
         format!(
             "stopped: {done} of {all} frames are in {folder}; run the same command again to resume"

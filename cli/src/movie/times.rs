@@ -4,7 +4,48 @@ use anyhow::{Context, bail};
 use clap::Args;
 use kerrlight_render::scene::Scene;
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
+
+/// Frames of a film, and those of them that are rendered.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frames {
+    /// How many the film has.
+    pub all: u32,
+    /// The first and the last that are rendered.
+    pub part: RangeInclusive<u32>,
+}
+
+/// Most frames of a film.
+const MOST: u32 = 1_000_000;
+
+impl Frames {
+    /// Whether all are rendered.
+    pub fn are_all(&self) -> bool {
+        self.part.end() - self.part.start() + 1 == self.all
+    }
+}
+
+impl FromStr for Frames {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |text: &str| text.trim().parse::<u32>().ok();
+        let read = || match text.split_once('/') {
+            None => number(text).map(|all| (all, 0..=all.saturating_sub(1))),
+            Some((part, all)) => {
+                let (first, last) = part.split_once("..")?;
+                Some((number(all)?, number(first)?..=number(last)?))
+            }
+        };
+        match read() {
+            Some((all, part)) if part.start() <= part.end() && *part.end() < all && all <= MOST => {
+                Ok(Frames { all, part })
+            }
+            _ => Err(format!("N, or A..B/N for the frames A to B of N: 0 ≤ A ≤ B < N ≤ {MOST}")),
+        }
+    }
+}
 
 /// Which time a film shows.
 #[derive(Debug, Args)]
@@ -102,6 +143,18 @@ impl Span {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn exact_parts_of_a_film() {
+        let frames = |text: &str| text.parse::<Frames>().ok().map(|f| (f.all, f.part));
+        assert_eq!(frames("12"), Some((12, 0..=11)));
+        assert_eq!(frames("4..7/12"), Some((12, 4..=7)));
+        assert!("0..11/12".parse::<Frames>().unwrap().are_all());
+        assert!(!"0..10/12".parse::<Frames>().unwrap().are_all());
+        for wrong in ["0", "-1", "4..7", "4..12/12", "7..4/12", "a..b/12", "1000001", "1..2/3/4"] {
+            assert_eq!(frames(wrong), None, "{wrong}");
+        }
+    }
 
     #[test]
     fn exact_units_of_time() {

@@ -17,13 +17,19 @@ pub fn is_long(table: &Table) -> bool {
 
 /// The first rows, which `body` has, with all of them for the script.
 pub fn wrap(table: &Table, body: &str) -> String {
-    let row = |(k, cells): (usize, &Vec<String>)| {
+    // Row by row: as one value, many of them take several times the memory of the page.
+    let row = |k: usize, cells: &[String]| {
         let link = table.links.get(k).map_or("", String::as_str);
         json!(std::iter::once(link).chain(cells.iter().map(String::as_str)).collect::<Vec<_>>())
+            .to_string()
     };
-    let rows: Vec<_> = table.rows.iter().enumerate().map(row).collect();
-    // Inside a script element nothing may look like its end.
-    let data = json!({"step": ROWS, "rows": rows}).to_string().replace('<', "\\u003c");
+    let mut data = String::from("{\"rows\":[");
+    for (k, cells) in table.rows.iter().enumerate() {
+        // Inside a script element nothing may look like its end.
+        data += &row(k, cells).replace('<', "\\u003c");
+        data.push(if k + 1 < table.rows.len() { ',' } else { ']' });
+    }
+    data += &format!(",\"step\":{ROWS}}}");
     let (count, title) = (table.rows.len(), escape(&table.title));
     format!(
         "<div class=\"paged\">\n<p class=\"turn\" hidden><label>Rows with <input type=\"search\" aria-label=\"Words that rows of {title} have\"></label> \

@@ -8,13 +8,13 @@ mod volumes;
 use super::cases::Case;
 use super::experiment::{Experiment, FigureAsked, FigureKind};
 use super::labels::{described, pairs};
+use super::results::Results;
 use super::runner::Runner;
-use super::summary::{Summary, is_at};
+use super::summary::Summary;
 use super::tables::levels;
 use crate::output;
 use crate::report::{Figure, LinePlot, encode};
 use anyhow::Context;
-use serde_json::Value;
 
 /// Pictures and plots.
 #[derive(Default)]
@@ -86,7 +86,7 @@ impl Figures<'_> {
                         );
                         let alt = asked.title.clone();
                         let figure = Figure { png: output::read(&path)?, caption, alt };
-                        drawn.figures.push((name(&case.slug), figure));
+                        drawn.figures.push((name(&case.slug()), figure));
                     }
                 }
             }
@@ -111,9 +111,13 @@ impl Figures<'_> {
     }
 
     /// Cases of a figure that have results.
-    fn chosen(&self, asked: &FigureAsked) -> impl Iterator<Item = (&Case, &Value)> {
-        let fixed = pairs(&asked.r#where);
-        self.summary.done().filter(move |(case, _)| is_at(case, &fixed))
+    fn chosen(&self, asked: &FigureAsked) -> impl Iterator<Item = (&Case, &Results)> {
+        self.chosen_at(asked, &[]).into_iter()
+    }
+
+    /// Those of them at these levels.
+    fn chosen_at(&self, asked: &FigureAsked, levels: &[(&str, &str)]) -> Vec<(&Case, &Results)> {
+        self.summary.at(&[levels, &pairs(&asked.r#where)].concat())
     }
 
     /// Means over two factors as colours with their numbers.

@@ -4,7 +4,7 @@ use super::Figures;
 use crate::compare::cases::Case;
 use crate::compare::experiment::FigureAsked;
 use crate::compare::labels::{called, combinations, described, result};
-use crate::compare::summary::is_at;
+use crate::compare::results::Results;
 use crate::compare::tables::levels;
 use crate::fit;
 use crate::output;
@@ -29,10 +29,10 @@ impl Figures<'_> {
             for row in combinations(&rows) {
                 let at = [row.as_slice(), &column].concat();
                 let mut points = Vec::new();
-                for (case, results) in self.chosen(asked).filter(|(case, _)| is_at(case, &at)) {
+                for (case, results) in self.chosen_at(asked, &at) {
                     points.extend(self.log(case, value)?);
                     // A linear problem has its quality at its end alone.
-                    let last = (result(results, "seconds"), result(results, value));
+                    let last = (results.get("seconds"), results.get(value));
                     if let (Some(x), Some(y)) = last {
                         points.push([x, y]);
                     }
@@ -80,11 +80,11 @@ impl Figures<'_> {
         let rows = levels(self.experiment, self.summary, &asked.rows);
         let mut series = Vec::new();
         for row in combinations(&rows) {
-            let at = self.chosen(asked).filter(|(case, _)| is_at(case, &row));
-            let point = |(case, results): (&Case, &Value)| {
-                Some([case.number(factor)?, result(results, value)?])
+            let point = |(case, results): (&Case, &Results)| {
+                Some([case.number(factor)?, results.get(value)?])
             };
-            let mut points: Vec<[f64; 2]> = at.filter_map(point).collect();
+            let mut points: Vec<[f64; 2]> =
+                self.chosen_at(asked, &row).into_iter().filter_map(point).collect();
             points.sort_by(|a, b| a[0].total_cmp(&b[0]));
             if !points.is_empty() {
                 let name = if row.is_empty() { factor.clone() } else { called(&row) };
@@ -143,7 +143,7 @@ impl Figures<'_> {
         let rows = levels(self.experiment, self.summary, &asked.rows);
         let mut series = Vec::new();
         for row in combinations(&rows) {
-            let Some((case, _)) = self.chosen(asked).find(|(case, _)| is_at(case, &row)) else {
+            let Some((case, _)) = self.chosen_at(asked, &row).into_iter().next() else {
                 continue;
             };
             let [assumed, simulated] = fit::velocities(&case.settings().unwrap_or_default())?;

@@ -3,8 +3,8 @@
 use super::Figures;
 use crate::compare::cases::Case;
 use crate::compare::experiment::FigureAsked;
-use crate::compare::labels::{called, combinations, result};
-use crate::compare::summary::is_at;
+use crate::compare::labels::{called, combinations};
+use crate::compare::results::Results;
 use crate::compare::tables::levels;
 use crate::fit;
 use crate::report::{Figure, encode};
@@ -14,7 +14,6 @@ use kerrlight_render::dynamics::Axis;
 use kerrlight_render::volume::metrics;
 use kerrlight_render::volume::projection::{Surroundings, Tile, View, mosaic};
 use kerrlight_render::volume::{Volume, VolumeFile};
-use serde_json::Value;
 
 impl Figures<'_> {
     /// Truths in the first row, recoveries of the first seed, or of every one, below.
@@ -47,10 +46,10 @@ impl Figures<'_> {
         for column in combinations(&columns) {
             let at = |row: &Row| {
                 let levels = [row.levels, &column].concat();
-                self.chosen(asked).find(|(case, _)| is_at(case, &levels) && case.seed == row.seed)
+                self.chosen_at(asked, &levels).into_iter().find(|(case, _)| case.seed == row.seed)
             };
             // A column with a gap would stand under the wrong truth.
-            let cells: Option<Vec<(&Case, &Value)>> = rows.iter().map(at).collect();
+            let cells: Option<Vec<(&Case, &Results)>> = rows.iter().map(at).collect();
             let Some(cells) = cells else { continue };
             let Some((first, _)) = cells.first() else { continue };
             let Some(truth) = self.load(first, TRUTH, asked.later)? else { continue };
@@ -58,7 +57,7 @@ impl Figures<'_> {
                 let Some(volume) = self.load(case, FOUND, asked.later)? else { return Ok(None) };
                 let psnr = match asked.later {
                     Some(_) => metrics::compare(&volume.volume, &truth.volume, None)?.psnr_db,
-                    None => result(results, "psnr_db"),
+                    None => results.get("psnr_db"),
                 };
                 line.cells.push((quality(psnr, results), volume));
             }
@@ -74,7 +73,7 @@ impl Figures<'_> {
             seeds.clone().map(move |seed| Row { levels: levels.as_slice(), seed })
         });
         let is_there = |row: &Row| {
-            self.chosen(asked).any(|(case, _)| is_at(case, row.levels) && case.seed == row.seed)
+            self.chosen_at(asked, row.levels).into_iter().any(|(case, _)| case.seed == row.seed)
         };
         rows.filter(is_there).collect()
     }
@@ -186,9 +185,9 @@ fn view_of(asked: &FigureAsked, [x, y, z]: [f64; 3]) -> View {
 }
 
 /// What stands above a recovered volume.
-fn quality(psnr: Option<f64>, results: &Value) -> String {
+fn quality(psnr: Option<f64>, results: &Results) -> String {
     let psnr = psnr.map(|x| format!("{x:.1} dB"));
-    let axis = result(results, "axis_dot_truth").filter(|x| *x < 1.0 - 1e-9);
+    let axis = results.get("axis_dot_truth").filter(|x| *x < 1.0 - 1e-9);
     let axis = axis.map(|x| format!("axis {x:.4}"));
     [psnr, axis].into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
