@@ -156,7 +156,7 @@ fn hand_sigmas(first: [f64; 2], second: [f64; 2], setup: &Setup) -> [f64; 4] {
 /// let longest = 2.0 * 6.4e6 / (299_792_458.0 / 230e9);
 /// assert!(!observation.rows.is_empty());
 /// assert!(observation.rows.iter().all(|row| row.uv[0].hypot(row.uv[1]) < longest));
-/// # Ok::<(), kerrlight_tomo::Error>(())
+/// # Ok::<(), kerrlight_vlbi::Error>(())
 /// ```
 ///
 /// # Errors

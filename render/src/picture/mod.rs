@@ -295,7 +295,7 @@ pub struct Rendered {
 /// // Seen along the axis of a hole without spin, the picture is symmetric.
 /// let at = |row: usize, column: usize| intensity[16 * row + column];
 /// assert!((at(4, 7) - at(7, 4)).abs() < 1e-5 * at(4, 7) && at(4, 7) > 0.0);
-/// # Ok::<(), kerrlight_tomo::Error>(())
+/// # Ok::<(), kerrlight_render::Error>(())
 /// ```
 ///
 /// # Errors

@@ -54,7 +54,7 @@ use serde::{Deserialize, Serialize};
 /// assert_eq!(Scene::parse(&scene.to_toml())?.to_toml(), scene.to_toml());
 /// let tilted = Scene::parse(&apply_override(text, "observer.inclination_deg=17")?)?;
 /// assert_eq!(tilted.observer.inclination_deg, 17.0);
-/// # Ok::<(), kerrlight_tomo::Error>(())
+/// # Ok::<(), kerrlight_render::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -42,7 +42,7 @@ use std::sync::Arc;
 /// // α = −6 M, β = 2 M, at the scene's own time of observation.
 /// let seen = prepared.observe(-6.0, 2.0, &mut Scratch::default())?;
 /// assert!(seen.intensity > 0.0 && seen.redshift > 1.0); // the side that approaches
-/// # Ok::<(), kerrlight_tomo::Error>(())
+/// # Ok::<(), kerrlight_render::Error>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct PreparedScene {

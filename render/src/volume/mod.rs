@@ -40,7 +40,7 @@ pub use panels::Shown;
 /// let estimate = Volume::new([3; 3], [-1.0; 3], [1.0; 3], high)?;
 /// let worth = metrics::compare(&estimate, &volume, None)?;
 /// assert!((worth.psnr_db.unwrap() - 20.0).abs() < 1e-5);
-/// # Ok::<(), kerrlight_tomo::Error>(())
+/// # Ok::<(), kerrlight_render::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Volume {

@@ -44,7 +44,7 @@ pub use kerrlight_common::simd::Float;
 /// let left: f64 = seen.iter().zip(&y).map(|(v, y)| (v.conj() * y).re).sum();
 /// let right: f64 = image.iter().zip(&back).map(|(x, b)| x * b).sum();
 /// assert!((left - right).abs() < 1e-14);
-/// # Ok::<(), kerrlight_tomo::Error>(())
+/// # Ok::<(), kerrlight_vlbi::Error>(())
 /// ```
 pub trait Operator<T: Float>: Sync {
     /// A number of the data: `T` or `Complex<T>`.
