@@ -344,6 +344,52 @@ fn exact_rings_do_not_depend_on_tiles_or_batches() {
     assert!(whole.channel("intensity").unwrap().iter().any(|light| *light > 0.0));
 }
 
+/// However small the picture, rings take no more rays than its grid, and the stated error holds with so few of them.
+#[test]
+fn exact_rings_of_small_pictures() {
+    for (name, pixels, samples) in [
+        ("disc_face_on.toml", [32, 18], 4),
+        ("disc_face_on.toml", [9, 7], 1),
+        ("hot_spots.toml", [24, 16], 4),
+    ] {
+        let [width, height] = pixels.map(|count: u64| count.to_string());
+        let size = [format!("screen.width={width}"), format!("screen.height={height}")];
+        let sized = |samples: u64, rings: &str| {
+            let samples = format!("screen.samples_per_pixel={samples}");
+            let rings = format!("screen.rings=\"{rings}\"");
+            let more =
+                [&size[0], &size[1], &samples, &rings, "screen.total_flux_jy="].map(str::to_owned);
+            let more: Vec<&str> = more.iter().map(String::as_str).collect();
+            kerrlight_tomo::render::render(&scene(&file(name), &more), None, &|_| true).unwrap()
+        };
+        let (few, many) = (sized(samples, "resolved"), sized(1024, "regular-grid"));
+        let grid = pixels[0] * pixels[1] * samples;
+        assert!(few.summary.rays > grid && few.summary.rays <= 2 * grid, "{}", few.summary.rays);
+        let (found, stated) = (distance(&few.picture, &many.picture), few.summary.image_error);
+        assert!(found < stated && found > 0.1 * stated, "{name} {pixels:?}: {found} {stated}");
+    }
+}
+
+/// Where pixels are refined, strata follow the requested error: a coarse picture takes not even twice the rays that it takes
+/// without them.
+#[test]
+fn exact_rings_follow_the_requested_error() {
+    let rays = |rings: &str| {
+        let rings = format!("screen.rings=\"{rings}\"");
+        let more = [
+            "screen.width=32",
+            "screen.height=18",
+            "screen.samples_per_pixel=1",
+            "screen.image_error=0.1",
+            &rings,
+        ];
+        let scene = scene(&file("disc_face_on.toml"), &more);
+        kerrlight_tomo::render::render(&scene, None, &|_| true).unwrap().summary.rays
+    };
+    let (resolved, grid) = (rays("resolved"), rays("regular-grid"));
+    assert!(resolved < 2 * grid, "{resolved} {grid}");
+}
+
 fn ring_strata(spin: f64, degrees: f64) -> (Kerr, Observer, RingStrata) {
     let hole = Kerr::new(spin).unwrap();
     let observer = Observer::at_infinity(Inclination::from_degrees(degrees).unwrap());

@@ -1,7 +1,8 @@
 //! Square parts of pixels and what they may be off by.
 
 use super::HIDDEN;
-use super::light::{Light, range};
+use super::light::Light;
+use crate::render::rings::range;
 
 /// A square part of a pixel whose four quarters have a ray each.
 #[derive(Debug, Clone, Copy)]

@@ -67,10 +67,3 @@ impl Light {
         }
     }
 }
-
-/// Largest less least.
-pub(super) fn range(values: impl Iterator<Item = f64>) -> f64 {
-    let (low, high) =
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-    high - low
-}

@@ -18,13 +18,13 @@ pub(super) use tolerance::tolerance;
 
 use super::grid::{Grid, Square};
 use super::pixels::Pixel;
-use super::rings::{Counted, Resolver};
+use super::rings::{Counted, Resolver, range};
 use super::workspace::Workspace;
 use crate::Error;
 use crate::transport::{PreparedScene, RayResult};
 use cell::Cell;
 use cut::Cut;
-use light::{Light, range};
+use light::Light;
 use std::ops::Range;
 
 /// Cells are cut at most this often: the smallest are 1/128 of a pixel wide.
