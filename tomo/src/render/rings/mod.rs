@@ -185,7 +185,8 @@ impl RingStrata {
             return part.quarters().into_iter().for_each(|quarter| self.cut(quarter, take));
         }
         // Of the whole square: rays of its quarters follow the same grading.
-        let core = CORE * plane.reach() * f64::from(1 << level);
+        // Few strata are better spread evenly.
+        let core = (CORE * self.coarseness).min(0.5) * plane.reach() * f64::from(1 << level);
         take(&part, Some((&plane, &plane.strata(core, self.width()))));
     }
 

@@ -141,7 +141,12 @@ impl Resolver {
                     let place = j * squares.len() + job.square;
                     let found = &work.seen[own.clone()];
                     counted[place] = mean(strata, found, &mut seen[place]);
+                    let between = between(strata, found);
                     counted[place].error = self.error(strata, found);
+                    if between > 0.0 {
+                        let light = prepared.brightest_disc(squares[job.square].center);
+                        counted[place].error += 2.0 * between * light;
+                    }
                     if let Some(layers) = layers.get_mut(place) {
                         layers.mixed = mixed(strata, &work.layers[own]);
                     }
@@ -239,6 +244,16 @@ fn mixed(rays: &[Stratum], found: &[Layers]) -> Mixed {
         mixed.add(*share as f32, &layers.mixed);
     }
     mixed
+}
+
+/// The share of a square that images of the disc cover between its rays.
+fn between(rays: &[Stratum], found: &[RayResult]) -> f64 {
+    let pairs = rays.windows(2).zip(found.windows(2));
+    let share = |(rays, found): (&[Stratum], &[RayResult])| match (rays, found) {
+        ([a, b], [one, other]) => 0.5 * (a.share + b.share) * one.passes.between(&other.passes),
+        _ => 0.0,
+    };
+    pairs.map(share).sum()
 }
 
 /// Largest less least.
