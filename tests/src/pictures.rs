@@ -267,7 +267,8 @@ fn exact_photon_rings_are_resolved() {
     let sized = |more: &[&str]| render(&scene(&text, &[&size, more].concat()));
     let reference = sized(&["screen.samples_per_pixel=1024", "screen.rings=\"regular-grid\""]);
     let grid = sized(&["screen.samples_per_pixel=1", "screen.rings=\"regular-grid\""]);
-    let resolved = sized(&["screen.samples_per_pixel=1"]);
+    // Rings take as many rays as the grid at most.
+    let resolved = sized(&["screen.samples_per_pixel=4"]);
     let [before, after] = [&grid, &resolved].map(|picture| ring_contrast(picture, &reference));
     assert!(before > 0.5 && after < 0.05, "{before} {after}");
     let [before, after] = [&grid, &resolved].map(|picture| distance(picture, &reference));
@@ -343,6 +344,81 @@ fn exact_rings_do_not_depend_on_tiles_or_batches() {
         assert_eq!(film.rendered(frame, 1.0).unwrap().picture, single, "{time}");
     }
     assert!(whole.channel("intensity").unwrap().iter().any(|light| *light > 0.0));
+}
+
+/// However small the picture, rings take no more rays than its grid, and the stated error holds with so few of them.
+#[test]
+fn exact_rings_of_small_pictures() {
+    let text = file("disc_face_on.toml");
+    for (width, height, samples) in [(32, 18, 4), (32, 18, 1), (9, 7, 1)] {
+        let sized = |samples: u64, rings: &str| {
+            let more = [
+                format!("screen.width={width}"),
+                format!("screen.height={height}"),
+                format!("screen.samples_per_pixel={samples}"),
+                format!("screen.rings=\"{rings}\""),
+            ];
+            let scene = scene(&text, &more.each_ref().map(String::as_str));
+            kerrlight_render::picture::render(&scene, None, &|_| true).unwrap()
+        };
+        let (few, many) = (sized(samples, "resolved"), sized(1024, "regular-grid"));
+        let grid = width * height * samples;
+        assert!(few.summary.rays > grid && few.summary.rays <= 2 * grid, "{}", few.summary.rays);
+        let (found, stated) = (distance(&few.picture, &many.picture), few.summary.image_error);
+        assert!(found < stated && found > 0.1 * stated, "{width} {samples}: {found} {stated}");
+    }
+}
+
+/// A transparent annulus of 0.02 M, whose image is narrower than rays are apart: the stated error covers what is missing,
+/// and pixels that are refined find it.
+#[test]
+fn exact_error_of_an_annulus_between_rays() {
+    let text = "hole = { spin = 0.5 }
+        observer = { inclination_deg = 80.0 }
+        screen = { field_of_view_m = 30.0, width = 48, samples_per_pixel = 1 }
+        effects = { redshift = true, spectral_index = 0.0 }
+        tracer = { integrator = \"elliptic\", tolerance = 1e-8 }
+        disc = { inner_edge = 10.0, outer_edge = 10.02, peak_intensity = 1.0, opaque = false }";
+    for inclination in ["observer.inclination_deg=80.0", "observer.inclination_deg=17.0"] {
+        let of = |more: &[&str]| {
+            let scene = scene(text, &[&[inclination], more].concat());
+            kerrlight_render::picture::render(&scene, None, &|_| true).unwrap().summary
+        };
+        let grid = "screen.rings=\"regular-grid\"";
+        let truth = of(&[grid, "screen.samples_per_pixel=1024"]).flux;
+        for more in [&[grid][..], &[], &["screen.image_error=0.1"]] {
+            let seen = of(more);
+            let off = (seen.flux - truth).abs();
+            let stated = seen.flux_error;
+            assert!(
+                off < stated && stated < 4.0 * truth,
+                "{more:?}: {} {stated} {truth}",
+                seen.flux
+            );
+        }
+        let refined = of(&["screen.image_error=0.1"]);
+        assert!(refined.flux > 0.8 * truth && refined.image_error < 0.3, "{refined:?} {truth}");
+    }
+}
+
+/// Where pixels are refined, strata follow the requested error: a coarse picture takes not even twice the rays that it takes
+/// without them.
+#[test]
+fn exact_rings_follow_the_requested_error() {
+    let rays = |rings: &str| {
+        let rings = format!("screen.rings=\"{rings}\"");
+        let more = [
+            "screen.width=32",
+            "screen.height=18",
+            "screen.samples_per_pixel=1",
+            "screen.image_error=0.1",
+            &rings,
+        ];
+        let scene = scene(&file("disc_face_on.toml"), &more);
+        kerrlight_render::picture::render(&scene, None, &|_| true).unwrap().summary.rays
+    };
+    let (resolved, grid) = (rays("resolved"), rays("regular-grid"));
+    assert!(resolved < 2 * grid, "{resolved} {grid}");
 }
 
 fn ring_strata(spin: f64, degrees: f64) -> (Kerr, Observer, RingStrata) {

@@ -63,6 +63,11 @@ impl DiscModel {
         (self.inner..=self.outer).contains(&r)
     }
 
+    /// Its inner and its outer radius, M.
+    pub fn edges(&self) -> [f64; 2] {
+        [self.inner, self.outer]
+    }
+
     /// Whether some of its matter plunges.
     pub fn plunges(&self) -> bool {
         self.plunging.is_some()

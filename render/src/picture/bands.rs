@@ -2,7 +2,8 @@
 //! a band puts the band together, so that only a few bands are in memory at any time.
 
 use super::adaptive::{self, Adaptive};
-use super::pixels::{Pixels, uniform};
+use super::grid::Grid;
+use super::pixels::{Pixel, Pixels, half_covered, uniform};
 use super::tally::Tally;
 use super::workspace::Workspace;
 use super::{Progress, Raster, RenderError};
@@ -110,6 +111,32 @@ impl Raster {
         Ok(pixels)
     }
 
+    /// Sum over the pixels of a band of the error by images of the disc that pass between their rays.
+    fn between(&self, pixels: &[Pixel], first: usize) -> f64 {
+        let Grid { width, side, .. } = self.grid;
+        let passes = |k: usize| &pixels[k].center.passes;
+        let mut sum = 0.0;
+        for k in 0..pixels.len() {
+            let (column, row) = (k % width, k / width);
+            let next = [
+                (column > 0).then(|| k - 1),
+                (column + 1 < width).then_some(k + 1),
+                (row > 0).then(|| k - width),
+                (k + width < pixels.len()).then_some(k + width),
+            ];
+            let share = next.map(|other| other.map_or(0.0, |k2| passes(k).between(passes(k2))));
+            let covered = half_covered(share);
+            // Images that are wider than the rays are apart are met.
+            let missed = covered * (1.0 - covered * side as f64).max(0.0);
+            if missed > 0.0 {
+                let center = self.grid.inside(column, first + row, [0.0; 2]);
+                let unknown = 1.0 - pixels[k].known;
+                sum += 2.0 * unknown * missed * self.prepared.brightest_disc(center);
+            }
+        }
+        sum
+    }
+
     /// The band from its tiles at the time number `time`.
     fn assemble(&self, index: usize, parts: &Parts, time: usize) -> Result<Band, Error> {
         let (width, rows) = (self.grid.width, self.layout.rows(index).len());
@@ -126,7 +153,10 @@ impl Raster {
             channels.push(values);
         }
         let side = self.scene.screen.image_error.is_none().then_some(self.grid.side);
-        let tally = Tally::of_band(&pixels, width, side);
+        let mut tally = Tally::of_band(&pixels, width, side);
+        if side.is_some() {
+            tally.error += self.between(&pixels, self.layout.rows(index).start);
+        }
         Ok(Band { index, channels, tally })
     }
 }

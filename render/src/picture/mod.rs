@@ -34,9 +34,8 @@ use crate::image::Picture;
 use crate::image::exr::Layout;
 use crate::scene::{Rings, Scene};
 use crate::transport::{Assets, Meter, PreparedScene, RayResult, Scratch, names};
-use grid::{Grid, Square};
+use grid::Grid;
 use kerrlight_geodesic::RayDevice;
-use rayon::prelude::*;
 use rings::Resolver;
 use std::sync::{Arc, Mutex, PoisonError};
 use tally::{Tally, own_unit};
@@ -108,7 +107,7 @@ const DEVICE_TILE: usize = 2048;
 /// What resolves photon rings, if the scene has them resolved.
 fn resolver(scene: &Scene, prepared: &PreparedScene) -> Option<Resolver> {
     match scene.screen.rings {
-        Rings::Resolved => Resolver::new(prepared, scene.screen.image_error.is_some()),
+        Rings::Resolved => Resolver::new(prepared, &Grid::new(scene), scene.screen.image_error),
         Rings::RegularGrid => None,
     }
 }
@@ -203,20 +202,8 @@ impl Raster {
     /// About how many rays photon rings take besides those of the regular grid, what hides them left out
     /// of account: counted in up to 256 rows.
     pub fn ring_rays(&self) -> u64 {
-        let Some(rings) = &self.rings else { return 0 };
-        let Grid { width, height, side, size } = self.grid;
-        let step = height.div_ceil(256);
-        let of_row = |row: usize| {
-            let places = (0..width * side * side).map(|k| (k / (side * side), k % (side * side)));
-            let square = |(column, k): (usize, usize)| {
-                let center = self.grid.screen(column, row, k % side, k / side);
-                rings.count(Square { center, size: size / side as f64 }) as u64
-            };
-            places.map(square).sum::<u64>()
-        };
-        let rows: Vec<usize> = (0..height).step_by(step).collect();
-        let found: u64 = rows.par_iter().map(|row| of_row(*row)).sum();
-        found * height as u64 / rows.len() as u64
+        let every = self.grid.height.div_ceil(256);
+        self.rings.as_ref().map_or(0, |rings| rings.rays(&self.grid, every))
     }
 
     /// Number of bands.

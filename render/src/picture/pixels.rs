@@ -20,6 +20,8 @@ pub(super) struct Pixel {
     pub rays: u32,
     /// Estimated absolute error of the intensity; 0 where it is not estimated pixel by pixel.
     pub error: f64,
+    /// Mean intensity of images of the disc that passed between the first rays, about.
+    pub missed: f64,
     /// The share of the pixel whose error that is.
     pub known: f64,
 }
@@ -104,6 +106,12 @@ pub(super) fn uniform(
         (work.seen, work.layers) = (seen, layers);
     }
     Ok(all)
+}
+
+/// The share of a square that images of the disc cover which lie between its centre and its neighbours on the left, on
+/// the right, above and below, on so much of the way to each. One that runs aslant lies between both kinds.
+pub(super) fn half_covered([left, right, above, below]: [f64; 4]) -> f64 {
+    0.5 * (left + right).max(above + below)
 }
 
 /// A pixel with what is known of the squares around its rays.

@@ -134,7 +134,7 @@ pub struct Summary {
     /// Unit of the flux.
     pub flux_unit: &'static str,
     /// Estimated error of the `intensity` image: sum of its pixels' absolute errors by the sum
-    /// of the pixels; 0 for a dark one.
+    /// of the pixels; infinite for a dark one in which a disc may have been missed.
     pub image_error: f64,
 }
 
@@ -172,7 +172,7 @@ impl Summary {
                 (false, Some(_)) => "scene unit uas^2",
                 (false, None) => "scene unit M^2",
             },
-            image_error: if tally.intensity > 0.0 { error / tally.intensity } else { 0.0 },
+            image_error: if error > 0.0 { error / tally.intensity } else { 0.0 },
         })
     }
 }

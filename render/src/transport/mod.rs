@@ -28,4 +28,5 @@ pub(crate) use prepare::view;
 pub use prepare::{Assets, PreparedScene};
 pub(crate) use ray::Block;
 pub use ray::Scratch;
+pub(crate) use result::Passes;
 pub use result::RayResult;

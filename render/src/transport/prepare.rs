@@ -280,6 +280,17 @@ impl PreparedScene {
         self.meshes.is_some()
     }
 
+    /// The brightest light of the disc, if it were met, along the ray that arrives at (x, y).
+    pub(crate) fn brightest_disc(&self, (x, y): (f64, f64)) -> f64 {
+        let (Some(disc), Ok(ray)) = (&self.disc, self.optics.view.ray(&self.optics.hole, x, y))
+        else {
+            return 0.0;
+        };
+        let light = disc.brightest(&self.optics, [ray.lambda, ray.eta]);
+        let shift = self.optics.spectral_index.zip(self.optics.blueshift(x, y));
+        shift.map_or(light, |(index, shift)| light * shift.powf(3.0 + index))
+    }
+
     /// Number of hot spots.
     pub fn spots(&self) -> usize {
         self.spots.len()

@@ -30,6 +30,40 @@ pub struct RayResult {
     pub optical_depth: f64,
     /// What became of the ray.
     pub outcome: Outcome,
+    /// Where it passes the disc.
+    pub(crate) passes: Passes,
+}
+
+/// Crossings of the equatorial plane of which is known where they pass the disc.
+pub(super) const PASSES: usize = 4;
+
+/// Where a ray passes the disc: what lies between two rays neither of which meets it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Passes {
+    /// 1/r of each crossing, from 0 at the outer edge to 1 at the inner one; that of infinity or of the horizon where the
+    /// ray ends before, 0 where it is not known or hidden.
+    pub places: [f32; PASSES],
+    /// How many crossings there are.
+    pub count: u32,
+}
+
+impl Passes {
+    /// Which crossings pass inside and outside the disc: two bits each.
+    pub fn sides(&self) -> u8 {
+        let side = |place: f32| u8::from(place < 0.0) + 2 * u8::from(place > 1.0);
+        self.places.iter().fold(0, |sides, place| sides << 2 | side(*place))
+    }
+
+    /// The share of the way to another ray on which images of the disc lie that neither of them meets: one at least
+    /// passes inside its inner edge, the other one outside the outer edge.
+    pub fn between(&self, other: &Passes) -> f64 {
+        let count = self.count.max(other.count) as usize;
+        let share = |(a, b): (&f32, &f32)| {
+            let (low, high) = (a.min(*b), a.max(*b));
+            if low < 0.0 && high > 1.0 { f64::from(1.0 / (high - low)) } else { 0.0 }
+        };
+        self.places.iter().zip(&other.places).take(count).map(share).sum::<f64>().min(1.0)
+    }
 }
 
 impl RayResult {
@@ -61,6 +95,7 @@ pub(super) struct Accumulator {
     pub depth: f64,
     pub stokes: [f64; 3],
     pub disc_images: u32,
+    pub passes: [f32; PASSES],
     /// What is kept besides, if anything is.
     pub record: Option<Box<Record>>,
 }
@@ -77,6 +112,7 @@ impl Accumulator {
             depth: 0.0,
             stokes: [0.0; 3],
             disc_images: 0,
+            passes: [0.0; PASSES],
             record: None,
         }
     }
@@ -134,6 +170,7 @@ impl Accumulator {
             optical_depth: self.depth,
             stokes: self.stokes,
             outcome,
+            passes: Passes { places: self.passes, count: ray.crossing_count },
         }
     }
 

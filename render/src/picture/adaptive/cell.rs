@@ -1,7 +1,9 @@
 //! Square parts of pixels and what they may be off by.
 
 use super::HIDDEN;
-use super::light::{Light, range};
+use super::light::Light;
+use crate::picture::pixels::half_covered;
+use crate::picture::rings::range;
 
 /// A square part of a pixel whose four quarters have a ray each.
 #[derive(Debug, Clone, Copy)]
@@ -18,7 +20,8 @@ pub(super) struct Cell {
 }
 
 impl Cell {
-    /// `middle` is the ray at its centre, `bright` the largest intensity around.
+    /// `middle` is the ray at its centre, `bright` the largest intensity around, `disc` that of the disc. Images of the
+    /// disc that pass between the rays are counted twice: as dark, or as wide as a quarter where one is met.
     ///
     /// A smooth function's mean over the quarters is off by a third of d, the difference
     /// of the quarters' mean and the middle; where an edge runs through, d or the twist t of
@@ -31,7 +34,7 @@ impl Cell {
         level: u32,
         middle: &Light,
         quarters: [Light; 4],
-        bright: f64,
+        [bright, disc]: [f64; 2],
     ) -> Self {
         let [a, b, c, d] = quarters.map(|light| light.intensity);
         let off = (0.25 * (a + b + c + d) - middle.intensity).abs();
@@ -48,6 +51,9 @@ impl Cell {
         if quarters.iter().any(|light| light.other_band(middle)) {
             error = error.max(HIDDEN * bright);
         }
+        let between = |i: usize, j: usize| quarters[i].between(&quarters[j]);
+        let covered = half_covered([between(0, 1), between(2, 3), between(0, 2), between(1, 3)]);
+        error += covered * disc;
         Cell { center, level, quarters, error: error * area(level), seam: 0.0 }
     }
 
@@ -90,11 +96,11 @@ mod tests {
         let places = Cell::places([0.25, -0.25], 1);
         assert_eq!(places[0], [0.125, -0.375]);
         let quarters = places.map(plane);
-        let cell = Cell::new([0.25, -0.25], 1, &plane([0.25, -0.25]), quarters, 4.0);
+        let cell = Cell::new([0.25, -0.25], 1, &plane([0.25, -0.25]), quarters, [4.0, 0.0]);
         assert!(cell.error.abs() < 1e-15);
         let bent = |[x, y]: [f64; 2]| Light { intensity: x * x + y * y, ..Light::default() };
         let quarters = Cell::places([0.0; 2], 0).map(bent);
-        let cell = Cell::new([0.0; 2], 0, &bent([0.0; 2]), quarters, 0.5);
+        let cell = Cell::new([0.0; 2], 0, &bent([0.0; 2]), quarters, [0.5, 0.0]);
         // The mean over the pixel is 1/6, that of the quarters' centres 1/8.
         assert!(cell.error >= 1.0 / 6.0 - 1.0 / 8.0);
     }

@@ -40,7 +40,8 @@ impl CellMap {
     /// What edges may do that pass between the rays of cell number `k` and those of the cells
     /// next to it. Between a ray and the border lies half of its quarter; the edge may be anywhere
     /// between this ray and the next cell's, which is taken for a quarter of the quarter.
-    pub(super) fn seam(&self, cells: &[Cell], k: usize) -> f64 {
+    /// Images of the disc, as bright as `disc`, that pass between them lie in one of the two, and count twice.
+    pub(super) fn seam(&self, cells: &[Cell], k: usize, disc: f64) -> f64 {
         let cell = &cells[k];
         let size = 0.5f64.powi(cell.level as i32);
         let quarter = 0.25 * area(cell.level);
@@ -52,7 +53,8 @@ impl CellMap {
                 across[axis] += (place[axis] - cell.center[axis]).signum() * 0.251 * size;
                 let next = self.light(cells, across).filter(|next| next.other_piece(light));
                 if let Some(next) = next {
-                    seam += 0.25 * quarter * (next.intensity - light.intensity).abs();
+                    let height = (next.intensity - light.intensity).abs();
+                    seam += quarter * (0.25 * height + next.between(light) * disc);
                 }
             }
         }

@@ -18,6 +18,8 @@ pub(super) struct Cut {
     pub(super) cells: Vec<Cell>,
     /// Largest intensity of its rays and its neighbours' first ones.
     pub(super) bright: f64,
+    /// The brightest light of the disc, where edges of it are near.
+    pub(super) disc: f64,
     /// The first rays of its neighbours, row by row, its own in the middle.
     pub(super) around: [Light; 9],
     /// How much neighbours' first rays differ from its rays on their side if none of these is of
@@ -33,12 +35,24 @@ impl Cut {
     pub(super) fn whole(
         pixel: usize,
         [column, row]: [usize; 2],
-        bright: f64,
+        [bright, disc]: [f64; 2],
         around: [Light; 9],
     ) -> Self {
         let (cells, contrast) = (Vec::new(), 0.0);
         let (samples, rays, unresolved) = (0, 0, 0);
-        Self { pixel, column, row, cells, bright, around, contrast, samples, rays, unresolved }
+        Self {
+            pixel,
+            column,
+            row,
+            cells,
+            bright,
+            disc,
+            around,
+            contrast,
+            samples,
+            rays,
+            unresolved,
+        }
     }
 
     /// Root of the sum of squares: the errors of cells at an edge are independent.
@@ -74,7 +88,7 @@ impl Cut {
         }
         let map = CellMap::new(&self.cells);
         for k in 0..self.cells.len() {
-            self.cells[k].seam = map.seam(&self.cells, k);
+            self.cells[k].seam = map.seam(&self.cells, k, self.disc);
         }
     }
 
@@ -91,7 +105,8 @@ impl Cut {
                 if !light.other_piece(neighbor) {
                     return 0.0;
                 }
-                contrast = contrast.max((light.intensity - neighbor.intensity).abs());
+                let height = (light.intensity - neighbor.intensity).abs();
+                contrast = contrast.max(height + self.disc * light.between(neighbor));
             }
         }
         contrast
@@ -125,7 +140,7 @@ impl Cut {
             self.bright = self.bright.max(place.intensity);
         }
         self.samples += 4;
-        self.cells.push(Cell::new(center, level, middle, quarters, self.bright));
+        self.cells.push(Cell::new(center, level, middle, quarters, [self.bright, self.disc]));
     }
 
     /// The pixel's light.

@@ -1,7 +1,7 @@
 //! What single rays see, and whether two of them see the same piece of the picture.
 
 use crate::picture::rings::Counted;
-use crate::transport::RayResult;
+use crate::transport::{Passes, RayResult};
 use kerrlight_geodesic::Outcome;
 
 /// What a ray, or several along photon rings, adds to its cell.
@@ -16,6 +16,8 @@ pub(super) struct Light {
     pub(super) unresolved: u32,
     /// Estimated error of the intensity where it is a mean over rays along photon rings.
     pub(super) mean: Option<f64>,
+    /// Where the ray passes the disc.
+    pub(super) passes: Passes,
 }
 
 /// What rays of one smooth piece of the picture have in common.
@@ -27,6 +29,8 @@ pub(super) struct Kind {
     pub(super) disc_images: u32,
     /// Whether there is emission.
     pub(super) lit: bool,
+    /// On which sides the ray passes the disc.
+    pub(super) sides: u8,
 }
 
 impl Light {
@@ -49,11 +53,20 @@ impl Light {
             intensity: seen.intensity,
             rgb: seen.rgb,
             stokes: seen.stokes,
-            kind: Kind { band, disc_images, lit },
+            kind: Kind { band, disc_images, lit, sides: seen.passes.sides() },
             rays: 1,
             unresolved: u32::from(seen.outcome.is_unresolved()),
             mean: None,
+            passes: seen.passes,
         }
+    }
+
+    /// The share of the way to another ray on which images of the disc lie that neither of them meets.
+    pub(super) fn between(&self, other: &Light) -> f64 {
+        if self.kind.sides == other.kind.sides || self.mean.is_some() || other.mean.is_some() {
+            return 0.0;
+        }
+        self.passes.between(&other.passes)
     }
 
     /// What a ray sees, or the mean around it.
@@ -66,11 +79,4 @@ impl Light {
             ..ray
         }
     }
-}
-
-/// Largest less least.
-pub(super) fn range(values: impl Iterator<Item = f64>) -> f64 {
-    let (low, high) =
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-    high - low
 }

@@ -17,14 +17,14 @@ mod tolerance;
 pub(super) use tolerance::tolerance;
 
 use super::grid::{Grid, Square};
-use super::pixels::Pixel;
-use super::rings::{Counted, Resolver};
+use super::pixels::{Pixel, half_covered};
+use super::rings::{Counted, Resolver, range};
 use super::workspace::Workspace;
 use crate::Error;
 use crate::transport::{PreparedScene, RayResult};
 use cell::Cell;
 use cut::Cut;
-use light::{Light, range};
+use light::Light;
 use std::ops::Range;
 
 /// Cells are cut at most this often: the smallest are 1/128 of a pixel wide.
@@ -172,17 +172,24 @@ impl Adaptive<'_> {
                     };
                     &light[place(to(column, dx, &wide), to(row, dy, &high))]
                 };
-                let Estimate { error, contrast, bright } = estimate(neighbor);
+                let around =
+                    core::array::from_fn(|k| *neighbor(k as isize % 3 - 1, k as isize / 3 - 1));
+                let Estimate { mut error, contrast, bright, at_disc, between } = estimate(&around);
+                let disc = if at_disc {
+                    self.prepared.brightest_disc(grid.inside(column, row, [0.0; 2]))
+                } else {
+                    0.0
+                };
+                let missed = between * disc;
+                error += 2.0 * missed;
                 let ring = || {
                     let square = grid.square(column, row, [0.0; 2], 1.0);
                     rings.is_some_and(|rings| rings.count(square) > 0)
                 };
                 if contrast.is_some() || error > tolerance || ring() {
-                    let around =
-                        core::array::from_fn(|k| *neighbor(k as isize % 3 - 1, k as isize / 3 - 1));
-                    cuts.push(Cut::whole(pixels.len(), [column, row], bright, around));
+                    cuts.push(Cut::whole(pixels.len(), [column, row], [bright, disc], around));
                 }
-                pixels.push(of_one_ray(center, error));
+                pixels.push(Pixel { missed, ..of_one_ray(center, error) });
             }
         }
         Ok((pixels, cuts))
@@ -203,11 +210,16 @@ struct Estimate {
     contrast: Option<f64>,
     /// Largest intensity.
     bright: f64,
+    /// Whether an edge of the disc runs through.
+    at_disc: bool,
+    /// The share of the pixel that images of the disc cover which lie between the rays.
+    between: f64,
 }
 
 /// Twice the midpoint rule's (D_xx + D_yy)/24 where all is smooth, a quarter of the range where
 /// it is not, and what may hide between lensing bands.
-fn estimate<'a>(at: impl Fn(isize, isize) -> &'a Light) -> Estimate {
+fn estimate(lights: &[Light; 9]) -> Estimate {
+    let at = |dx: isize, dy: isize| &lights[(4 + dx + 3 * dy) as usize];
     let value = |dx, dy| at(dx, dy).intensity;
     let middle = at(0, 0);
     let second = |a: f64, b: f64| (a - 2.0 * middle.intensity + b).abs();
@@ -223,7 +235,10 @@ fn estimate<'a>(at: impl Fn(isize, isize) -> &'a Light) -> Estimate {
     if around().any(|(dx, dy)| at(dx, dy).other_band(middle)) {
         error = error.max(HIDDEN * bright);
     }
-    Estimate { error, contrast, bright }
+    let of_disc = |light: &Light| (light.kind.disc_images, light.kind.sides);
+    let at_disc = lights.iter().any(|light| of_disc(light) != of_disc(middle));
+    let between = [(-1, 0), (1, 0), (0, -1), (0, 1)].map(|(dx, dy)| at(dx, dy).between(middle));
+    Estimate { error, contrast, bright, at_disc, between: half_covered(between) }
 }
 
 /// A pixel that one ray stands for.
@@ -236,6 +251,7 @@ fn of_one_ray(center: RayResult, error: f64) -> Pixel {
         unresolved: u32::from(center.outcome.is_unresolved()),
         rays: 1,
         error,
+        missed: 0.0,
         known: 1.0,
     }
 }

@@ -40,7 +40,7 @@ pub(in crate::picture) fn tolerance(
         for cut in cuts {
             errors[cut.pixel] = (pixels[cut.pixel].error, k);
         }
-        let sum: f64 = pixels.iter().map(|pixel| pixel.intensity * k * k).sum();
+        let sum: f64 = pixels.iter().map(|pixel| (pixel.intensity + pixel.missed) * k * k).sum();
         Ok((errors, sum))
     });
     let lines = lines.collect::<Result<Vec<_>, Error>>()?;

@@ -11,7 +11,7 @@
 mod resolve;
 mod square;
 
-pub(super) use resolve::{Counted, Resolver};
+pub(super) use resolve::{Counted, Resolver, range};
 
 use crate::transport::View;
 use core::f64::consts::TAU;
@@ -38,6 +38,8 @@ pub struct RingStrata {
     /// Distance of the critical curve from the origin of an observer's screen, at equal steps of the angle.
     curve: Vec<f64>,
     spacing: f64,
+    /// How many times as far apart as `spacing` says rays are, so that they are as few as the picture is small.
+    coarseness: f64,
     /// Whether only squares that the critical curve runs through have strata.
     only_on_curve: bool,
 }
@@ -55,6 +57,33 @@ const SLACK: f64 = 0.05;
 /// A square is quartered at most this often where W is no plane on it.
 const DEEPEST: u32 = 6;
 
+/// A part of a square.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    center: (f64, f64),
+    size: f64,
+    /// Of the area of the square.
+    share: f64,
+    /// How often the square was quartered to get it.
+    level: u32,
+}
+
+impl Part {
+    fn quarters(self) -> [Part; 4] {
+        let Part { center: (x, y), size, share, level } = self;
+        let step = 0.25 * size;
+        [(-step, -step), (step, -step), (-step, step), (step, step)].map(|(dx, dy)| Part {
+            center: (x + dx, y + dy),
+            size: 0.5 * size,
+            share: 0.25 * share,
+            level: level + 1,
+        })
+    }
+}
+
+/// Takes a part of a square, with a plane and its strata.
+type Take<'a> = dyn FnMut(&Part, Option<(&Plane, &[([f64; 2], f64)])>) + 'a;
+
 impl RingStrata {
     /// For a view of a hole. `spacing` is that of rays in the logarithm of their distance from the critical
     /// curve: that of the finest feature of what shines, about its size by its radius.
@@ -66,7 +95,14 @@ impl RingStrata {
             }
             View::Camera(_) => Vec::new(),
         };
-        RingStrata { hole: *hole, view: *view, curve, spacing, only_on_curve: false }
+        RingStrata {
+            hole: *hole,
+            view: *view,
+            curve,
+            spacing,
+            coarseness: 1.0,
+            only_on_curve: false,
+        }
     }
 
     /// The same for squares that are cut where their light says so: only those that the critical curve runs
@@ -75,14 +111,43 @@ impl RingStrata {
         RingStrata { only_on_curve: true, ..self }
     }
 
+    /// The same with strata that are `coarseness` times as wide, and squares that are quartered where W is that much
+    /// farther from a plane.
+    pub fn coarsened(&self, coarseness: f64) -> Self {
+        RingStrata { coarseness, ..self.clone() }
+    }
+
+    pub(super) fn coarseness(&self) -> f64 {
+        self.coarseness
+    }
+
+    /// How many rays [`place`](Self::place) adds for a square.
+    pub fn count(&self, center: (f64, f64), size: f64) -> usize {
+        if self.is_far(center, size) {
+            return 0;
+        }
+        let mut count = 0;
+        let whole = Part { center, size, share: 1.0, level: 0 };
+        self.cut(whole, &mut |_, strata| count += strata.map_or(1, |(_, strata)| strata.len()));
+        if count > 1 { count } else { 0 }
+    }
+
     /// Adds the rays of the square of width `size` about (x, y), ordered along W; none where a
     /// single ray at its centre will do.
-    pub fn place(&self, (x, y): (f64, f64), size: f64, rays: &mut Vec<Stratum>) {
-        if self.is_far(x, y, size) {
+    pub fn place(&self, center: (f64, f64), size: f64, rays: &mut Vec<Stratum>) {
+        if self.is_far(center, size) {
             return;
         }
         let first = rays.len();
-        self.cut((x, y), size, (1.0, 0), rays);
+        let whole = Part { center, size, share: 1.0, level: 0 };
+        self.cut(whole, &mut |part, strata| {
+            let Part { center: (x, y), size, share, .. } = *part;
+            let Some((plane, strata)) = strata else { return rays.push(Stratum { x, y, share }) };
+            for (place, within) in strata {
+                let [dx, dy] = self.onto(plane, *place, (x, y), size);
+                rays.push(Stratum { x: x + dx * size, y: y + dy * size, share: share * within });
+            }
+        });
         if rays.len() == first + 1 {
             rays.truncate(first);
         }
@@ -90,54 +155,39 @@ impl RingStrata {
 
     /// Whether a square has one stratum, without W: images are as wide as their distance from the curve
     /// times the spacing.
-    fn is_far(&self, x: f64, y: f64, size: f64) -> bool {
+    fn is_far(&self, (x, y): (f64, f64), size: f64) -> bool {
         if self.curve.is_empty() {
             return false;
         }
         let turn = (y.atan2(x) / TAU).rem_euclid(1.0) * f64::from(POINTS);
         let near = self.curve.get(turn as usize % self.curve.len()).copied().unwrap_or(0.0);
-        (x.hypot(y) - near).abs() > 2.0 * size * (1.0 + 1.0 / self.spacing) + SLACK
+        (x.hypot(y) - near).abs() > 2.0 * size * (1.0 + 1.0 / self.width()) + SLACK
     }
 
-    fn cut(
-        &self,
-        (x, y): (f64, f64),
-        size: f64,
-        (share, level): (f64, u32),
-        rays: &mut Vec<Stratum>,
-    ) {
+    /// Width of a stratum in the logarithm of the distance from the critical curve.
+    fn width(&self) -> f64 {
+        self.spacing * self.coarseness
+    }
+
+    /// Tells `take` the parts of a square on each of which W is a plane, and this plane with its strata; none of a part
+    /// that one ray at its centre stands for.
+    fn cut(&self, part: Part, take: &mut Take<'_>) {
+        let Part { center: (x, y), size, level, .. } = part;
         let half = 0.5 * size;
         let at = |dx: f64, dy: f64| self.height(x + dx * half, y + dy * half);
         let corners = [at(-1.0, -1.0), at(1.0, -1.0), at(-1.0, 1.0), at(1.0, 1.0)];
         let plane = Plane::through(at(0.0, 0.0), corners);
-        if !plane.is_finite() {
-            return rays.push(Stratum { x, y, share });
+        if !plane.is_finite() || self.only_on_curve && !plane.is_near(corners) {
+            return take(&part, None);
         }
-        if self.only_on_curve && !plane.is_near(corners) {
-            return rays.push(Stratum { x, y, share });
-        }
-        if level < DEEPEST && plane.is_bent() && plane.is_near(corners) {
-            return self.quarter((x, y), size, (share, level), rays);
+        let deepest = DEEPEST.saturating_sub(self.coarseness.log2() as u32);
+        if level < deepest && plane.is_bent(self.coarseness) && plane.is_near(corners) {
+            return part.quarters().into_iter().for_each(|quarter| self.cut(quarter, take));
         }
         // Of the whole square: rays of its quarters follow the same grading.
-        let core = CORE * plane.reach() * f64::from(1 << level);
-        for (place, part) in plane.strata(core, self.spacing) {
-            let [dx, dy] = self.onto(&plane, place, (x, y), size);
-            rays.push(Stratum { x: x + dx * size, y: y + dy * size, share: share * part });
-        }
-    }
-
-    fn quarter(
-        &self,
-        (x, y): (f64, f64),
-        size: f64,
-        (share, level): (f64, u32),
-        rays: &mut Vec<Stratum>,
-    ) {
-        let step = 0.25 * size;
-        for (dx, dy) in [(-step, -step), (step, -step), (-step, step), (step, step)] {
-            self.cut((x + dx, y + dy), 0.5 * size, (0.25 * share, level + 1), rays);
-        }
+        // Few strata are better spread evenly.
+        let core = (CORE * self.coarseness).min(0.5) * plane.reach() * f64::from(1 << level);
+        take(&part, Some((&plane, &plane.strata(core, self.width()))));
     }
 
     /// A place of the plane moved to where W is what the plane says, inside the square.

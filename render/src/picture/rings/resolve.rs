@@ -2,10 +2,11 @@
 
 use super::{RingStrata, Stratum};
 use crate::Error;
-use crate::picture::grid::Square;
+use crate::picture::grid::{Grid, Square};
 use crate::picture::workspace::Workspace;
 use crate::transport::{Layers, Mixed, PreparedScene, RayResult};
 use kerrlight_geodesic::Outcome;
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Resolves the photon rings of a prepared scene.
@@ -15,6 +16,21 @@ pub struct Resolver {
     /// Whether a disc may hide them.
     hides: bool,
 }
+
+/// The error of a picture (relative, L1) for which strata are as narrow as where pixels are not refined.
+const FINE_ERROR: f64 = 1e-3;
+
+/// Rows from which the rays of rings are estimated where they are likely to be few.
+const SAMPLED: usize = 32;
+
+/// By how much such an estimate may be too small.
+const SURE: f64 = 1.5;
+
+/// Strata are widened in so many steps to twice their width.
+const STEPS_AN_OCTAVE: f64 = 4.0;
+
+/// Most of these steps: then no square has more than one stratum.
+const STEPS: u32 = 40;
 
 /// Rays that a square got besides the one at its centre, at one time.
 #[derive(Debug, Clone, Copy, Default)]
@@ -32,20 +48,58 @@ struct Job {
 }
 
 impl Resolver {
-    /// Of a prepared scene, if what it shows has photon rings. Where pixels are refined the thin images beside the critical
-    /// curve are found by their light.
-    pub fn new(prepared: &PreparedScene, refined: bool) -> Option<Self> {
+    /// Of a prepared scene that is seen on a grid, if what it shows has photon rings. They take no more rays than the grid:
+    /// in a picture of few pixels strata are wider. Where pixels are refined until the picture is off by `image_error`, the
+    /// thin images beside the critical curve are found by their light, and strata are as wide as this error allows.
+    pub fn new(prepared: &PreparedScene, grid: &Grid, image_error: Option<f64>) -> Option<Self> {
         let spacing = prepared.ring_spacing()?;
         let strata = RingStrata::new(prepared.hole(), prepared.view(), spacing);
-        let strata = if refined { strata.on_curve() } else { strata };
-        Some(Resolver { strata, hides: prepared.has_opaque_disc() })
+        let (strata, finest) = match image_error {
+            Some(error) => (strata.on_curve(), (error / FINE_ERROR).max(1.0)),
+            None => (strata, 1.0),
+        };
+        let hides = prepared.has_opaque_disc();
+        Some(Resolver { strata: strata.coarsened(finest), hides }.within(grid))
+    }
+
+    /// The same with strata as much wider as it takes for their rays to be no more than those of a grid.
+    fn within(self, grid: &Grid) -> Self {
+        let most = (grid.width * grid.height * grid.side * grid.side) as u64;
+        let few = self.rays(grid, grid.height.div_ceil(SAMPLED));
+        if few as f64 * SURE < most as f64 || self.rays(grid, 1) <= most {
+            return self;
+        }
+        let (mut fine, mut coarse) = (0, STEPS);
+        let coarser = |step: u32| {
+            let coarseness = self.strata.coarseness() * (f64::from(step) / STEPS_AN_OCTAVE).exp2();
+            Resolver { strata: self.strata.coarsened(coarseness), hides: self.hides }
+        };
+        while coarse - fine > 1 {
+            let middle = (fine + coarse) / 2;
+            if coarser(middle).rays(grid, 1) <= most { coarse = middle } else { fine = middle }
+        }
+        coarser(coarse)
     }
 
     /// How many rays a square gets, hidden or not, besides that at its centre.
     pub fn count(&self, square: Square) -> usize {
-        let mut rays = Vec::new();
-        self.strata.place(square.center, square.size, &mut rays);
-        rays.len()
+        self.strata.count(square.center, square.size)
+    }
+
+    /// How many the squares of a grid get, from those in one row of pixels out of `every`.
+    pub fn rays(&self, grid: &Grid, every: usize) -> u64 {
+        let Grid { width, height, side, size } = *grid;
+        let of_row = |row: usize| {
+            let places = (0..width * side * side).map(|k| (k / (side * side), k % (side * side)));
+            let square = |(column, k): (usize, usize)| {
+                let center = grid.screen(column, row, k % side, k / side);
+                self.count(Square { center, size: size / side as f64 }) as u64
+            };
+            places.map(square).sum::<u64>()
+        };
+        let rows: Vec<usize> = (0..height).step_by(every).collect();
+        let found: u64 = rows.par_iter().map(|row| of_row(*row)).sum();
+        found * height as u64 / rows.len() as u64
     }
 
     /// Replaces the light in `seen`, of rays at the centres of `squares` at each time (square k at time j has the number
@@ -85,7 +139,14 @@ impl Resolver {
                     let (strata, own) = (&rays[job.rays.clone()], first..first + job.rays.len());
                     first = own.end;
                     let place = j * squares.len() + job.square;
-                    counted[place] = mean(strata, &work.seen[own.clone()], &mut seen[place]);
+                    let found = &work.seen[own.clone()];
+                    counted[place] = mean(strata, found, &mut seen[place]);
+                    let between = between(strata, found);
+                    counted[place].error = self.error(strata, found);
+                    if between > 0.0 {
+                        let light = prepared.brightest_disc(squares[job.square].center);
+                        counted[place].error += 2.0 * between * light;
+                    }
                     if let Some(layers) = layers.get_mut(place) {
                         layers.mixed = mixed(strata, &work.layers[own]);
                     }
@@ -93,6 +154,24 @@ impl Resolver {
             }
         }
         Ok(counted)
+    }
+
+    /// Of the mean: an edge between two strata is anywhere between their rays, so that a quarter of its height
+    /// is the usual error of their common share; errors of edges are independent. Images that are narrower than strata
+    /// which were widened may lie within them, as bright as what is next to them.
+    fn error(&self, rays: &[Stratum], found: &[RayResult]) -> f64 {
+        let pairs = rays.windows(2).zip(found.windows(2));
+        let square = |(rays, found): (&[Stratum], &[RayResult])| match (rays, found) {
+            ([a, b], [one, other]) => {
+                (0.125 * (a.share + b.share) * (one.intensity - other.intensity)).powi(2)
+            }
+            _ => 0.0,
+        };
+        let edges = pairs.map(square).sum::<f64>();
+        let within = 0.25 * (1.0 - 1.0 / self.strata.coarseness());
+        let contrast = within * range(found.iter().map(|ray| ray.intensity));
+        let hidden = rays.iter().map(|ray| (contrast * ray.share).powi(2)).sum::<f64>();
+        (edges + hidden).sqrt()
     }
 
     /// Drops squares whose centre and corners all end on the direct image of an opaque disc.
@@ -155,7 +234,6 @@ fn mean(rays: &[Stratum], found: &[RayResult], seen: &mut RayResult) -> Counted 
         }
         counted.unresolved += u32::from(light.outcome.is_unresolved());
     }
-    counted.error = error(rays, found);
     counted
 }
 
@@ -168,15 +246,19 @@ fn mixed(rays: &[Stratum], found: &[Layers]) -> Mixed {
     mixed
 }
 
-/// Of the mean: an edge between two strata is anywhere between their rays, so that a quarter of its height
-/// is the usual error of their common share; errors of edges are independent.
-fn error(rays: &[Stratum], found: &[RayResult]) -> f64 {
+/// The share of a square that images of the disc cover between its rays.
+fn between(rays: &[Stratum], found: &[RayResult]) -> f64 {
     let pairs = rays.windows(2).zip(found.windows(2));
-    let square = |(rays, found): (&[Stratum], &[RayResult])| match (rays, found) {
-        ([a, b], [one, other]) => {
-            (0.125 * (a.share + b.share) * (one.intensity - other.intensity)).powi(2)
-        }
+    let share = |(rays, found): (&[Stratum], &[RayResult])| match (rays, found) {
+        ([a, b], [one, other]) => 0.5 * (a.share + b.share) * one.passes.between(&other.passes),
         _ => 0.0,
     };
-    pairs.map(square).sum::<f64>().sqrt()
+    pairs.map(share).sum()
+}
+
+/// Largest less least.
+pub(in crate::picture) fn range(values: impl Iterator<Item = f64>) -> f64 {
+    let (low, high) =
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    high - low
 }

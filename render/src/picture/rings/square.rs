@@ -33,9 +33,9 @@ impl Plane {
         0.5 * (self.slope[0].abs() + self.slope[1].abs())
     }
 
-    /// Whether the function is no plane.
-    pub fn is_bent(&self) -> bool {
-        self.bend > 0.1 * self.reach()
+    /// Whether the function is no plane, even if it may be `slack` times as far from one as usual.
+    pub fn is_bent(&self, slack: f64) -> bool {
+        self.bend > 0.1 * slack * self.reach()
     }
 
     /// Whether the function may vanish on the square.

@@ -5,8 +5,8 @@ use crate::scene::Scene;
 use crate::transport::layers::Origin;
 use crate::transport::optics::Optics;
 use crate::transport::polarized::{PolarizedRay, share};
-use crate::transport::result::{Accumulator, Place};
-use kerrlight_geodesic::{Kerr, PlaneCrossing, TracedRay, orbits};
+use crate::transport::result::{Accumulator, PASSES, Place};
+use kerrlight_geodesic::{Kerr, Outcome, PlaneCrossing, TracedRay, orbits};
 
 /// Crossings of a ray that are located in closed form; rays with more are traced step by step.
 const CROSSINGS: usize = 4;
@@ -15,7 +15,13 @@ const CROSSINGS: usize = 4;
 #[derive(Debug, Clone)]
 pub(in crate::transport) struct Disc {
     model: DiscModel,
+    /// 1/r of its outer edge and of its inner one, and of the horizon.
+    edges: [f64; 2],
+    horizon: f64,
 }
+
+/// Radii at which the brightest light of a disc is looked for.
+const RADII: u32 = 8;
 
 /// How the light of the disc reaches the observer along one ray.
 #[derive(Debug, Clone, Copy)]
@@ -32,7 +38,10 @@ pub(in crate::transport) struct DiscRay<'a> {
 impl Disc {
     /// The disc of a scene, if it has one.
     pub fn new(scene: &Scene, hole: &Kerr) -> Option<Self> {
-        scene.disc.as_ref().map(|disc| Disc { model: DiscModel::new(disc, hole) })
+        let model = DiscModel::new(scene.disc.as_ref()?, hole);
+        let [inner, outer] = model.edges();
+        let edges = [1.0 / outer, 1.0 / inner];
+        Some(Disc { model, edges, horizon: 1.0 / hole.horizon() })
     }
 
     /// How many crossings of a ray are to be located.
@@ -64,13 +73,49 @@ impl Disc {
         self.model.opaque && self.model.covers(crossing.radius)
     }
 
+    /// Its brightest light along rays with these constants of motion, wherever they meet it.
+    pub fn brightest(&self, optics: &Optics, [lambda, eta]: [f64; 2]) -> f64 {
+        let [inner, outer] = self.model.edges();
+        let light = |k: u32| {
+            let r = inner + (outer - inner) * f64::from(k) / f64::from(RADII);
+            let boost = optics.spectral_index.map_or(1.0, |index| {
+                self.model.redshift(r, &Photon { lambda, eta, outward: true }).powf(3.0 + index)
+            });
+            boost * self.model.intensity(r)
+        };
+        (0..=RADII).map(light).fold(0.0, f64::max)
+    }
+
+    /// Where a crossing at 1/r passes it: see [`Passes`](crate::transport::result::Passes).
+    #[inline]
+    fn place(&self, inverse_radius: f64) -> f32 {
+        let [outer, inner] = self.edges;
+        ((inverse_radius - outer) / (inner - outer)) as f32
+    }
+
+    /// Where crossings would be that a ray does not get to.
+    #[inline]
+    fn end(&self, ray: &TracedRay) -> f32 {
+        match ray.outcome {
+            _ if ray.surface.is_some() || ray.until < ray.mino_total => 0.0,
+            Outcome::Escaped => self.place(0.0),
+            Outcome::Captured => self.place(self.horizon),
+            _ => 0.0,
+        }
+    }
+
     /// Adds its light: I = g^{3+α} I_em at every crossing up to the ray's last light.
     #[inline(always)]
     pub fn add(&self, optics: &Optics, seen: &DiscRay<'_>, light: &mut Accumulator) {
         let end = seen.ray.last_time();
+        let known = seen.crossings.len().min(PASSES);
+        light.passes[known..].fill(self.end(seen.ray));
         for (number, crossing) in seen.crossings.iter().enumerate() {
             if crossing.mino_time > end {
                 break;
+            }
+            if let Some(place) = light.passes.get_mut(number) {
+                *place = self.place(1.0 / crossing.radius);
             }
             if self.model.covers(crossing.radius) {
                 let kind = if self.model.plunges_at(crossing.radius) { 16 } else { 0 };
