@@ -122,10 +122,6 @@ impl Fit {
             eprint!("{text}\n{}", guess.sentences(&text));
         }
         let work = Work::read(&text).with_context(|| self.name())?;
-        let folder = match &self.output {
-            Some(path) => path.clone(),
-            None => free_name(),
-        };
         if self.samples.is_some() {
             work.check_draws()?;
         }
@@ -133,6 +129,10 @@ impl Fit {
         let prepared = prepared?;
         prepared.check_device(device.as_ref())?;
         let text = Self::begun(&text, &base_dir);
+        let folder = match &self.output {
+            Some(path) => path.clone(),
+            None => Folder::unnamed()?,
+        };
         let folder = Folder::create(&folder, &text, Inputs::new(&text, read))?;
         self.run_all(&prepared, &text, (&folder, false), device)
     }
@@ -243,13 +243,4 @@ fn parse(text: &str) -> anyhow::Result<FitFile> {
         Error::Fit(FitError::Syntax(error)) => init::explained(&error),
         other => other.into(),
     })
-}
-
-/// A folder that does not exist yet.
-fn free_name() -> PathBuf {
-    let name = |k: u32| match k {
-        1 => PathBuf::from("kerrlight-fit"),
-        k => PathBuf::from(format!("kerrlight-fit-{k}")),
-    };
-    (1..).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(1))
 }
