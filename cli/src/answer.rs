@@ -2,6 +2,7 @@
 
 use crate::columns::{self, Column};
 use crate::output::{self, Output};
+use crate::plain;
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -121,7 +122,7 @@ impl Answer {
         let failure = self.failure.take();
         match form {
             Form::Json => output::print(&format!("{:#}\n", self.into_json()))?,
-            Form::Text => output::print(&self.into_text()?)?,
+            Form::Text => output::print(&plain::lines(&self.into_text()?))?,
             Form::Aside => eprint!("{}", self.into_text()?),
         }
         failure.map_or(Ok(()), Err)

@@ -20,20 +20,21 @@
 //! From then on `representation.kind = "small"` with `representation.own.width = 32` works in every fit and every
 //! comparison of that program.
 
-/// As the standard library's, but a message that cannot be written, as into a file on a full disk, is no panic.
-macro_rules! eprintln {
-    ($($words:tt)*) => {{
-        use std::io::Write as _;
-        let _ = std::writeln!(std::io::stderr(), $($words)*);
-    }};
-}
-
-/// The same without an end of the line.
+/// As the standard library's, but a message that cannot be written, as into a file on a full disk, is no panic, and
+/// control characters of foreign names are escaped.
 macro_rules! eprint {
     ($($words:tt)*) => {{
         use std::io::Write as _;
-        let _ = std::write!(std::io::stderr(), $($words)*);
+        let words = std::format!($($words)*);
+        let _ = std::io::stderr().write_all($crate::plain::lines(&words).as_bytes());
     }};
+}
+
+/// The same with an end of the line.
+macro_rules! eprintln {
+    ($($words:tt)*) => {
+        eprint!("{}\n", std::format_args!($($words)*))
+    };
 }
 
 mod accuracy;
@@ -63,6 +64,7 @@ mod overlay;
 mod parquet_table;
 mod paths;
 pub mod pictures;
+mod plain;
 mod program;
 mod progress;
 mod record;

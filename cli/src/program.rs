@@ -1,6 +1,6 @@
 //! The program with what others add to it.
 
-use super::{Arguments, compare, fit, help, interrupt, output, run};
+use super::{Arguments, compare, fit, help, interrupt, output, plain, run};
 use anyhow::Context;
 use clap::FromArgMatches;
 use kerrlight_tomo::representation::{BuildRepresentation, FindRepresentation, Registry};
@@ -68,6 +68,11 @@ impl Program {
     /// The same for a command line of the caller's, whose first word is the program's name; returns the exit code.
     /// Help, and what is wrong with the words themselves, end the process.
     pub fn run_with(self, words: impl IntoIterator<Item = OsString>) -> u8 {
+        let words: Vec<OsString> = words.into_iter().collect();
+        if let Err(error) = plain::check_words(&words) {
+            eprintln!("error: {error:#}");
+            return 2;
+        }
         let matches = help::command().try_get_matches_from(words);
         let arguments = matches.and_then(|matches| Arguments::from_arg_matches(&matches));
         let arguments = arguments.unwrap_or_else(|error| output::exit(&error));

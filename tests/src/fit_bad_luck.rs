@@ -321,3 +321,22 @@ fn exact_fits_that_begin_at_once_have_a_folder_each() {
         assert!(folder.path().join(name).join("report.html").is_file(), "{name}");
     }
 }
+
+/// A title with a control character is no end of a comment, and nothing that a terminal obeys.
+#[test]
+fn regress_titles_stand_in_a_line() {
+    let (small, folder) = (small(), tempfile::tempdir().unwrap());
+    let words = ["-o", "run", "--set", "training.steps=1", "--set", "title=a\u{1b}[31m\nb"];
+    let output = kerrlight(folder.path(), &with(&small, &words));
+    assert_eq!(output.status.code(), Some(0), "{}", message(&output));
+    assert!(message(&output).contains("a\\u{1b}[31m\\nb: image"), "{}", message(&output));
+    let run = folder.path().join("run");
+    let scene = std::fs::read_to_string(run.join("scene.toml")).unwrap();
+    assert!(scene.lines().next().unwrap().ends_with("a\\u{1b}[31m\\nb"), "{scene}");
+    for name in ["scene.toml", "fit.toml", "report.html"] {
+        assert!(!std::fs::read_to_string(run.join(name)).unwrap().contains('\u{1b}'), "{name}");
+    }
+    let refused = fail(folder.path(), &with(&small, &["-o", "new\nline"]));
+    assert!(refused.contains("`new\\nline` holds a control character (U+000A)"), "{refused}");
+    assert_eq!(files(folder.path()), ["run"]);
+}

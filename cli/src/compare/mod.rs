@@ -22,6 +22,7 @@ mod verdicts;
 use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::lock::Lock;
+use crate::plain;
 use crate::program::Program;
 use crate::progress;
 use crate::record::Recorder;
@@ -304,7 +305,7 @@ fn run<'a>(cases: &'a [Case], runner: &Runner<'_>) -> Summary<'a> {
         if keeper.stopped() {
             break;
         }
-        bar.set_message(case.name());
+        bar.set_message(plain::line(&case.name()).into_owned());
         bar.tick();
         *status = runner.run(case, &keeper);
         if let Status::Failed(why) = status {

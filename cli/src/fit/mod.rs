@@ -31,7 +31,7 @@ mod world_search;
 use crate::answer::Answer;
 use crate::devices::{FitDevice, StepsOption};
 use crate::record::Recorder;
-use crate::{interrupt, output, paths};
+use crate::{interrupt, output, paths, plain};
 use anyhow::{Context, bail};
 pub use api::{assigned, check, coverage, sizes, turned, velocities};
 pub use band_plots::{loop_plot, of_runs as plots_of_bands};
@@ -197,6 +197,8 @@ impl Fit {
                 (text, folder)
             }
         };
+        // It stands in a line of the run's settings.
+        plain::check_name(&base_dir.to_string_lossy())?;
         // The built-in experiment has no folder of its own.
         let folder = self.file.is_some().then_some(base_dir.as_path());
         for assignment in &self.set {

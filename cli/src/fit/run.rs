@@ -20,6 +20,7 @@ pub use super::world_search::Placed;
 use crate::answer::Answer;
 use crate::devices::{CheckSteps, FitDevice};
 use crate::interrupt::{Interrupted, Keeper};
+use crate::plain;
 use crate::progress;
 use anyhow::{Context, bail};
 use kerrlight_tomo::Error;
@@ -251,7 +252,7 @@ impl Run<'_> {
         };
         format!(
             "{}: {names}; {} frames{dark} of {} rays, {} nodes; {} with {} parameters",
-            self.file.title,
+            plain::line(&self.file.title),
             model.frames(),
             model.rays(),
             instrument.lines.points(),

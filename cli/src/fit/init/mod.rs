@@ -14,6 +14,7 @@ use crate::answer::Answer;
 use crate::interferometry::image_files::OwnTimes;
 use crate::interferometry::movie_files;
 use crate::output::Output;
+use crate::plain;
 use annotate::annotate;
 use anyhow::{Context, bail};
 pub use guess::{Guess, guess};
@@ -154,6 +155,7 @@ fn seen_from(toml: &Path, data: &Path) -> anyhow::Result<String> {
         false => std::path::absolute(data).with_context(|| data.display().to_string())?,
     };
     let text = path.to_str().with_context(|| format!("{} is not UTF-8", path.display()))?;
+    plain::check_name(text)?;
     Ok(text.to_owned())
 }
 
@@ -186,6 +188,12 @@ fn known(observation: &Observation) -> Option<&'static Source> {
     })
 }
 
+/// The source's name in a line of text.
+fn called(observation: &Observation, source: Option<&Source>) -> String {
+    let name = source.map_or(observation.source.trim(), |source| source.name);
+    plain::line(if name.is_empty() { "unnamed source" } else { name }).into_owned()
+}
+
 /// Of visibilities: a static image, if that is wanted, the source is known to stand still for a night, or what it varies is
 /// no more than is known of it.
 fn of_observation(
@@ -196,8 +204,7 @@ fn of_observation(
     let path = toml::Value::String(seen_from(toml, data)?).to_string();
     let file = data.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let source = known(observation);
-    let name = source.map_or(observation.source.trim(), |source| source.name);
-    let name = if name.is_empty() { "unnamed source" } else { name };
+    let name = &called(observation, source);
     let image = || static_image::of_visibilities(observation, source, name, (&path, file));
     let volume = || of_visibilities(observation, &path, file);
     match (model, source) {
@@ -219,8 +226,7 @@ fn of_observation(
 fn of_visibilities(observation: &Observation, path: &str, file: &str) -> anyhow::Result<String> {
     let flux = short_baselines(observation)?;
     let source = known(observation);
-    let name = source.map_or(observation.source.trim(), |source| source.name);
-    let name = if name.is_empty() { "unnamed source" } else { name };
+    let name = &called(observation, source);
     let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
     let (mass, inclination, field) = match source {
         Some(of) => (
