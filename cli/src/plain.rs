@@ -22,6 +22,19 @@ pub fn path(path: &Path) -> String {
     line(&path.to_string_lossy()).into_owned()
 }
 
+/// An error with its reasons, each told once: many errors name their reason themselves.
+pub fn reasons(error: &anyhow::Error) -> String {
+    let mut told = String::new();
+    for reason in error.chain().map(ToString::to_string) {
+        if told.is_empty() {
+            told = reason;
+        } else if !told.ends_with(&reason) {
+            told = format!("{told}: {reason}");
+        }
+    }
+    told
+}
+
 fn escaped(text: &str, stays: impl Fn(usize, char) -> bool) -> Cow<'_, str> {
     let is_plain = |(k, letter): (usize, char)| !letter.is_control() || stays(k, letter);
     if text.char_indices().all(is_plain) {
@@ -81,6 +94,14 @@ mod tests {
         ] {
             assert_eq!((&*lines(text), &*line(text)), (in_lines, in_line));
         }
+    }
+
+    #[test]
+    fn exact_reasons_are_told_once() {
+        let error = anyhow::anyhow!("no such key").context("bad header: no such key");
+        assert_eq!(reasons(&error.context("a.fits")), "a.fits: bad header: no such key");
+        let error = anyhow::anyhow!("line 3").context("a.toml");
+        assert_eq!(reasons(&error), "a.toml: line 3");
     }
 
     #[test]

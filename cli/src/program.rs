@@ -70,7 +70,7 @@ impl Program {
     pub fn run_with(self, words: impl IntoIterator<Item = OsString>) -> u8 {
         let words: Vec<OsString> = words.into_iter().collect();
         if let Err(error) = plain::check_words(&words) {
-            eprintln!("error: {error:#}");
+            eprintln!("error: {}", plain::reasons(&error));
             return 2;
         }
         let matches = help::command().try_get_matches_from(words);
@@ -79,11 +79,11 @@ impl Program {
         match interrupt::listen().and_then(|()| run(&arguments, &self)) {
             Ok(()) => 0,
             Err(error) if error.is::<interrupt::Interrupted>() => {
-                eprintln!("{error:#}");
+                eprintln!("{}", plain::reasons(&error));
                 interrupt::code()
             }
             Err(error) => {
-                eprintln!("error: {error:#}");
+                eprintln!("error: {}", plain::reasons(&error));
                 if error.is::<compare::Busy>() {
                     return BUSY;
                 }

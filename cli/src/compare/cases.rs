@@ -88,7 +88,9 @@ impl Case {
     pub fn settings(&self) -> Result<String, String> {
         match &self.error {
             Some(error) => Err(error.clone()),
-            None => self.recipe.text(&self.chosen, self.seed).map_err(|e| format!("{e:#}")),
+            None => {
+                self.recipe.text(&self.chosen, self.seed).map_err(|e| crate::plain::reasons(&e))
+            }
         }
     }
 
@@ -242,7 +244,7 @@ fn case(recipe: &Arc<Recipe>, chosen: &[u32], seed: u64) -> Case {
         levels: named,
         numbers: levels.iter().map(|level| level.number).collect(),
         seed,
-        error: settings.err().map(|error| format!("{error:#}")),
+        error: settings.err().map(|error| crate::plain::reasons(&error)),
         slug: words.collect::<Vec<_>>().join("_"),
         recipe: Arc::clone(recipe),
         chosen: chosen.to_vec(),

@@ -43,6 +43,7 @@ pub use inputs::{Inputs, SETTINGS};
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{FitError, FitFile, StaticImageFile};
 use kerrlight_tomo::representation::Registry;
+use kerrlight_tomo::toml_file;
 pub use posterior::Posterior;
 pub use results::LIGHT_CURVE;
 use std::path::{Path, PathBuf};
@@ -122,6 +123,9 @@ impl Fit {
             eprint!("{text}\n{}", guess.sentences(&text));
         }
         let work = Work::read(&text).with_context(|| self.name())?;
+        if let Some(unused) = work.unused(&text) {
+            eprintln!("note: {unused}");
+        }
         if self.samples.is_some() {
             work.check_draws()?;
         }
@@ -176,9 +180,9 @@ impl Fit {
 
     fn name(&self) -> String {
         match (&self.file, &self.data) {
-            (Some(file), _) => file.display().to_string(),
+            (Some(file), _) => plain::path(file),
             // Lines that an error names are those of the settings, not of the data.
-            (None, Some(data)) => format!("settings guessed from {}", data.display()),
+            (None, Some(data)) => format!("settings guessed from {}", plain::path(data)),
             (None, None) => "built-in experiment".to_owned(),
         }
     }
@@ -201,6 +205,10 @@ impl Fit {
         plain::check_name(&base_dir.to_string_lossy())?;
         // The built-in experiment has no folder of its own.
         let folder = self.file.is_some().then_some(base_dir.as_path());
+        if !self.set.is_empty() {
+            // What is wrong with the file is no fault of --set.
+            toml_file::read::<toml::Table>(&text).with_context(|| self.name())?;
+        }
         for assignment in &self.set {
             text = assigned(&text, &paths::from_here(assignment, folder)?)?;
         }

@@ -42,26 +42,34 @@ pub fn explained(error: &ReadError) -> anyhow::Error {
 
 /// What to write for a key that is missing in a table; `loss.0` is one of the tables `loss`.
 fn advice(missing: &str, table: &str) -> String {
-    let one = |(table, text): &(&str, &str)| {
-        (*table == missing).then(|| {
-            format!("\nadd a table [{table}]: {text} `kerrlight fit --init` writes an example")
-        })
+    let place: Vec<&str> = table.split('.').filter(|part| part.parse::<u32>().is_err()).collect();
+    let place = place.join(".");
+    let is_below = |name: &str| {
+        name.strip_prefix(missing).is_some_and(|rest| rest.starts_with('.')) && place.is_empty()
     };
-    let found: Vec<String> = TABLES.iter().filter_map(one).collect();
+    let one = |(name, text): &(&str, &str)| {
+        format!("\nadd a table [{name}]: {text} `kerrlight fit --init` writes an example")
+    };
+    let tables = |is: &dyn Fn(&str) -> bool| -> String {
+        TABLES.iter().filter(|(name, _)| is(name)).map(one).collect()
+    };
+    let found = tables(&|name| name == missing);
+    // Of `axis` there is a table for each of its kinds.
+    let found = if found.is_empty() { tables(&is_below) } else { found };
     let key = |key: &&keys::Key| key.name == missing && key.example.is_empty();
     let of = |key: &keys::Key| match key.table {
         "" => format!("\ngive `{missing} = …`: {}", key.note),
         table => format!("\ngive `{missing} = …` in [{table}]: {}", key.note),
     };
-    let place: Vec<&str> = table.split('.').filter(|part| part.parse::<u32>().is_err()).collect();
-    let place = place.join(".");
     let (here, elsewhere): (Vec<_>, Vec<_>) =
         KEYS.iter().filter(key).partition(|key| key.table == place);
     // A key of another table of that name is another key, unless one of the tables is in the other.
-    let is_near = |key: &&keys::Key| key.table.starts_with(&place) || place.starts_with(key.table);
+    let is_near = |key: &&keys::Key| {
+        !place.is_empty() && (key.table.starts_with(&place) || place.starts_with(key.table))
+    };
     let near = elsewhere.into_iter().filter(is_near).collect();
     let keys = if here.is_empty() { near } else { here };
-    found.into_iter().chain(keys.into_iter().map(of)).collect()
+    found + &keys.into_iter().map(of).collect::<String>()
 }
 
 /// What is fitted to visibilities.
