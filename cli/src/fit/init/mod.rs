@@ -355,6 +355,7 @@ fn of_movie(images: &Images, path: &str) -> anyhow::Result<String> {
     if flux <= 0.0 {
         bail!("all pixels of the images are zero");
     }
+    let jy = flux / (grid.pixels() as f64 * 4.0 * 0.02);
     let span = field_uas
         .map_or(String::new(), |field| format!("; on the sky it is {field:.1} microarcseconds"));
     let hours = match times {
@@ -368,7 +369,8 @@ fn of_movie(images: &Images, path: &str) -> anyhow::Result<String> {
         ("title", "Images".to_owned()),
         ("pixels", grid.width.to_string()),
         ("frames", frames.to_string()),
-        ("jy", digits(flux / (grid.pixels() as f64 * 4.0 * 0.02))),
+        ("jy", digits(jy)),
+        ("upper", digits((peak / jy).max(3.0))),
         ("flux", digits(flux)),
         ("peak", digits(peak)),
         ("span", span),

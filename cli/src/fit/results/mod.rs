@@ -1,5 +1,6 @@
 //! What a run leaves: the volume, the movie, numbers, pictures and the report.
 
+mod bounds;
 mod fields;
 pub mod gains;
 pub mod leakage;
@@ -103,7 +104,11 @@ impl Estimate<'_> {
             state,
             begun,
         };
-        let results = self.results(trainer, &found)?;
+        let mut results = self.results(trainer, &found)?;
+        let bounds = self.bounds(&found.volume, &state.now.parameters, found.quiescent.as_ref());
+        if !bounds.is_empty() {
+            results["bounds"] = bounds.into();
+        }
         self.folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
         self.report(&found, &results)?;
         Ok((numbers::last_line(&found.judged.worth(), &results), results))
