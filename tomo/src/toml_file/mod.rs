@@ -216,7 +216,7 @@ mod tests {
                 "line 3: center.1: invalid type: string \"xxx",
             ),
             (format!("center = [1, {}, 2]", "1".repeat(300)), "line 3: center.1: 111"),
-            (format!("a = [{} = ]", "1, ".repeat(300)), "TOML parse error at line 3, column 906: "),
+            (format!("a = [{} = ]", "1, ".repeat(300)), "TOML parse error at line 3, column 907: "),
         ] {
             let text = refused(&more);
             assert!(text.starts_with(says) && text.len() < 250, "{more}: {text}");

@@ -25,7 +25,7 @@ use super::failed;
 use super::folder::Folder;
 use crate::checksum::sealed;
 use gains::Gains;
-use kerrlight_tomo::fit::settings::FitFile;
+use kerrlight_tomo::fit::settings::{FitFile, Kind};
 use kerrlight_tomo::fit::setup::{self, Instrument, Measured, Still, StillView};
 use kerrlight_tomo::fit::{Loss, Motion, State, Trainer};
 use kerrlight_tomo::frames::Frames;
@@ -84,7 +84,11 @@ impl Estimate<'_> {
         self.scene(trainer, state, &movie)?;
         let still = self.still_view().at(self.time_of_still(), trainer, state)?;
         let objective = &trainer.objective;
-        let compared = (objective.names(), objective.statistics(&seen)?);
+        let mut statistics = objective.statistics(&seen)?;
+        let data: usize = statistics.iter().map(|of| of.all.count).sum();
+        let taken = self.solved(&state.now.parameters) as f64 / data.max(1) as f64;
+        statistics.iter_mut().for_each(|of| of.taken = taken);
+        let compared = (objective.names(), statistics);
         let judged = self.evidence().judged(compared, &movie)?;
         self.curve_table(&seen)?;
         let gains = self.gains(&movie, &seen)?;
@@ -112,6 +116,18 @@ impl Estimate<'_> {
         self.folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
         self.report(&found, &results)?;
         Ok((numbers::last_line(&found.judged.worth(), &results), results))
+    }
+
+    /// Parameters of a linear grid between their bounds: as many data, at most, are used up. None of others, which are
+    /// no parameters of the data but of a function.
+    fn solved(&self, parameters: &[f32]) -> usize {
+        match (&self.file.representation.kind, &self.file.linear) {
+            (Kind::LinearGrid, Some(linear)) => {
+                let is_free = |x: &&f32| **x > 0.0 && f64::from(**x) < linear.upper;
+                parameters.iter().filter(is_free).count()
+            }
+            _ => 0,
+        }
     }
 
     fn evidence(&self) -> Evidence<'_> {

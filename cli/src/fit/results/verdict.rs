@@ -202,7 +202,7 @@ impl Judged {
             "correlation_in_space": statistics.in_space.correlation(),
         });
         if tested.errors != Errors::Weight {
-            term["expected"] = json!({ "mean": expected.chi2, "deviation": expected.spread });
+            term["expected"] = json!({ "mean": expected.chi2, "deviation": expected.spread, "taken": expected.taken });
         }
         if let Some((frame, part, chi2)) = worst(statistics.frames.iter().enumerate()) {
             let time = self.times.get(frame);
