@@ -47,7 +47,7 @@ impl Output {
 
     /// A place to write to, whose name must end in one of `extensions` (any, if there are none).
     pub fn ending_in(path: &Path, extensions: &[&str]) -> anyhow::Result<Self> {
-        let shown = plain::path(&path);
+        let shown = plain::path(path);
         if path.is_dir() {
             bail!("output {shown} is a directory: give the name of a file in it");
         }
@@ -140,7 +140,7 @@ impl Output {
     pub fn differs(&self, other: &Path) -> anyhow::Result<()> {
         let full = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         if full(&self.path) == full(other) {
-            bail!("{} is given for two outputs: use different names", plain::path(&other));
+            bail!("{} is given for two outputs: use different names", plain::path(other));
         }
         Ok(())
     }
@@ -224,7 +224,7 @@ pub fn remove_unfinished() {
 /// A regular file to read that is not empty, with an error that names it.
 pub fn open(path: &Path) -> anyhow::Result<File> {
     let file = open_any(path)?;
-    let shown = plain::path(&path);
+    let shown = plain::path(path);
     if file.metadata().with_context(|| format!("cannot read {shown}"))?.len() == 0 {
         bail!("{shown} is empty (0 bytes)");
     }
@@ -232,7 +232,7 @@ pub fn open(path: &Path) -> anyhow::Result<File> {
 }
 
 fn open_any(path: &Path) -> anyhow::Result<File> {
-    let shown = plain::path(&path);
+    let shown = plain::path(path);
     let metadata = std::fs::metadata(path).with_context(|| format!("cannot read {shown}"))?;
     if metadata.is_dir() {
         bail!("{shown} is a directory, not a file");
@@ -274,9 +274,9 @@ pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
 }
 
 fn bytes_of(path: &Path, mut file: File) -> anyhow::Result<Vec<u8>> {
-    let name = || format!("cannot read {}", plain::path(&path));
+    let name = || format!("cannot read {}", plain::path(path));
     let length = file.metadata().with_context(name)?.len();
-    memory::afford(|| plain::path(&path), length as f64)?;
+    memory::afford(|| plain::path(path), length as f64)?;
     let mut bytes = Vec::with_capacity(length as usize);
     file.read_to_end(&mut bytes).with_context(name)?;
     READ.with_borrow_mut(|read| {
@@ -289,7 +289,7 @@ fn bytes_of(path: &Path, mut file: File) -> anyhow::Result<Vec<u8>> {
 
 /// The same file, read once from its beginning to its end for its checksum: what it holds need not fit into memory.
 pub fn read_through(path: &Path) -> anyhow::Result<BufReader<File>> {
-    let name = || format!("cannot read {}", plain::path(&path));
+    let name = || format!("cannot read {}", plain::path(path));
     let mut file = BufReader::with_capacity(1 << 16, open(path)?);
     let sum = Sum::of_file(&mut file).with_context(name)?;
     file.rewind().with_context(name)?;
@@ -325,7 +325,7 @@ pub fn read_log(path: &Path) -> anyhow::Result<String> {
 
 fn text_of(path: &Path, file: File) -> anyhow::Result<String> {
     let text = String::from_utf8(bytes_of(path, file)?);
-    let text = text.with_context(|| format!("{} is not UTF-8 text", plain::path(&path)))?;
+    let text = text.with_context(|| format!("{} is not UTF-8 text", plain::path(path)))?;
     // Spreadsheets and editors of Windows put a byte order mark before it.
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }

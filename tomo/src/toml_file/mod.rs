@@ -205,7 +205,19 @@ mod tests {
         ] {
             assert!(refused(more).starts_with(says), "{more}: {}", refused(more));
         }
-        // What is long is cut, and what would end the line is escaped.
+        let error = read::<File>("title = 3\nseed = -1").unwrap_err().to_string();
+        assert_eq!(error, "line 1: title: invalid type: integer `3`, expected a string");
+        let error = read::<File>("title = \"\"\nseed = -1").unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "line 2: seed: invalid value: integer `-1`, expected a whole number, 0 or more"
+        );
+        assert!(read::<File>("title = \"\"\nseed = ").unwrap_err().to_string().contains("line 2"));
+    }
+
+    /// What is long is cut, and what would end the line is escaped.
+    #[test]
+    fn regress_errors_are_short_and_in_a_line() {
         let long = "x".repeat(300);
         for (more, says) in [
             (format!("shape = {:?}", long), "line 3: shape: unknown variant `xxx"),
@@ -223,14 +235,6 @@ mod tests {
         }
         let odd = refused("\"a\\n\\u001b\" = 1");
         assert!(odd.starts_with("line 3: unknown field `a\\n\\u{1b}`, expected"), "{odd}");
-        let error = read::<File>("title = 3\nseed = -1").unwrap_err().to_string();
-        assert_eq!(error, "line 1: title: invalid type: integer `3`, expected a string");
-        let error = read::<File>("title = \"\"\nseed = -1").unwrap_err().to_string();
-        assert_eq!(
-            error,
-            "line 2: seed: invalid value: integer `-1`, expected a whole number, 0 or more"
-        );
-        assert!(read::<File>("title = \"\"\nseed = ").unwrap_err().to_string().contains("line 2"));
     }
 
     #[test]
