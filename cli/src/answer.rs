@@ -2,6 +2,7 @@
 
 use crate::columns::{self, Column};
 use crate::output::{self, Output};
+use crate::plain;
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -135,7 +136,7 @@ impl Answer {
         let failure = self.failure.take();
         match form {
             Form::Json => output::print(&format!("{:#}\n", self.into_json()))?,
-            Form::Text => self.each_text(output::print)?,
+            Form::Text => self.each_text(|text| output::print(&plain::lines(text)))?,
             Form::Aside => self.each_text(|text| {
                 eprint!("{text}");
                 Ok(())

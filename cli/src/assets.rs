@@ -73,7 +73,7 @@ pub fn load(
         let beside = beside.unwrap_or(Path::new("."));
         let resources = |name: &str| {
             let found = reach.find(beside, name)?;
-            found.map(|path| read(&path)).transpose().map_err(|error| format!("{error:#}"))
+            found.map(|path| read(&path)).transpose().map_err(|error| crate::plain::reasons(&error))
         };
         let file = MeshFile::decode(&bytes, &resources).with_context(name)?;
         warn(&name(), &file.warnings);

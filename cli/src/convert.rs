@@ -289,7 +289,10 @@ impl Convert {
 fn told(error: anyhow::Error) -> anyhow::Error {
     match error.downcast_ref() {
         Some(Error::Unknown(_) | Error::File(FileError::Unknown(_))) => {
-            anyhow!("{error:#} with --source, --array, --mjd, --frequency or --bandwidth")
+            anyhow!(
+                "{} with --source, --array, --mjd, --frequency or --bandwidth",
+                crate::plain::reasons(&error)
+            )
         }
         _ => error,
     }

@@ -20,20 +20,21 @@
 //! From then on `representation.kind = "small"` with `representation.own.width = 32` works in every fit and every
 //! comparison of that program.
 
-/// As the standard library's, but a message that cannot be written, as into a file on a full disk, is no panic.
-macro_rules! eprintln {
-    ($($words:tt)*) => {{
-        use std::io::Write as _;
-        let _ = std::writeln!(std::io::stderr(), $($words)*);
-    }};
-}
-
-/// The same without an end of the line.
+/// As the standard library's, but a message that cannot be written, as into a file on a full disk, is no panic, and
+/// control characters of foreign names are escaped.
 macro_rules! eprint {
     ($($words:tt)*) => {{
         use std::io::Write as _;
-        let _ = std::write!(std::io::stderr(), $($words)*);
+        let words = std::format!($($words)*);
+        let _ = std::io::stderr().write_all($crate::plain::lines(&words).as_bytes());
     }};
+}
+
+/// The same with an end of the line.
+macro_rules! eprintln {
+    ($($words:tt)*) => {
+        eprint!("{}\n", std::format_args!($($words)*))
+    };
 }
 
 mod accuracy;
@@ -63,6 +64,7 @@ mod overlay;
 mod parquet_table;
 mod paths;
 pub mod pictures;
+mod plain;
 mod program;
 mod progress;
 mod record;
@@ -160,17 +162,22 @@ impl Program {
     /// The same for a command line of the caller's, whose first word is the program's name; returns the exit code.
     /// Help, and what is wrong with the words themselves, end the process.
     pub fn run_with(self, words: impl IntoIterator<Item = OsString>) -> u8 {
+        let words: Vec<OsString> = words.into_iter().collect();
+        if let Err(error) = plain::check_words(&words) {
+            eprintln!("error: {}", plain::reasons(&error));
+            return 2;
+        }
         let matches = help::command().try_get_matches_from(words);
         let arguments = matches.and_then(|matches| Arguments::from_arg_matches(&matches));
         let arguments = arguments.unwrap_or_else(|error| output::exit(&error));
         match interrupt::listen().and_then(|()| run(&arguments, &self)) {
             Ok(()) => 0,
             Err(error) if error.is::<interrupt::Interrupted>() => {
-                eprintln!("{error:#}");
+                eprintln!("{}", plain::reasons(&error));
                 interrupt::code()
             }
             Err(error) => {
-                eprintln!("error: {error:#}");
+                eprintln!("error: {}", plain::reasons(&error));
                 if error.is::<compare::Busy>() {
                     return BUSY;
                 }

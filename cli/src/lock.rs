@@ -1,6 +1,6 @@
 //! A folder that one process at a time works in.
 
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, ensure};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -15,6 +15,26 @@ impl Lock {
     /// Shares a folder with others who do the same, and with nobody else, as far as the file system has locks.
     pub fn share(folder: &Path, busy: &str, patience: Duration) -> anyhow::Result<Self> {
         Self::by(File::try_lock_shared, folder, busy, patience)
+    }
+
+    /// Takes the lock of a folder that is new or empty; it is made if there is none. Of several processes that want the
+    /// same one, a single one gets it.
+    pub fn of_new(folder: &Path, busy: &str) -> anyhow::Result<Self> {
+        let is_free = || {
+            ensure!(
+                is_free(folder),
+                "{} exists and is not an empty folder: resume it with --resume, or give another with -o",
+                folder.display()
+            );
+            Ok(())
+        };
+        is_free()?;
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        let lock = Self::take(folder, busy, Duration::ZERO)?;
+        // Another process may have worked in it, and ended, since it was found empty.
+        is_free()?;
+        Ok(lock)
     }
 
     /// Takes the lock of a folder, within `patience`; `busy` is what another process does there.
@@ -70,7 +90,7 @@ fn in_use(folder: &Path, busy: &str) -> anyhow::Error {
 }
 
 /// Whether there is nothing in a folder but its lock; so it is if there is no folder.
-pub fn is_free(folder: &Path) -> bool {
+fn is_free(folder: &Path) -> bool {
     let Ok(mut entries) = std::fs::read_dir(folder) else { return !folder.exists() };
     entries.all(|entry| entry.is_ok_and(|entry| entry.file_name() == NAME))
 }

@@ -10,6 +10,7 @@ use standard::pour;
 pub use standard::{exit, print};
 
 use crate::checksum::Sum;
+use crate::plain;
 use anyhow::{Context, bail};
 use kerrlight_common::memory;
 use std::cell::RefCell;
@@ -46,7 +47,7 @@ impl Output {
 
     /// A place to write to, whose name must end in one of `extensions` (any, if there are none).
     pub fn ending_in(path: &Path, extensions: &[&str]) -> anyhow::Result<Self> {
-        let shown = path.display();
+        let shown = plain::path(path);
         if path.is_dir() {
             bail!("output {shown} is a directory: give the name of a file in it");
         }
@@ -61,7 +62,7 @@ impl Output {
             _ => PathBuf::from("."),
         };
         if !folder.is_dir() {
-            bail!("output {shown}: there is no directory {}", folder.display());
+            bail!("output {shown}: there is no directory {}", plain::path(&folder));
         }
         // Through a symbolic link to the file it names, and never over a protected file.
         let given = path.to_owned();
@@ -107,7 +108,7 @@ impl Output {
         loop {
             let file = builder
                 .tempfile_in(&self.folder)
-                .with_context(|| format!("cannot write to {}", self.folder.display()))?;
+                .with_context(|| format!("cannot write to {}", plain::path(&self.folder)))?;
             // It tells others that somebody writes here. One that came before the lock has removed the file.
             if lock(file.as_file()) {
                 return Ok(file);
@@ -126,7 +127,10 @@ impl Output {
     pub fn spares(&self, input: &Path) -> anyhow::Result<()> {
         match (self.path.canonicalize(), input.canonicalize()) {
             (Ok(output), Ok(input)) if output == input && !self.piped => {
-                bail!("output {} is an input and would be lost: give another name", input.display())
+                bail!(
+                    "output {} is an input and would be lost: give another name",
+                    plain::path(&input)
+                )
             }
             _ => Ok(()),
         }
@@ -136,7 +140,7 @@ impl Output {
     pub fn differs(&self, other: &Path) -> anyhow::Result<()> {
         let full = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         if full(&self.path) == full(other) {
-            bail!("{} is given for two outputs: use different names", other.display());
+            bail!("{} is given for two outputs: use different names", plain::path(other));
         }
         Ok(())
     }
@@ -151,7 +155,7 @@ impl Output {
         &self,
         write: impl FnOnce(&mut BufWriter<&File>) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
-        let name = || format!("cannot write {}", self.path.display());
+        let name = || format!("cannot write {}", plain::path(&self.path));
         if self.piped {
             // The bytes are kept in a file without a name until they are whole.
             let file = tempfile::tempfile_in(&self.folder).with_context(name)?;
@@ -220,7 +224,7 @@ pub fn remove_unfinished() {
 /// A regular file to read that is not empty, with an error that names it.
 pub fn open(path: &Path) -> anyhow::Result<File> {
     let file = open_any(path)?;
-    let shown = path.display();
+    let shown = plain::path(path);
     if file.metadata().with_context(|| format!("cannot read {shown}"))?.len() == 0 {
         bail!("{shown} is empty (0 bytes)");
     }
@@ -228,7 +232,7 @@ pub fn open(path: &Path) -> anyhow::Result<File> {
 }
 
 fn open_any(path: &Path) -> anyhow::Result<File> {
-    let shown = path.display();
+    let shown = plain::path(path);
     let metadata = std::fs::metadata(path).with_context(|| format!("cannot read {shown}"))?;
     if metadata.is_dir() {
         bail!("{shown} is a directory, not a file");
@@ -270,9 +274,9 @@ pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
 }
 
 fn bytes_of(path: &Path, mut file: File) -> anyhow::Result<Vec<u8>> {
-    let name = || format!("cannot read {}", path.display());
+    let name = || format!("cannot read {}", plain::path(path));
     let length = file.metadata().with_context(name)?.len();
-    memory::afford(|| path.display().to_string(), length as f64)?;
+    memory::afford(|| plain::path(path), length as f64)?;
     let mut bytes = Vec::with_capacity(length as usize);
     file.read_to_end(&mut bytes).with_context(name)?;
     READ.with_borrow_mut(|read| {
@@ -285,7 +289,7 @@ fn bytes_of(path: &Path, mut file: File) -> anyhow::Result<Vec<u8>> {
 
 /// The same file, read once from its beginning to its end for its checksum: what it holds need not fit into memory.
 pub fn read_through(path: &Path) -> anyhow::Result<BufReader<File>> {
-    let name = || format!("cannot read {}", path.display());
+    let name = || format!("cannot read {}", plain::path(path));
     let mut file = BufReader::with_capacity(1 << 16, open(path)?);
     let sum = Sum::of_file(&mut file).with_context(name)?;
     file.rewind().with_context(name)?;
@@ -321,7 +325,7 @@ pub fn read_log(path: &Path) -> anyhow::Result<String> {
 
 fn text_of(path: &Path, file: File) -> anyhow::Result<String> {
     let text = String::from_utf8(bytes_of(path, file)?);
-    let text = text.with_context(|| format!("{} is not UTF-8 text", path.display()))?;
+    let text = text.with_context(|| format!("{} is not UTF-8 text", plain::path(path)))?;
     // Spreadsheets and editors of Windows put a byte order mark before it.
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }

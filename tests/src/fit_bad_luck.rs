@@ -1,9 +1,9 @@
 //! `kerrlight fit` with bad input and bad luck: one clear message, and nothing lost or half-written.
 
 use crate::fit::{changed, results, small, with};
-use crate::support::{cramped, fail, kerrlight, root, succeed};
+use crate::support::{binary, cramped, fail, kerrlight, root, succeed};
 use std::path::Path;
-use std::process::Output;
+use std::process::{Command, Output, Stdio};
 
 fn message(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
@@ -299,4 +299,44 @@ fn exact_visibilities_without_errors_are_named() {
         let said = message(&output);
         assert!(output.status.success() && said.contains(&format!("; {frames} frames")), "{said}");
     }
+}
+
+/// The system makes a folder once: of fits that begin at the same moment each has its own.
+#[test]
+fn exact_fits_that_begin_at_once_have_a_folder_each() {
+    let (small, folder) = (small(), tempfile::tempdir().unwrap());
+    let words = with(&small, &["--set", "training.steps=1"]);
+    let start = |_| {
+        let mut command = Command::new(binary());
+        command.current_dir(folder.path()).args(&words);
+        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    };
+    let running: Vec<_> = (0..4).map(start).collect();
+    for mut fit in running {
+        assert_eq!(fit.wait().unwrap().code(), Some(0));
+    }
+    let names = ["kerrlight-fit", "kerrlight-fit-2", "kerrlight-fit-3", "kerrlight-fit-4"];
+    assert_eq!(files(folder.path()), names);
+    for name in names {
+        assert!(folder.path().join(name).join("report.html").is_file(), "{name}");
+    }
+}
+
+/// A title with a control character is no end of a comment, and nothing that a terminal obeys.
+#[test]
+fn regress_titles_stand_in_a_line() {
+    let (small, folder) = (small(), tempfile::tempdir().unwrap());
+    let words = ["-o", "run", "--set", "training.steps=1", "--set", "title=a\u{1b}[31m\nb"];
+    let output = kerrlight(folder.path(), &with(&small, &words));
+    assert_eq!(output.status.code(), Some(0), "{}", message(&output));
+    assert!(message(&output).contains("a\\u{1b}[31m\\nb: image"), "{}", message(&output));
+    let run = folder.path().join("run");
+    let scene = std::fs::read_to_string(run.join("scene.toml")).unwrap();
+    assert!(scene.lines().next().unwrap().ends_with("a\\u{1b}[31m\\nb"), "{scene}");
+    for name in ["scene.toml", "fit.toml", "report.html"] {
+        assert!(!std::fs::read_to_string(run.join(name)).unwrap().contains('\u{1b}'), "{name}");
+    }
+    let refused = fail(folder.path(), &with(&small, &["-o", "new\nline"]));
+    assert!(refused.contains("`new\\nline` holds a control character (U+000A)"), "{refused}");
+    assert_eq!(files(folder.path()), ["run"]);
 }

@@ -65,7 +65,7 @@ impl Case {
     pub fn settings(&self) -> Result<String, String> {
         match self.error() {
             Some(error) => Err(error.to_owned()),
-            None => self.recipe.text(self.at(), self.seed).map_err(|e| format!("{e:#}")),
+            None => self.recipe.text(self.at(), self.seed).map_err(|e| crate::plain::reasons(&e)),
         }
     }
 

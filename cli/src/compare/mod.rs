@@ -23,7 +23,8 @@ mod verdicts;
 
 use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
-use crate::lock::{self, Lock};
+use crate::lock::Lock;
+use crate::plain;
 use crate::program::Program;
 use crate::progress;
 use crate::record::Recorder;
@@ -249,20 +250,18 @@ impl Compare {
     /// Enters the folder: new or resumed. A report takes no lock.
     fn enter(&self, asked: &Asked) -> anyhow::Result<Option<Lock>> {
         let folder = &asked.folder;
-        let shown = folder.display();
         let begun = Plan::load(folder)?;
         if self.collect {
             let Some(_) = begun else { return Err(status::no_comparison(folder)) };
             return Ok(None);
         }
-        if !lock::is_free(folder) && !self.resume {
-            bail!(
-                "{shown} exists and is not an empty folder: resume it with --resume, or give another with -o"
-            );
-        }
-        std::fs::create_dir_all(folder)
-            .with_context(|| format!("cannot make the folder {shown}"))?;
-        let lock = Lock::take(folder, plan::BUSY, Duration::ZERO)?;
+        let lock = if self.resume {
+            std::fs::create_dir_all(folder)
+                .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+            Lock::take(folder, plan::BUSY, Duration::ZERO)?
+        } else {
+            Lock::of_new(folder, plan::BUSY)?
+        };
         asked.plan.write(folder, &asked.text)?;
         Ok(Some(lock))
     }
@@ -308,7 +307,7 @@ fn run(cases: &[Case], runner: &Runner<'_>) -> HashMap<String, String> {
         if keeper.stopped() {
             break;
         }
-        bar.set_message(case.name());
+        bar.set_message(plain::line(&case.name()).into_owned());
         bar.tick();
         let status = runner.run(case, &keeper);
         bar.inc(u64::from(status != Status::Open));

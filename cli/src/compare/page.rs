@@ -6,6 +6,7 @@ use super::runner::Runner;
 use super::summary::Summary;
 use super::{changes, figures, quick, ran, tables, verdicts};
 use crate::output::Output;
+use crate::plain;
 use crate::report::{Figure, Part, Report, Table};
 #[cfg(not(feature = "parquet"))]
 use anyhow::Context;
@@ -140,7 +141,7 @@ impl Page<'_> {
             return String::new();
         }
         let notice = quick::notice();
-        format!("# {}\n\n{}\n\n", self.experiment.title, notice.text.join("\n\n"))
+        format!("# {}\n\n{}\n\n", plain::line(&self.experiment.title), notice.text.join("\n\n"))
     }
 
     /// What came out, how to read it, how it was measured.

@@ -144,7 +144,7 @@ impl Recipe {
     pub fn error(&self, variant: usize) -> Option<&str> {
         let check = || fit::check(&self.text(variant, 1)?, &self.choice.registry);
         let error = &self.variants[variant].error;
-        error.get_or_init(|| check().err().map(|error| format!("{error:#}"))).as_deref()
+        error.get_or_init(|| check().err().map(|error| crate::plain::reasons(&error))).as_deref()
     }
 
     /// The same, as far as it is looked for before cases are run: each check takes a third of a millisecond.

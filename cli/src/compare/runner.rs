@@ -117,7 +117,7 @@ impl<'a> Runner<'a> {
             _ if keeper.stopped() => Status::Open,
             Ok((status, _)) if was_told(status) => Status::Open,
             Ok((status, said)) => Status::Failed(failure(status, &said)),
-            Err(error) => Status::Failed(format!("{error:#}")),
+            Err(error) => Status::Failed(crate::plain::reasons(&error)),
         }
     }
 

@@ -5,6 +5,7 @@ use super::experiment::{Beside, Experiment, Level, TableAsked};
 use super::labels::{called, combinations, described, number, pairs};
 use super::results::Results;
 use super::summary::{Spread, Summary};
+use crate::plain;
 use crate::report::Table;
 use toml::Value;
 
@@ -214,15 +215,19 @@ pub fn all(summary: &Summary, with_verdicts: bool) -> Table {
     }
 }
 
-/// The table in Markdown.
+/// The table in Markdown. Names of levels and titles are the experiment's: none of them ends a line or a cell.
 pub fn markdown(table: &Table) -> String {
-    let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+    let cell = |text: &String| plain::line(text).replace('|', "\\|");
+    let line = |cells: &[String]| {
+        format!("| {} |\n", cells.iter().map(cell).collect::<Vec<_>>().join(" | "))
+    };
+    let (title, caption) = (plain::line(&table.title), plain::lines(&table.caption));
     if table.rows.is_empty() {
-        return format!("### {}\n\n{}\n\n", table.title, table.caption);
+        return format!("### {title}\n\n{caption}\n\n");
     }
     let rule = format!("|{}\n", "---|".repeat(table.head.len()));
     let rows: String = table.rows.iter().map(|row| line(row)).collect();
-    format!("### {}\n\n{}{rule}{rows}\n{}\n", table.title, line(&table.head), table.caption)
+    format!("### {title}\n\n{}{rule}{rows}\n{caption}\n", line(&table.head))
 }
 
 #[cfg(test)]
@@ -262,6 +267,10 @@ pub mod tests {
         let table = table(&experiment, &summary, &experiment.table[0]);
         assert_eq!(table.rows, [["bhnerf", "30.00 (0.001)"], ["grid", "25.00 (0.002)"]]);
         assert_eq!(table.caption, "Of two. One seed. In brackets: the best level of rate.");
+        let odd =
+            Table { title: "a\n# b".to_owned(), rows: vec![vec!["|\u{1b}".to_owned()]], ..table };
+        let text = markdown(&odd);
+        assert!(text.starts_with("### a\\n# b\n") && text.contains("| \\|\\u{1b} |\n"), "{text}");
         // What no case has leaves a note.
         let none = cases
             .iter()

@@ -2,12 +2,12 @@
 
 use super::inputs::{self, Inputs, SETTINGS};
 use crate::file_sums::FileSums;
-use crate::lock::{self, Lock};
+use crate::lock::Lock;
 use crate::output::{self, Output};
 use anyhow::{Context, bail};
 use serde_json::Value;
 use std::fs::OpenOptions;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -28,20 +28,33 @@ const BUSY: &str = "fits in";
 impl Folder {
     /// A new folder.
     pub fn create(path: &Path, settings: &str, inputs: Inputs) -> anyhow::Result<Self> {
-        let shown = path.display();
-        if !lock::is_free(path) {
-            bail!(
-                "{shown} exists and is not an empty folder: resume it with --resume, or give another with -o"
-            );
-        }
-        std::fs::create_dir_all(path).with_context(|| format!("cannot make the folder {shown}"))?;
-        let lock = Lock::take(path, BUSY, Duration::ZERO)?;
+        let lock = Lock::of_new(path, BUSY)?;
         let folder = Self { path: path.to_owned(), inputs, _lock: Some(lock) };
         let inputs = serde_json::to_string_pretty(&folder.inputs)?;
         folder.file(inputs::FILE)?.write(format!("{inputs}\n").as_bytes())?;
         // Last: with them it is a run.
         folder.file(SETTINGS)?.write(settings.as_bytes())?;
         Ok(folder)
+    }
+
+    /// A new folder that nobody has named: kerrlight-fit, or the first of kerrlight-fit-2, -3 … that does not exist.
+    /// Fits that start at once get one each, for the system lets only one of them make it.
+    pub fn unnamed() -> anyhow::Result<PathBuf> {
+        for k in 1u32.. {
+            let path = PathBuf::from(match k {
+                1 => "kerrlight-fit".to_owned(),
+                k => format!("kerrlight-fit-{k}"),
+            });
+            match std::fs::create_dir(&path) {
+                Ok(()) => return Ok(path),
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                Err(error) => {
+                    return Err(error)
+                        .with_context(|| format!("cannot make the folder {}", path.display()));
+                }
+            }
+        }
+        bail!("every folder kerrlight-fit-N exists: name one with -o")
     }
 
     /// A folder that holds a run, within `patience` if another process works in it; all that the run has read must be

@@ -94,7 +94,7 @@ impl Inputs {
         match output::read(&settings) {
             Ok(bytes) if Sum::of(&bytes) == self.settings => {}
             Ok(_) => faults.push(format!("{} has changed", settings.display())),
-            Err(error) => faults.push(format!("{error:#}")),
+            Err(error) => faults.push(crate::plain::reasons(&error)),
         }
         faults
     }

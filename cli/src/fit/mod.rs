@@ -31,7 +31,7 @@ mod world_search;
 use crate::answer::Answer;
 use crate::devices::{FitDevice, StepsOption};
 use crate::record::Recorder;
-use crate::{interrupt, output, paths};
+use crate::{interrupt, output, paths, plain};
 use anyhow::{Context, bail};
 pub use api::{assigned, check, coverage, sizes, turned, velocities};
 pub use band_plots::{loop_plot, of_runs as plots_of_bands};
@@ -40,6 +40,7 @@ use clap::Args;
 pub use failed::Failed;
 use folder::Folder;
 pub use inputs::{Inputs, SETTINGS};
+use kerrlight_common::toml_file;
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{FitError, FitFile, StaticImageFile};
 use kerrlight_tomo::representation::Registry;
@@ -122,10 +123,9 @@ impl Fit {
             eprint!("{text}\n{}", guess.sentences(&text));
         }
         let work = Work::read(&text).with_context(|| self.name())?;
-        let folder = match &self.output {
-            Some(path) => path.clone(),
-            None => free_name(),
-        };
+        if let Some(unused) = work.unused(&text) {
+            eprintln!("note: {unused}");
+        }
         if self.samples.is_some() {
             work.check_draws()?;
         }
@@ -133,6 +133,10 @@ impl Fit {
         let prepared = prepared?;
         prepared.check_device(device.as_ref())?;
         let text = Self::begun(&text, &base_dir);
+        let folder = match &self.output {
+            Some(path) => path.clone(),
+            None => Folder::unnamed()?,
+        };
         let folder = Folder::create(&folder, &text, Inputs::new(&text, read))?;
         self.run_all(&prepared, &text, (&folder, false), device)
     }
@@ -176,9 +180,9 @@ impl Fit {
 
     fn name(&self) -> String {
         match (&self.file, &self.data) {
-            (Some(file), _) => file.display().to_string(),
+            (Some(file), _) => plain::path(file),
             // Lines that an error names are those of the settings, not of the data.
-            (None, Some(data)) => format!("settings guessed from {}", data.display()),
+            (None, Some(data)) => format!("settings guessed from {}", plain::path(data)),
             (None, None) => "built-in experiment".to_owned(),
         }
     }
@@ -197,8 +201,14 @@ impl Fit {
                 (text, folder)
             }
         };
+        // It stands in a line of the run's settings.
+        plain::check_name(&base_dir.to_string_lossy())?;
         // The built-in experiment has no folder of its own.
         let folder = self.file.is_some().then_some(base_dir.as_path());
+        if !self.set.is_empty() {
+            // What is wrong with the file is no fault of --set.
+            toml_file::read::<toml::Table>(&text).with_context(|| self.name())?;
+        }
         for assignment in &self.set {
             text = assigned(&text, &paths::from_here(assignment, folder)?)?;
         }
@@ -243,13 +253,4 @@ fn parse(text: &str) -> anyhow::Result<FitFile> {
         Error::Fit(FitError::Syntax(error)) => init::explained(&error),
         other => other.into(),
     })
-}
-
-/// A folder that does not exist yet.
-fn free_name() -> PathBuf {
-    let name = |k: u32| match k {
-        1 => PathBuf::from("kerrlight-fit"),
-        k => PathBuf::from(format!("kerrlight-fit-{k}")),
-    };
-    (1..).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(1))
 }

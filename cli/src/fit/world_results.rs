@@ -1,6 +1,8 @@
 //! What is said of a world that was found: lines, sentences, and distances from a known one.
 
+use super::world_search::ALIKE;
 use super::{labels, world_scan};
+use kerrlight_tomo::fit::verdict::EXCESS;
 use kerrlight_tomo::fit::world::Parameter;
 use serde_json::{Value, json};
 
@@ -28,6 +30,8 @@ pub fn lines(results: &Value) -> Vec<String> {
         .collect();
     lines.extend(small_residuals(results).map(|said| format!("note: {said}")));
     lines.extend(rival(results).map(|said| format!("note: {said}")));
+    lines.extend(unfinished(results).map(|said| format!("note: {said}")));
+    lines.extend(edges(results).into_iter().map(|said| format!("note: {said}")));
     lines.extend(unexplained(results).map(|said| format!("note: {said}")));
     let chi2 = reduced(results["chi2_per_datum"].as_f64().unwrap_or(f64::NAN));
     lines.push(match results["scan"]["worlds"].as_u64() {
@@ -98,6 +102,8 @@ pub fn sentences(results: &Value) -> Vec<String> {
     let mut all: Vec<String> = Parameter::ALL.into_iter().filter_map(of).collect();
     all.extend(small_residuals(results).map(|said| format!("Note that {said}.")));
     all.extend(rival(results).map(|said| format!("Note that {said}.")));
+    all.extend(unfinished(results).map(|said| format!("Note that {said}.")));
+    all.extend(edges(results).into_iter().map(|said| format!("Note that {said}.")));
     all.extend(unexplained(results).map(|said| format!("Note that {said}.")));
     all.push(world_scan::sentence(&results["scan"]).unwrap_or_else(|| {
         format!(
@@ -107,9 +113,6 @@ pub fn sentences(results: &Value) -> Vec<String> {
     }));
     all
 }
-
-/// χ²/2 above the best below which the coarse search does not tell another world from it.
-const ALIKE: f64 = 3.0;
 
 /// A world far from the best one that explains the data about as well: one of two mirror images, say.
 fn rival(results: &Value) -> Option<String> {
@@ -133,16 +136,56 @@ fn rival(results: &Value) -> Option<String> {
     ))
 }
 
-/// χ²/N of the best world above which its errors do not hold.
-const ROUGH: f64 = 1.2;
+/// How many searches the limit on their worlds has stopped.
+fn unfinished(results: &Value) -> Option<String> {
+    let trials = results["trials"].as_array()?;
+    let open = trials.iter().filter(|trial| trial["converged"] == false).count();
+    (open > 0).then(|| {
+        format!(
+            "{open} of {} searches were stopped by world.search.coarse.worlds before they had converged: more of them may \
+             end at the same world, or at a better one",
+            trials.len()
+        )
+    })
+}
+
+/// Part of a prior's range within which a value lies at its edge.
+const EDGE: f64 = 0.02;
+
+/// Parameters at an edge of their priors, where the prior and not the model ends.
+fn edges(results: &Value) -> Vec<String> {
+    let of = |parameter: Parameter| {
+        let (name, unit) = (parameter.name(), parameter.unit());
+        let (words, degrees) = labels::parameter(parameter);
+        let value = results["world"][name].as_f64()?;
+        let [low, high] = ends(results, "bounds", name)?;
+        let range = parameter.range().map(|end| end / unit);
+        let is_circle = parameter.difference(low * unit, high * unit).abs() < 1e-6;
+        let is_at = |end: f64, of_model: f64| {
+            (value - end).abs() < EDGE * (high - low) && (end - of_model).abs() > 1e-6 && !is_circle
+        };
+        let end =
+            [(low, range[0]), (high, range[1])].into_iter().find(|(end, of)| is_at(*end, *of));
+        end.filter(|_| results["open"][name] != true).map(|(end, _)| {
+            format!(
+                "the {words} lies at the edge of its prior, {end}{degrees}: the data may ask for more than that allows"
+            )
+        })
+    };
+    Parameter::ALL.into_iter().filter_map(of).collect()
+}
+
+/// χ²/N of the best world above which its errors do not hold: where the verdict of a fit begins to say so.
+const ROUGH: f64 = 1.0 + EXCESS;
 
 /// Why errors of the world do not hold where its volume leaves data unexplained.
 fn unexplained(results: &Value) -> Option<String> {
     let chi2 = results["chi2_per_datum"].as_f64().filter(|chi2| *chi2 > ROUGH)?;
     Some(format!(
         "the volume of the best world leaves χ²/N = {chi2:.2}, which pulls at the world more than its errors say: \
+         matter may move by another law than motion.velocity, or emission lie outside of the region; else \
          world.search.finest or linear.degree = \"quadratic\" may help, as may a higher order of region.nodes, and pulse = \
-         \"delta\" where data are of finer pixels, or the model is wrong"
+         \"delta\" where data are of finer pixels"
     ))
 }
 
@@ -226,6 +269,25 @@ mod tests {
             said.starts_with("If the model were right, the inclination would be between"),
             "{said}"
         );
+    }
+
+    #[test]
+    fn exact_what_stopped_and_what_lies_at_an_edge_is_told() {
+        let mut results = found();
+        let note = |results: &Value, part: &str| {
+            [lines(results), sentences(results)].map(|all| all.iter().any(|s| s.contains(part)))
+        };
+        results["trials"] = json!([{"converged": false}, {"converged": true}]);
+        assert_eq!(note(&results, "1 of 2 searches were stopped by"), [true; 2]);
+        results["trials"][0]["converged"] = json!(true);
+        assert_eq!(note(&results, "were stopped by"), [false; 2]);
+        assert_eq!(note(&results, "edge of its prior"), [false; 2]);
+        results["open"]["spin"] = json!(false);
+        results["world"]["spin"] = json!(0.94);
+        assert_eq!(note(&results, "the spin lies at the edge of its prior, 0.95:"), [true; 2]);
+        // Where the model itself ends there is no more.
+        results["world"]["inclination_deg"] = json!(0.1);
+        assert_eq!(note(&results, "the inclination lies at the edge"), [false; 2]);
     }
 
     #[test]

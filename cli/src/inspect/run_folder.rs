@@ -2,6 +2,7 @@
 
 use crate::answer::Answer;
 use crate::output;
+use crate::plain;
 use anyhow::{Context, bail};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -20,7 +21,8 @@ pub fn describe(folder: &Path) -> anyhow::Result<Answer> {
     let log = log(&folder.join("log.jsonl"))?;
     let results = results(&folder.join("results.json"))?;
     let mut text = format!("{shown}: a fit\n\n");
-    let mut line = |key: &str, value: String| text += &format!("{key:<16}{value}\n");
+    let mut line =
+        |key: &str, value: String| text += &format!("{key:<16}{}\n", plain::line(&value));
     line("title", string(&table, &["title"]));
     line("data", data(&table));
     match table.get("image").and_then(|image| image.get("pixels")) {

@@ -66,7 +66,7 @@ pub fn exit(words: &clap::Error) -> ! {
         check().and_then(|()| printed())
     };
     if let Err(error) = told {
-        eprintln!("error: {error:#}");
+        eprintln!("error: {}", crate::plain::reasons(&error));
         std::process::exit(2)
     }
     std::process::exit(words.exit_code())

@@ -10,6 +10,10 @@ pub fn escape(text: &str) -> String {
             '>' => safe.push_str("&gt;"),
             '"' => safe.push_str("&quot;"),
             '\'' => safe.push_str("&#39;"),
+            // HTML has no other control characters.
+            _ if letter.is_control() && !letter.is_ascii_whitespace() => {
+                safe.extend(letter.escape_default());
+            }
             _ => safe.push(letter),
         }
     }

@@ -181,6 +181,7 @@ mod tests {
     #[test]
     fn exact_text_is_escaped_and_not_looked_at_twice() {
         assert_eq!(escape("<a href='x'>\"&\""), "&lt;a href=&#39;x&#39;&gt;&quot;&amp;&quot;");
+        assert_eq!(escape("\u{1b}[31m\n"), "\\u{1b}[31m\n");
         let parts = [("a", "{{b}}".to_owned()), ("b", "2".to_owned())];
         assert_eq!(fill("1 {{a}} {{b}} }} {", &parts), "1 {{b}} 2 }} {");
     }

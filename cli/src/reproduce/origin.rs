@@ -130,7 +130,7 @@ impl Origin {
         let files = assets::load(&scene, &source.folder, &[], assets::Reach::default());
         let before = source.files.as_deref().unwrap_or_default();
         let faults = match &files {
-            Err(error) => vec![format!("{error:#}")],
+            Err(error) => vec![crate::plain::reasons(error)],
             Ok(files) if files.identity != before => {
                 vec![format!("files of the scene have changed: they were {}", before.trim())]
             }

@@ -1,6 +1,7 @@
 //! A parsed TOML text as serde's data model. Generic code is kept small: it is compiled for every type that is read.
 
 use super::ReadError;
+use super::error::brief;
 use serde::de::value::StrDeserializer;
 use serde::de::{
     DeserializeSeed, Deserializer, EnumAccess, Error, Expected, IntoDeserializer, MapAccess,
@@ -27,12 +28,14 @@ enum Number {
 fn integer(value: &DeInteger<'_>) -> Result<i64, ReadError> {
     let digits = value.as_str().replace('_', "");
     i64::from_str_radix(&digits, value.radix())
-        .map_err(|_| ReadError::custom(format_args!("{digits} has more than 64 bits")))
+        .map_err(|_| ReadError::custom(format_args!("{} has more than 64 bits", brief(&digits))))
 }
 
 fn float(value: &DeFloat<'_>) -> Result<f64, ReadError> {
     let digits = value.as_str().replace('_', "");
-    digits.parse().map_err(|_| ReadError::custom(format_args!("{digits} is not a number")))
+    digits
+        .parse()
+        .map_err(|_| ReadError::custom(format_args!("{} is not a number", brief(&digits))))
 }
 
 impl<'a> Value<'a> {
@@ -86,7 +89,10 @@ impl<'a> Value<'a> {
     fn refused(self, expected: &dyn Expected) -> ReadError {
         let text;
         let found = match self.0.get_ref() {
-            DeValue::String(value) => Unexpected::Str(value),
+            DeValue::String(value) => {
+                text = brief(value);
+                Unexpected::Str(&text)
+            }
             DeValue::Boolean(value) => Unexpected::Bool(*value),
             DeValue::Integer(value) => match integer(value) {
                 Ok(value) => Unexpected::Signed(value),

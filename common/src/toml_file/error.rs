@@ -28,6 +28,26 @@ const TYPES: [(&str, &str); 9] = [
     ("i32", "a whole number, -2147483648 to 2147483647"),
 ];
 
+/// Most bytes of a line of the text that is shown.
+const LINE: usize = 160;
+/// Most letters of a name or a value that are shown.
+const WORD: usize = 80;
+
+/// A name or a value in a single line, its end left out where it is long.
+pub(super) fn brief(text: &str) -> String {
+    let mut short = String::new();
+    for letter in text.chars().take(WORD) {
+        match letter.is_control() {
+            true => short.extend(letter.escape_default()),
+            false => short.push(letter),
+        }
+    }
+    if text.chars().nth(WORD).is_some() {
+        short.push('…');
+    }
+    short
+}
+
 impl ReadError {
     fn new(message: String) -> Self {
         ReadError { message, keys: Vec::new(), span: None, line: None }
@@ -35,7 +55,16 @@ impl ReadError {
 
     /// What the parser says, which shows the line.
     pub fn syntax(error: &dyn Display) -> Self {
-        ReadError::new(error.to_string().trim_end().to_owned())
+        let text = error.to_string();
+        let is_long = |line: &str| line.len() > LINE;
+        if !text.lines().any(is_long) {
+            return ReadError::new(text.trim_end().to_owned());
+        }
+        // Without the line itself, and the mark under it: `4 | text`.
+        let digits = |c: char| c == ' ' || c.is_ascii_digit();
+        let is_shown = |line: &&str| line.trim_start_matches(digits).starts_with('|');
+        let left: Vec<&str> = text.lines().filter(|line| !is_shown(line)).collect();
+        ReadError::new(left.join(": "))
     }
 
     /// The same of the value at a key.
@@ -80,7 +109,8 @@ impl Display for ReadError {
             write!(f, "line {line}: ")?;
         }
         if !self.keys.is_empty() {
-            write!(f, "{}: ", self.key())?;
+            let keys: Vec<String> = self.keys.iter().rev().map(|key| brief(key)).collect();
+            write!(f, "{}: ", keys.join("."))?;
         }
         f.write_str(&self.message)
     }
@@ -93,7 +123,14 @@ impl de::Error for ReadError {
         let plain = |text: String, (name, meaning): &(&str, &str)| {
             text.replace(&format!("expected {name}"), &format!("expected {meaning}"))
         };
-        ReadError::new(TYPES.iter().fold(message.to_string(), plain))
+        // Names stand between such quotes.
+        let message = message.to_string();
+        let quoted = |(k, part): (usize, &str)| match k % 2 {
+            0 => part.to_owned(),
+            _ => brief(part),
+        };
+        let message: Vec<String> = message.split('`').enumerate().map(quoted).collect();
+        ReadError::new(TYPES.iter().fold(message.join("`"), plain))
     }
 }
 

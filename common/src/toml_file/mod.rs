@@ -215,6 +215,28 @@ mod tests {
         assert!(read::<File>("title = \"\"\nseed = ").unwrap_err().to_string().contains("line 2"));
     }
 
+    /// What is long is cut, and what would end the line is escaped.
+    #[test]
+    fn regress_errors_are_short_and_in_a_line() {
+        let long = "x".repeat(300);
+        for (more, says) in [
+            (format!("shape = {:?}", long), "line 3: shape: unknown variant `xxx"),
+            (format!("{long} = 1"), "line 3: unknown field `xxx"),
+            (format!("tables = {{ {long} = true }}"), "line 3: tables.xxx"),
+            (
+                format!("center = [1, {:?}, 2]", long),
+                "line 3: center.1: invalid type: string \"xxx",
+            ),
+            (format!("center = [1, {}, 2]", "1".repeat(300)), "line 3: center.1: 111"),
+            (format!("a = [{} = ]", "1, ".repeat(300)), "TOML parse error at line 3, column 907: "),
+        ] {
+            let text = refused(&more);
+            assert!(text.starts_with(says) && text.len() < 250, "{more}: {text}");
+        }
+        let odd = refused("\"a\\n\\u001b\" = 1");
+        assert!(odd.starts_with("line 3: unknown field `a\\n\\u{1b}`, expected"), "{odd}");
+    }
+
     #[test]
     fn exact_errors_in_a_table_have_no_line() {
         let table: Table = "title = 3\nseed = 1".parse().unwrap();

@@ -22,7 +22,7 @@ pub use problem::Problem;
 pub use progress::{At, Event, Now, Progress, Resumed, Silent};
 pub use search::{Choice, Found, Placed, Searched, Stage, settled};
 pub use start::FoundAxis;
-pub use words::short;
+pub use words::{range_of, short};
 
 use crate::Error;
 use crate::fit::settings::{FitFile, Kind};
@@ -178,9 +178,30 @@ impl<'t> Fit<'_, 't> {
     ///
     /// # Errors
     /// If images cannot be read.
-    pub fn judged(&self, seen: &Frames<f32>, movie: &Frames<f32>) -> Result<Judged, Error> {
+    pub fn judged(
+        &self,
+        state: &State<f32>,
+        seen: &Frames<f32>,
+        movie: &Frames<f32>,
+    ) -> Result<Judged, Error> {
         let objective = &self.trainer.objective;
-        self.evidence().judged((objective.names(), objective.statistics(seen)?), movie)
+        let mut statistics = objective.statistics(seen)?;
+        let data: usize = statistics.iter().map(|of| of.all.count).sum();
+        let taken = self.solved(&state.now.parameters) as f64 / data.max(1) as f64;
+        statistics.iter_mut().for_each(|of| of.taken = taken);
+        self.evidence().judged((objective.names(), statistics), movie)
+    }
+
+    /// Parameters of a linear grid between their bounds: as many data, at most, are used up. None of others, which are
+    /// no parameters of the data but of a function.
+    fn solved(&self, parameters: &[f32]) -> usize {
+        match (&self.file.representation.kind, &self.file.linear) {
+            (Kind::LinearGrid, Some(linear)) => {
+                let is_free = |x: &&f32| **x > 0.0 && f64::from(**x) < linear.upper;
+                parameters.iter().filter(is_free).count()
+            }
+            _ => 0,
+        }
     }
 
     fn recovery(&mut self, state: &State<f32>) -> Result<Recovery, Error> {
@@ -189,7 +210,7 @@ impl<'t> Fit<'_, 't> {
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
         let loss = self.trainer.objective.loss_of(&frames, &seen)?;
         let movie = self.pictured(state, &seen)?;
-        let judged = self.judged(&seen, &movie)?;
+        let judged = self.judged(state, &seen, &movie)?;
         let closeness = self.closeness(&volume)?;
         Ok(Recovery {
             settings: self.file.clone(),

@@ -100,14 +100,21 @@ impl Judged {
     }
 }
 
+/// The expected χ² per datum: `1.00 ± 0.02`, or `0.74 to 1.00 ± 0.02` where parameters may have used up a quarter of the data.
+pub fn range_of(Expected { chi2, spread, taken, .. }: &Expected) -> String {
+    let least =
+        if *taken >= 5e-3 { format!("{:.2} to ", chi2 * (1.0 - taken)) } else { String::new() };
+    format!("{least}{chi2:.2} ± {spread:.2}")
+}
+
 /// `χ² 1.68 per data point of visibilities (1.00 ± 0.02 expected)`.
 fn chi2_of(name: &str, tested: &Tested) -> String {
-    let Expected { chi2: mean, spread, .. } = tested.expected;
+    let (mean, range) = (tested.expected.chi2, range_of(&tested.expected));
     let chi2 = tested.statistics.chi2().map_or("–".to_owned(), short);
     let expected = match tested.errors {
-        Errors::Assumed => format!("{mean:.2} ± {spread:.2} expected with the assumed σ"),
+        Errors::Assumed => format!("{range} expected with the assumed σ"),
         Errors::Shared => format!("{mean:.2} at most expected with errors of what varies"),
-        _ => format!("{mean:.2} ± {spread:.2} expected"),
+        _ => format!("{range} expected"),
     };
     format!("χ² {chi2} per data point of {name} ({expected})")
 }

@@ -12,7 +12,7 @@ pub fn write(observation: &Observation) -> String {
     let mut text = String::new();
     let mut line = |key: &str, value: &str| {
         // A value of several lines would end the comment.
-        let value = value.replace(['\n', '\r'], " ");
+        let value = value.replace(char::is_control, " ");
         let _ = writeln!(text, "# {key}: {value}");
     };
     let mut number = |key: &str, value: Option<f64>| {

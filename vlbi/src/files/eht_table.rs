@@ -35,7 +35,8 @@ pub fn to_eht_table(observation: &Observation, style: EhtTable) -> Result<String
     }
     let mjd = observation.mjd.ok_or(Unknown("the date (MJD)"))?;
     let frequency = observation.frequency_hz.ok_or(Unknown("the frequency"))? / 1e9;
-    let source = observation.source.replace([' ', ','], "_");
+    let ends = |letter: char| letter.is_control() || matches!(letter, ' ' | ',');
+    let source = observation.source.replace(ends, "_");
     let names = table::EHT_COLUMNS;
     let mut text = match style {
         EhtTable::Csv => {

@@ -208,7 +208,7 @@ pub fn to_text(observation: &Observation) -> Result<String, Error> {
     let bandwidth = observation.bandwidth_hz.ok_or(Unknown("the bandwidth"))?;
     let mut text = format!(
         "# SRC: {}\n# RA: {}\n# DEC: {}\n# MJD: {mjd}\n# RF: {} GHz\n# BW: {} GHz\n",
-        observation.source,
+        observation.source.replace(char::is_control, " "),
         parts(position.ra_hours, "h"),
         parts(position.dec_deg, "deg"),
         frequency / 1e9,
@@ -277,9 +277,11 @@ mod tests {
 
     #[test]
     fn exact_round_trip() {
-        let observation = small();
+        // A source's name ends no line.
+        let observation = Observation { source: "a\n0 1".to_owned(), ..small() };
         let text = to_text(&observation).unwrap();
         let back = parse(&text).unwrap();
+        assert_eq!(back.source, "a 0 1");
         assert!((back.position.unwrap().ra_hours - 17.76).abs() < 1e-13);
         assert!((back.position.unwrap().dec_deg + 0.25).abs() < 1e-13);
         assert_eq!(back.stations, observation.stations);

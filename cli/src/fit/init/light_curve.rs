@@ -85,7 +85,9 @@ pub fn of_light_curve(
         ("polarization", if polarized { POLARIZATION } else { "" }.to_owned()),
         ("path", path.to_owned()),
         ("prepared", fitted.prepared()),
-        ("validate", digits(fitted.validate_after_min())),
+        ("validate", format!("{:?}", fitted.validate_after_min())),
+        ("held", fitted.held().to_string()),
+        ("all", fitted.curve.samples.len().to_string()),
         ("errors", format!("sigma = {errors} #! {}", sigma.1)),
         ("steady", all(&mean)),
         (
@@ -164,10 +166,22 @@ impl Fitted {
         lines.iter().map(|line| format!("{line}\n")).collect()
     }
 
+    /// Samples that judge the fit: a part of their number, wherever gaps lie.
+    fn held(&self) -> usize {
+        let all = self.curve.samples.len();
+        all - ((FITTED * all as f64).round() as usize).clamp(1, all.saturating_sub(1).max(1))
+    }
+
+    /// Minutes from the first sample to the middle between the last that is fitted and the first that is not.
     fn validate_after_min(&self) -> f64 {
-        let hours = |sample: Option<&Sample>| sample.map_or(0.0, |sample| sample.time_h);
-        let (first, last) = (self.curve.samples.first(), self.curve.samples.last());
-        FITTED * 60.0 * (hours(last) - hours(first))
+        let samples = &self.curve.samples;
+        let minutes = |k: usize| {
+            let [first, sample] = [0, k].map(|k| samples.get(k).or(samples.last()));
+            60.0 * (sample.map_or(0.0, |s| s.time_h) - first.map_or(0.0, |s| s.time_h))
+        };
+        let fitted = samples.len() - self.held();
+        let middle = 0.5 * (minutes(fitted.saturating_sub(1)) + minutes(fitted));
+        (1e4 * middle).round() / 1e4
     }
 
     /// Mean of the root of Q² + U², Jy; 0 where these are not fitted.
@@ -277,4 +291,27 @@ fn average_s(curve: &LightCurve) -> Option<f64> {
 fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kerrlight_vlbi::files::parse_light_curve;
+
+    /// 60 samples, a gap of half an hour, and 16 more: a fifth of them is 15, whatever the clock says.
+    #[test]
+    fn exact_a_fifth_of_the_samples_is_held_back() {
+        let mut text = "time,I\n".to_owned();
+        for k in 0..76 {
+            let hours = 9.0 + f64::from(k) / 60.0 + if k < 60 { 0.0 } else { 0.5 };
+            text += &format!("{hours},{}\n", 2.0 + 0.1 * f64::from(k % 7));
+        }
+        let curve = parse_light_curve(&text).unwrap();
+        let fitted = Fitted::of(&curve).unwrap();
+        let after = fitted.validate_after_min() / 60.0;
+        let later = fitted.curve.samples.iter().filter(|sample| sample.time_h - 9.0 > after);
+        assert_eq!((fitted.curve.samples.len(), fitted.held(), later.count()), (76, 15, 15));
+        let text = of_light_curve(&curve, ("\"a.csv\"", "a.csv"), None).unwrap();
+        assert!(text.contains("#! the last 15 of 76 samples, a fifth, judge the fit"), "{text}");
+    }
 }

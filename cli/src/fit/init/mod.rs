@@ -14,6 +14,7 @@ use crate::answer::Answer;
 use crate::interferometry::image_files::OwnTimes;
 use crate::interferometry::movie_files;
 use crate::output::Output;
+use crate::plain;
 use annotate::annotate;
 use anyhow::{Context, bail};
 pub use guess::{Guess, guess};
@@ -41,26 +42,34 @@ pub fn explained(error: &ReadError) -> anyhow::Error {
 
 /// What to write for a key that is missing in a table; `loss.0` is one of the tables `loss`.
 fn advice(missing: &str, table: &str) -> String {
-    let one = |(table, text): &(&str, &str)| {
-        (*table == missing).then(|| {
-            format!("\nadd a table [{table}]: {text} `kerrlight fit --init` writes an example")
-        })
+    let place: Vec<&str> = table.split('.').filter(|part| part.parse::<u32>().is_err()).collect();
+    let place = place.join(".");
+    let is_below = |name: &str| {
+        name.strip_prefix(missing).is_some_and(|rest| rest.starts_with('.')) && place.is_empty()
     };
-    let found: Vec<String> = TABLES.iter().filter_map(one).collect();
+    let one = |(name, text): &(&str, &str)| {
+        format!("\nadd a table [{name}]: {text} `kerrlight fit --init` writes an example")
+    };
+    let tables = |is: &dyn Fn(&str) -> bool| -> String {
+        TABLES.iter().filter(|(name, _)| is(name)).map(one).collect()
+    };
+    let found = tables(&|name| name == missing);
+    // Of `axis` there is a table for each of its kinds.
+    let found = if found.is_empty() { tables(&is_below) } else { found };
     let key = |key: &&keys::Key| key.name == missing && key.example.is_empty();
     let of = |key: &keys::Key| match key.table {
         "" => format!("\ngive `{missing} = …`: {}", key.note),
         table => format!("\ngive `{missing} = …` in [{table}]: {}", key.note),
     };
-    let place: Vec<&str> = table.split('.').filter(|part| part.parse::<u32>().is_err()).collect();
-    let place = place.join(".");
     let (here, elsewhere): (Vec<_>, Vec<_>) =
         KEYS.iter().filter(key).partition(|key| key.table == place);
     // A key of another table of that name is another key, unless one of the tables is in the other.
-    let is_near = |key: &&keys::Key| key.table.starts_with(&place) || place.starts_with(key.table);
+    let is_near = |key: &&keys::Key| {
+        !place.is_empty() && (key.table.starts_with(&place) || place.starts_with(key.table))
+    };
     let near = elsewhere.into_iter().filter(is_near).collect();
     let keys = if here.is_empty() { near } else { here };
-    found.into_iter().chain(keys.into_iter().map(of)).collect()
+    found + &keys.into_iter().map(of).collect::<String>()
 }
 
 /// What is fitted to visibilities.
@@ -154,6 +163,7 @@ fn seen_from(toml: &Path, data: &Path) -> anyhow::Result<String> {
         false => std::path::absolute(data).with_context(|| data.display().to_string())?,
     };
     let text = path.to_str().with_context(|| format!("{} is not UTF-8", path.display()))?;
+    plain::check_name(text)?;
     Ok(text.to_owned())
 }
 
@@ -186,6 +196,12 @@ fn known(observation: &Observation) -> Option<&'static Source> {
     })
 }
 
+/// The source's name in a line of text.
+fn called(observation: &Observation, source: Option<&Source>) -> String {
+    let name = source.map_or(observation.source.trim(), |source| source.name);
+    plain::line(if name.is_empty() { "unnamed source" } else { name }).into_owned()
+}
+
 /// Of visibilities: a static image, if that is wanted, the source is known to stand still for a night, or what it varies is
 /// no more than is known of it.
 fn of_observation(
@@ -196,8 +212,7 @@ fn of_observation(
     let path = toml::Value::String(seen_from(toml, data)?).to_string();
     let file = data.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let source = known(observation);
-    let name = source.map_or(observation.source.trim(), |source| source.name);
-    let name = if name.is_empty() { "unnamed source" } else { name };
+    let name = &called(observation, source);
     let image = || static_image::of_visibilities(observation, source, name, (&path, file));
     let volume = || of_visibilities(observation, &path, file);
     match (model, source) {
@@ -219,8 +234,7 @@ fn of_observation(
 fn of_visibilities(observation: &Observation, path: &str, file: &str) -> anyhow::Result<String> {
     let flux = short_baselines(observation)?;
     let source = known(observation);
-    let name = source.map_or(observation.source.trim(), |source| source.name);
-    let name = if name.is_empty() { "unnamed source" } else { name };
+    let name = &called(observation, source);
     let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
     let (mass, inclination, field) = match source {
         Some(of) => (
@@ -341,6 +355,7 @@ fn of_movie(images: &Images, path: &str) -> anyhow::Result<String> {
     if flux <= 0.0 {
         bail!("all pixels of the images are zero");
     }
+    let jy = flux / (grid.pixels() as f64 * 4.0 * 0.02);
     let span = field_uas
         .map_or(String::new(), |field| format!("; on the sky it is {field:.1} microarcseconds"));
     let hours = match times {
@@ -354,7 +369,8 @@ fn of_movie(images: &Images, path: &str) -> anyhow::Result<String> {
         ("title", "Images".to_owned()),
         ("pixels", grid.width.to_string()),
         ("frames", frames.to_string()),
-        ("jy", digits(flux / (grid.pixels() as f64 * 4.0 * 0.02))),
+        ("jy", digits(jy)),
+        ("upper", digits((peak / jy).max(3.0))),
         ("flux", digits(flux)),
         ("peak", digits(peak)),
         ("span", span),

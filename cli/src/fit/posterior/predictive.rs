@@ -21,6 +21,8 @@ pub struct Check {
     pub larger_on_a_baseline: Option<f64>,
     /// Of a less probable χ² of any frame.
     pub larger_in_a_frame: Option<f64>,
+    /// The least of the three if the model has an error as large as the verdict of a fit lets pass.
+    pub beyond_what_passes: f64,
 }
 
 /// Means over the draws, of all kinds of data that every one was compared with.
@@ -46,6 +48,7 @@ fn check(data: &str, draws: &[Vec<Check>]) -> Option<Check> {
         larger_chi2: mean(&|p| Some(p.larger_chi2))?,
         larger_on_a_baseline: mean(&|p| p.larger_on_a_baseline),
         larger_in_a_frame: mean(&|p| p.larger_in_a_frame),
+        beyond_what_passes: mean(&|p| Some(p.beyond_what_passes))?,
     })
 }
 
@@ -56,6 +59,13 @@ impl Check {
         let least = [Some(self.larger_chi2), self.larger_on_a_baseline, self.larger_in_a_frame];
         let least = least.into_iter().flatten().fold(1.0, f64::min);
         let chi2 = self.chi2_per_datum;
+        if self.beyond_what_passes >= WRONG && least < WRONG {
+            return format!(
+                "The {name} are such as the draws predict, but for an error of the model that is smaller than those of the \
+                 data: by chance alone data would be as far off with a probability of {} (χ² {chi2:.2} per data point).",
+                probability(least)
+            );
+        }
         if least < WRONG {
             return format!(
                 "The {name} are not what the draws predict: data that are as far off come about with a probability of {} \

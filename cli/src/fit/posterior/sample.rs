@@ -90,6 +90,7 @@ fn predicted(through: &Through<'_>, movie: &Frames<f32>) -> anyhow::Result<Vec<C
             larger_chi2: found.all,
             larger_on_a_baseline: found.groups,
             larger_in_a_frame: found.frames,
+            beyond_what_passes: found.beyond,
         })
     };
     Ok(evidence.judged(compared, movie)?.terms.iter().filter_map(of).collect())

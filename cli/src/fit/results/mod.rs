@@ -1,5 +1,6 @@
 //! What a run leaves: the volume, the movie, numbers, pictures and the report.
 
+mod bounds;
 pub mod gains;
 pub mod leakage;
 mod light_curve;
@@ -75,6 +76,7 @@ impl Estimate<'_> {
     ) -> anyhow::Result<(String, Value)> {
         let seen = fit.seen(state)?;
         let movie = fit.pictured(state, &seen)?;
+        let judged = fit.judged(state, &seen, &movie)?;
         let trainer = &mut fit.trainer;
         let volume = recovered(self.file, trainer, state)?;
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
@@ -91,9 +93,6 @@ impl Estimate<'_> {
         }
         self.scene(trainer, state, &movie)?;
         let still = self.still_view().at(self.time_of_still(), trainer, state)?;
-        let objective = &trainer.objective;
-        let compared = (objective.names(), objective.statistics(&seen)?);
-        let judged = self.evidence().judged(compared, &movie)?;
         self.curve_table(&seen)?;
         let gains = self.gains(&movie, &seen)?;
         let found = Found {
@@ -112,7 +111,11 @@ impl Estimate<'_> {
             state,
             begun,
         };
-        let results = self.results(trainer, &found)?;
+        let mut results = self.results(trainer, &found)?;
+        let bounds = self.bounds(&found.volume, &state.now.parameters, found.quiescent.as_ref());
+        if !bounds.is_empty() {
+            results["bounds"] = bounds.into();
+        }
         self.folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
         self.report(&found, &results)?;
         Ok((numbers::last_line(&found.judged.worth(), &results), results))

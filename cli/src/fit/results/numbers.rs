@@ -1,6 +1,6 @@
 //! What was found, in numbers.
 
-use super::{Estimate, Found, quadrature, verdict};
+use super::{Estimate, Found, bounds, quadrature, verdict};
 use crate::fit::{
     band_search, closures, held_out, linear, rotation_search, world_results, world_search,
 };
@@ -143,10 +143,10 @@ impl Estimate<'_> {
     }
 }
 
-/// The verdict, what is wrong with sums along rays and, beside a truth, PSNR with that of an empty volume.
+/// The verdict, what is wrong with sums along rays, bounds that were reached and, beside a truth, PSNR with that of an empty volume.
 pub fn last_line(headline: &str, results: &Value) -> String {
-    let headline = [Some(headline.to_owned()), quadrature::sentence(results)];
-    let headline = headline.into_iter().flatten().collect::<Vec<_>>().join(" ");
+    let said = quadrature::sentence(results).into_iter().chain(bounds::sentences(results));
+    let headline = std::iter::once(headline.to_owned()).chain(said).collect::<Vec<_>>().join(" ");
     match (results["psnr_db"].as_f64(), results["nrmse"].as_f64()) {
         (Some(psnr), Some(nrmse)) => {
             let empty = psnr + 20.0 * nrmse.log10();

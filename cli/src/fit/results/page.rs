@@ -7,7 +7,7 @@ use super::numbers::outcomes;
 use super::over_time::Changes;
 use super::quiescent::Quiescent;
 use super::verdict;
-use super::{Estimate, Found, quadrature};
+use super::{Estimate, Found, bounds, quadrature};
 use crate::fit::curves::{loss_plot, psnr_plot};
 use crate::fit::{
     band_plots, band_search, band_words, held_out, labels, rotation_search, world_results,
@@ -191,6 +191,7 @@ impl Estimate<'_> {
         lines.extend(rotation_search::sentences(&results["faraday"]));
         lines.extend(held_out::sentence(&results["held_out"]));
         lines.extend(quadrature::sentence(results));
+        lines.extend(bounds::sentences(results));
         if let Some(statement) = results["linear"]["statement"].as_str() {
             lines.push(format!("The linear grid's solution: {statement}."));
         }

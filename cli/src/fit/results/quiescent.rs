@@ -33,6 +33,13 @@ struct Closeness {
     flux_jy: f64,
 }
 
+impl Quiescent {
+    /// All pixels, Jy, and whether they are fluxes.
+    pub fn values(&self) -> (Vec<f32>, bool) {
+        (self.images.iter().flat_map(|(_, image)| image.iter().copied()).collect(), self.is_flux)
+    }
+}
+
 impl Estimate<'_> {
     /// What does not move, where it was recovered; writes its files.
     pub fn quiescent(

@@ -1,6 +1,7 @@
 //! A scene of what was recovered, with its motion: `kerrlight render` and `kerrlight movie` show it.
 
 use super::Estimate;
+use crate::plain;
 use anyhow::Context;
 use kerrlight_common::frames::Frames;
 use kerrlight_common::toml_file;
@@ -60,10 +61,10 @@ impl Estimate<'_> {
     }
 
     fn heading(&self) -> String {
-        let (folder, times) = (self.folder.path().display(), &self.measured.times);
+        let (folder, times) = (plain::path(self.folder.path()), &self.measured.times);
         let mut text = format!(
             "# The emission that a fit recovered, with its motion. The fit: {}\n#   kerrlight render {folder}/{SCENE}\n",
-            self.file.title.replace('\n', " ")
+            plain::line(&self.file.title)
         );
         if let [first, .., last] = times[..] {
             let span = format!("--frames {} --from {first:?} --to {last:?}", times.len());

@@ -5,9 +5,9 @@ pub mod parts;
 mod tests;
 
 use crate::report::{Notice, Table, Tone};
-use kerrlight_tomo::fit::verdict::{Errors, Expected, Outcome, Tested, worst};
-use kerrlight_tomo::recovery::short;
+use kerrlight_tomo::fit::verdict::{Errors, Outcome, Tested, worst};
 pub use kerrlight_tomo::recovery::{Evidence, Judged};
+use kerrlight_tomo::recovery::{range_of, short};
 use serde_json::{Value, json};
 
 /// For results.json.
@@ -56,7 +56,8 @@ fn term(judged: &Judged, name: &str, tested: &Tested) -> Value {
         "correlation_in_space": statistics.in_space.correlation(),
     });
     if tested.errors != Errors::Weight {
-        term["expected"] = json!({ "mean": expected.chi2, "deviation": expected.spread });
+        term["expected"] =
+            json!({ "mean": expected.chi2, "deviation": expected.spread, "taken": expected.taken });
     }
     if let Some((frame, part, chi2)) = worst(statistics.frames.iter().enumerate()) {
         let time = judged.times.get(frame);
@@ -116,11 +117,11 @@ pub fn table(judged: &Judged) -> Table {
         "worst",
     ];
     let row = |(name, tested): &(String, Tested)| {
-        let Tested { statistics, errors, expected: Expected { chi2: mean, spread, .. } } = tested;
+        let Tested { statistics, errors, expected } = tested;
         let number = |x: Option<f64>| x.map_or("–".to_owned(), |x| format!("{x:.2}"));
         let expected = match errors {
             Errors::Weight => "no noise".to_owned(),
-            _ => format!("{mean:.2} ± {spread:.2}"),
+            _ => range_of(expected),
         };
         vec![
             name.clone(),

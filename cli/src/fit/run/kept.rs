@@ -8,6 +8,7 @@ use crate::fit::{
     world_search,
 };
 use crate::interrupt::Keeper;
+use crate::plain;
 use crate::progress;
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
@@ -146,7 +147,7 @@ impl<'a> Kept<'a> {
         };
         format!(
             "{}: {names}; {} frames{dark} of {} rays, {} nodes; {} with {} parameters",
-            now.settings.title,
+            plain::line(&now.settings.title),
             model.frames(),
             model.rays(),
             now.instrument.lines.points(),

@@ -10,6 +10,8 @@ type Range = (&'static str, f64, f64, &'static str);
 
 const TIME: f64 = 1e9;
 const LENGTH: f64 = 1e6;
+/// With a smaller learning rate nothing is learnt.
+const RATE: f64 = 1e-12;
 
 const RANGES: &[Range] = &[
     ("hole.spin", -1.0, 1.0, "a/M"),
@@ -123,11 +125,11 @@ const RANGES: &[Range] = &[
     ("probe.nodes", 4.0, 256.0, "nodes along each axis"),
     ("representation.length_scale", 1e-3, LENGTH, "M"),
     ("representation.time_scale", 1e-3, TIME, "M"),
-    ("training.rate", 0.0, 10.0, "a learning rate"),
+    ("training.rate", RATE, 10.0, "a learning rate"),
     ("training.last_rate", 0.0, 10.0, "a learning rate"),
-    ("training.grid_rate", 0.0, 10.0, "a learning rate"),
+    ("training.grid_rate", RATE, 10.0, "a learning rate"),
     ("training.grid_last_rate", 0.0, 10.0, "a learning rate"),
-    ("training.feature_rate", 0.0, 10.0, "a learning rate"),
+    ("training.feature_rate", RATE, 10.0, "a learning rate"),
     ("training.feature_last_rate", 0.0, 10.0, "a learning rate"),
     ("training.batch.pixels", 1.0, 1e9, "pixels"),
     ("training.batch.frames", 1.0, f64::INFINITY, "frames"),
@@ -141,7 +143,7 @@ const RANGES: &[Range] = &[
     ("linear.prior.mean", -1e12, 1e12, "emission, or its logarithm"),
     ("linear.prior.amplitude", 1e-12, 1e12, "a standard deviation"),
     ("linear.prior.correlation_length", 1e-3, LENGTH, "M"),
-    ("axis.from.rate", 0.0, 10.0, "a learning rate"),
+    ("axis.from.rate", RATE, 10.0, "a learning rate"),
     ("axis.from.last_rate", 0.0, 10.0, "a learning rate"),
     ("axis.scan.directions", 12.0, 1e5, "directions"),
     ("axis.scan.frames", 2.0, f64::INFINITY, "frames"),
@@ -291,7 +293,11 @@ mod tests {
             ("truth.spot.0.amplitude=-1", "truth.spot.0.amplitude = -1"),
             ("loss.0.weight=1e-300", "loss.0.weight = 1e-300"),
             ("representation.length_scale=nan", "representation.length_scale = NaN"),
-            ("training.rate=-1", "training.rate = -1 is not allowed: 0 to 10"),
+            (
+                "training.rate=-1",
+                "training.rate = -1 is not allowed: 1e-12 to 10 (a learning rate)",
+            ),
+            ("training.rate=0", "training.rate = 0 is not allowed: 1e-12 to 10 (a learning rate)"),
             ("world.hole.spin=2", "world.hole.spin = 2"),
             ("output.nodes=nan", "output.nodes = NaN is not allowed: 2 to 512"),
             ("observer.radius=nan", "observer.radius = NaN is not allowed: a finite number"),

@@ -87,6 +87,31 @@ impl Kind {
             Kind::Own(name) => name,
         }
     }
+
+    /// Keys of `representation` that it has a use for, `kind` aside; none of one that a program adds, which says itself
+    /// what it needs.
+    fn keys(&self) -> Option<&'static [&'static str]> {
+        Some(match self {
+            Kind::Bhnerf => &["activation", "degree", "hidden_layers", "length_scale", "width"],
+            Kind::Mlp4d => {
+                &["activation", "degree", "hidden_layers", "length_scale", "time_scale", "width"]
+            }
+            Kind::FeatureGrid => &["activation", "coarsest", "levels"],
+            Kind::Grid => &["activation", "nodes"],
+            Kind::LinearGrid => &["nodes"],
+            Kind::Own(_) => return None,
+        })
+    }
+
+    /// Keys of `representation` in the text of a fit's file that are another representation's, in their order.
+    pub fn foreign_keys(&self, text: &str) -> Vec<String> {
+        let (Ok(table), Some(own)) = (text.parse::<toml::Table>(), self.keys()) else {
+            return Vec::new();
+        };
+        let given = table.get("representation").and_then(toml::Value::as_table);
+        let given = given.into_iter().flat_map(toml::Table::keys);
+        given.filter(|key| *key != "kind" && !own.contains(&key.as_str())).cloned().collect()
+    }
 }
 
 /// How it is recovered.
@@ -291,6 +316,25 @@ pub enum Optimiser {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn exact_keys_of_others_are_foreign() {
+        let text = "[representation]\nkind = \"grid\"\nnodes = 20\nhidden_layers = 4\nwidth = 64";
+        assert_eq!(Kind::Grid.foreign_keys(text), ["hidden_layers", "width"]);
+        assert_eq!(Kind::Bhnerf.foreign_keys(text), ["nodes"]);
+        assert!(Kind::Own("mine".to_owned()).foreign_keys(text).is_empty());
+        // Each key of the table is one of a kind, or of those that a program adds.
+        let all = toml::Table::try_from(Representation {
+            nodes: Some(1),
+            ..toml::from_str("kind = \"grid\"").unwrap()
+        });
+        for key in all.unwrap().keys().filter(|key| *key != "kind") {
+            assert!(
+                Kind::BUILT_IN.iter().any(|kind| kind.keys().unwrap().contains(&key.as_str())),
+                "{key}"
+            );
+        }
+    }
 
     /// What messages list is what settings are read as.
     #[test]

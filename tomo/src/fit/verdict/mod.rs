@@ -1,8 +1,9 @@
 //! Whether a fit explains its data: a function of the residuals of its last state.
 //!
-//! For N independent data with Gaussian errors about a model that is right, χ² per datum is 1 ± √(2/N). How many of the
-//! data a network's parameters have used up nobody knows, so that 1 is where χ² may begin, not where it has to end:
-//! too large is judged closely, too small generously.
+//! For N independent data with Gaussian errors about a model that is right, χ² per datum is 1 ± √(2/N). A fit lies lower by
+//! the part of the data that its parameters have used up. How much a network uses nobody knows, and of voxels only that it is
+//! at most their number, so that 1 is where χ² may begin, not where it has to end: too large is judged closely, too small
+//! generously. The same is let pass whoever asks: a fit, or a draw from its posterior.
 
 mod predictive;
 mod statistics;
@@ -17,7 +18,7 @@ pub const CHANCE: f64 = 5.0;
 /// Excess of χ² per datum that is tolerated for any number of data: an error of the model of 0.3 σ, smaller than
 /// anything that single data can tell.
 pub const EXCESS: f64 = 0.1;
-/// Deficit of χ² per datum that is tolerated: the share of data that parameters may use up.
+/// Deficit of χ² per datum that is tolerated: the share of data that parameters may use up where their number tells nothing.
 pub const LACK: f64 = 0.2;
 /// Mean residual in σ, or correlation of neighbours, that is let pass: what an error of the model as large as
 /// [`EXCESS`] allows makes, if it is the same all over.
@@ -58,6 +59,21 @@ pub struct Expected {
     pub mean: f64,
     /// Correlation of the same datum in consecutive frames.
     pub in_time: f64,
+    /// Part of the data that parameters have used up, at most; 0 where nobody knows. χ² of a fit may lie lower by as much,
+    /// that of a draw from a posterior does not.
+    pub taken: f64,
+}
+
+impl Expected {
+    /// Largest χ² per datum that passes.
+    pub fn most(&self) -> f64 {
+        self.chi2 + (CHANCE * self.spread).max(EXCESS * self.chi2)
+    }
+
+    /// Least χ² per datum that passes.
+    pub fn least(&self) -> f64 {
+        self.chi2 - (CHANCE * self.spread).max(LACK.max(self.taken) * self.chi2)
+    }
 }
 
 /// One kind of data.
@@ -75,7 +91,8 @@ impl Tested {
     /// With the χ² of independent Gaussian data.
     pub fn gaussian(statistics: Statistics, errors: Errors) -> Self {
         let spread = (2.0 / statistics.all.count.max(1) as f64).sqrt();
-        let expected = Expected { chi2: 1.0, spread, mean: 0.0, in_time: 0.0 };
+        let taken = statistics.taken.clamp(0.0, 1.0);
+        let expected = Expected { chi2: 1.0, spread, mean: 0.0, in_time: 0.0, taken };
         Self { statistics, errors, expected }
     }
 
@@ -93,6 +110,7 @@ impl Tested {
             spread: (square / (count - 1.0)).sqrt().max(self.expected.spread),
             mean: mean(&mut draws.iter().filter_map(Statistics::mean)),
             in_time: mean(&mut draws.iter().filter_map(|draw| draw.in_time.correlation())),
+            taken: self.expected.taken,
         };
         let numbers = [expected.chi2, expected.spread, expected.mean, expected.in_time];
         if numbers.iter().all(|x| x.is_finite()) { Self { expected, ..self } } else { self }
@@ -209,14 +227,12 @@ fn judge_noise_free(term: usize, tested: &Tested, verdict: &mut Verdict) {
 }
 
 fn judge_noisy(term: usize, tested: &Tested, chi2: f64, verdict: &mut Verdict) {
-    let Expected { chi2: mean, spread, .. } = tested.expected;
-    if chi2 > mean + (CHANCE * spread).max(EXCESS * mean) {
+    if chi2 > tested.expected.most() {
         verdict.add(Outcome::Unexplained, Some(term), Fault::Large);
     } else {
         judge_structure(term, tested, verdict);
     }
-    let small = chi2 < mean - (CHANCE * spread).max(LACK * mean);
-    if small && tested.errors != Errors::Shared {
+    if chi2 < tested.expected.least() && tested.errors != Errors::Shared {
         verdict.add(Outcome::FitsNoise, Some(term), Fault::Small);
     }
 }

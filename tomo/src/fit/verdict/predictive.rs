@@ -5,7 +5,7 @@
 //! simulated. The mean over the draws of the probability of a larger one is near 0 where the model cannot make such data,
 //! near 1 where it follows their noise.
 
-use super::{Errors, Expected, Part, Tested};
+use super::{EXCESS, Errors, Expected, GROUP_EXCESS, Part, Tested};
 use statrs::function::gamma::checked_gamma_ur;
 
 /// Probabilities, under one draw, of data of one kind that are at least as far from it as the measured ones.
@@ -17,6 +17,8 @@ pub struct Predicted {
     pub groups: Option<f64>,
     /// Of the least probable χ² among frames.
     pub frames: Option<f64>,
+    /// The least of the three if the model has an error as large as the verdict of a fit lets pass.
+    pub beyond: f64,
 }
 
 impl Tested {
@@ -29,12 +31,19 @@ impl Tested {
         let all = self.statistics.all;
         // Over that of Gaussian errors with this mean: that of closure quantities of faint sources is larger.
         let excess = spread / (mean * (2.0 / all.count.max(1) as f64).sqrt());
-        let larger = |part: &Part| probability_of_larger(part, mean, excess);
-        Some(Predicted {
-            all: larger(&all)?,
-            groups: least(self.statistics.groups.values().filter_map(larger)),
-            frames: least(self.statistics.frames.iter().filter_map(larger)),
-        })
+        let of = |[whole, part]: [f64; 2]| -> Option<[Option<f64>; 3]> {
+            // χ² that an error of the model has added is no matter of chance, up to what is let pass.
+            let larger = |of: &Part, passed: f64| {
+                let added = (of.per_datum()? / mean - 1.0).clamp(0.0, passed);
+                probability_of_larger(of, mean * (1.0 + added), excess)
+            };
+            let groups = self.statistics.groups.values().filter_map(|of| larger(of, part));
+            let frames = self.statistics.frames.iter().filter_map(|of| larger(of, part));
+            Some([Some(larger(&all, whole)?), least(groups), least(frames)])
+        };
+        let [all, groups, frames] = of([0.0, 0.0])?;
+        let beyond = of([EXCESS, GROUP_EXCESS])?.into_iter().flatten().fold(1.0, f64::min);
+        Some(Predicted { all: all?, groups, frames, beyond })
     }
 }
 
@@ -131,6 +140,7 @@ mod tests {
         }
         let wrong = tested(1, 2.5).predicted().unwrap();
         assert!(wrong.groups.unwrap() < 1e-6 && wrong.groups.unwrap() < wrong.all, "{wrong:?}");
+        assert!(wrong.beyond < 1e-3, "{wrong:?}");
         assert!(Tested { errors: Errors::Weight, ..tested(1, 0.0) }.predicted().is_none());
     }
 }

@@ -74,6 +74,8 @@ pub struct Statistics {
     pub in_time: Pairs,
     /// Neighbouring pixels of a row.
     pub in_space: Pairs,
+    /// Part of the data that parameters of a fit have used up, at most; 0 where nobody knows.
+    pub taken: f64,
     sum: f64,
     signal: f64,
     before: Frame,

@@ -118,6 +118,42 @@ fn exact_shared_errors_are_judged_by_size_alone() {
     assert_eq!(of(3.0).outcome, Outcome::Unexplained);
 }
 
+/// A linear grid that has used up half of the data halves χ²; a quarter of it is too little all the same.
+#[test]
+fn exact_what_parameters_take_is_expected() {
+    let of = |size: f64, taken: f64| {
+        let mut residuals = baselines(60, |_, _, noise| size.sqrt() * noise);
+        residuals.taken = taken;
+        verdict(residuals, Errors::Known).outcome
+    };
+    assert_eq!(
+        [of(0.6, 0.0), of(0.6, 0.5), of(0.3, 0.5)],
+        [Outcome::FitsNoise, Outcome::Explained, Outcome::FitsNoise]
+    );
+    assert_eq!(of(1.2, 0.5), Outcome::Unexplained);
+}
+
+/// 147,000 pixels with an error of the model of 0.2 σ: the fit and its posterior say the same.
+#[test]
+fn exact_a_fit_and_its_draws_are_judged_alike() {
+    let frames = |size: f64| {
+        let mut random = Pcg64Mcg::seed_from_u64(8);
+        let mut value = move || {
+            let noise: f64 = StandardNormal.sample(&mut random);
+            size.sqrt() * noise
+        };
+        let plain = move |value| Residual { value, datum: 9.0, stations: vec![] };
+        (0..100).map(move |_| (0..1470).map(|_| plain(value())).collect::<Vec<_>>())
+    };
+    for (size, outcome) in [(1.05, Outcome::Explained), (1.3, Outcome::Unexplained)] {
+        let tested = Tested::gaussian(Statistics::of(frames(size), 42), Errors::Assumed);
+        let found = tested.predicted().unwrap();
+        assert!(found.all < 1e-6, "{found:?}");
+        assert_eq!(found.beyond < 1e-3, outcome == Outcome::Unexplained, "{found:?}");
+        assert_eq!(judge(&[tested], None).outcome, outcome);
+    }
+}
+
 /// σ of noise-free data is a weight: how much of the data is left over is what counts.
 #[test]
 fn exact_noise_free_data_are_judged_by_what_is_left_over() {

@@ -31,7 +31,7 @@ pub(super) fn covariance(
     }
     let of_prior = |k: usize| {
         let scale = free[k].parameter.scale();
-        let [_, bend] = free[k].prior.curve(world.get(free[k].parameter), WIDTH * scale);
+        let [_, bend] = free[k].curve(world.get(free[k].parameter), WIDTH * scale);
         bend * scale * scale
     };
     let likelihood = DMatrix::from_fn(n, n, |a, b| {

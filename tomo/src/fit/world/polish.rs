@@ -158,7 +158,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         };
         for (k, free) in self.free.iter().enumerate() {
             let scale = free.parameter.scale();
-            let [slope, bend] = free.prior.curve(at.world.get(free.parameter), WIDTH * scale);
+            let [slope, bend] = free.curve(at.world.get(free.parameter), WIDTH * scale);
             bowl.slopes[k] += slope * scale;
             bowl.bends[(k, k)] += bend * scale * scale;
         }

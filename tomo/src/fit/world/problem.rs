@@ -46,12 +46,44 @@ impl Free {
         [low.max(least), high.min(most)]
     }
 
-    /// A value brought inside the bounds; a whole circle has none.
+    /// A value brought inside the bounds; a whole circle has none, and of its copies the one about which the prior lies.
     pub fn inside(&self, value: f64) -> f64 {
         let [low, high] = self.bounds();
-        match self.is_circle() {
-            true => low + (value - low).rem_euclid(TAU),
-            false => value.clamp(low, high),
+        if !self.is_circle() {
+            return value.clamp(low, high);
+        }
+        let near = self.near_prior(low + (value - low).rem_euclid(TAU));
+        match near {
+            near if near < low => near + TAU,
+            near if near > high => near - TAU,
+            near => near,
+        }
+    }
+
+    /// −ln of the prior's density at a value up to a constant, infinite where it is not possible.
+    pub fn penalty(&self, value: f64) -> f64 {
+        self.prior.penalty(self.near_prior(value))
+    }
+
+    /// Slope and second derivative of that by differences of half width `width`.
+    pub(super) fn curve(&self, value: f64, width: f64) -> [f64; 2] {
+        self.prior.curve(self.near_prior(value), width)
+    }
+
+    /// The copy of an angle on the sky within half a circle of a bell curve's middle: 40° is as good as −320°.
+    fn near_prior(&self, value: f64) -> f64 {
+        match self.prior {
+            Prior::Normal { mean, .. } => mean + self.parameter.difference(value, mean),
+            _ => value,
+        }
+    }
+
+    /// The width of populations in which worlds are looked for: what changes images by about as much as for any other
+    /// parameter, or a bell curve that is narrower, which has no bounds to keep them inside.
+    fn width(&self) -> f64 {
+        match self.prior {
+            Prior::Normal { sigma, .. } => self.parameter.scale().min(sigma),
+            _ => self.parameter.scale(),
         }
     }
 
@@ -232,16 +264,16 @@ impl<T: Float + Default> WorldProblem<'_, T> {
 
     pub(super) fn estimate(&self, world: World, Least { x, value }: Least) -> Estimate {
         let value = self.unit() * value;
-        let penalty = |free: &Free| free.prior.penalty(world.get(free.parameter));
+        let penalty = |free: &Free| free.penalty(world.get(free.parameter));
         let penalties: f64 = self.free.iter().map(penalty).sum();
         Estimate { world, x, chi2: value, value: 0.5 * self.scale * value + penalties }
     }
 
-    /// The world at a place about another one, in units of [`Parameter::scale`]; bounds are mirrors, a whole circle has
-    /// none.
+    /// The world at a place about another one, in units of [`Parameter::scale`] or of a narrower prior; bounds are mirrors,
+    /// a whole circle has none.
     pub(super) fn place(&self, about: &World, u: &[f64]) -> World {
         let one = |world: World, (free, u): (&Free, &f64)| {
-            let value = about.get(free.parameter) + u * free.parameter.scale();
+            let value = about.get(free.parameter) + u * free.width();
             world.with(free.parameter, free.mirrored(value))
         };
         self.free.iter().zip(u).fold(*about, one)
@@ -258,6 +290,38 @@ fn mirrored(x: f64, low: f64, high: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A direction is a direction: −319.55° is 40.45°, and as probable.
+    #[test]
+    fn exact_angles_lie_where_their_prior_does() {
+        let free = |mean: f64, sigma: f64| Free {
+            parameter: Parameter::PositionAngle,
+            prior: Prior::Normal { mean: mean.to_radians(), sigma: sigma.to_radians() },
+        };
+        for (mean, value, expected) in [
+            (40.0f64, -319.55f64, 40.45),
+            (40.0, 40.45, 40.45),
+            (-170.0, 175.0, -185.0),
+            (170.0, -175.0, 185.0),
+            // Not beyond a whole turn.
+            (350.0, 370.0, 10.0),
+            (-350.0, -370.0, -10.0),
+        ] {
+            let free = free(mean, 5.0);
+            let inside = free.inside(value.to_radians()).to_degrees();
+            assert!((inside - expected).abs() < 1e-9, "{mean} {value}: {inside}");
+            let away = (value - mean + 180.0).rem_euclid(360.0) - 180.0;
+            for turn in [-360.0, 0.0, 360.0] {
+                let penalty = free.penalty((value + turn).to_radians());
+                assert!((penalty - 0.5 * (away / 5.0).powi(2)).abs() < 1e-9, "{mean} {value}");
+            }
+        }
+        assert!((free(40.0, 0.01).width().to_degrees() - 0.01).abs() < 1e-12);
+        assert_eq!(free(40.0, 50.0).width(), Parameter::PositionAngle.scale());
+        let whole = Prior::Uniform { low: 0.0, high: TAU };
+        let whole = Free { parameter: Parameter::PositionAngle, prior: whole };
+        assert!((whole.inside(-0.5) - (TAU - 0.5)).abs() < 1e-14);
+    }
 
     #[test]
     fn exact_mirrors_keep_values_inside() {

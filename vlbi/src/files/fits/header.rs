@@ -54,7 +54,8 @@ impl<'a> Header<'a> {
         self.wrong(keyword, format!("= {value} is not allowed: {message}"))
     }
 
-    /// Text in quotes, `''` standing for one, trailing blanks dropped.
+    /// Text in quotes, `''` standing for one, trailing blanks dropped. Control characters, which the standard does not
+    /// allow, are blanks.
     pub fn text(&self, keyword: &str) -> Option<String> {
         let value = self.values.get(keyword)?.trim_start().strip_prefix('\'')?;
         let mut text = String::new();
@@ -63,7 +64,7 @@ impl<'a> Header<'a> {
             if c == '\'' && characters.next_if_eq(&'\'').is_none() {
                 break;
             }
-            text.push(c);
+            text.push(if c.is_control() { ' ' } else { c });
         }
         text.truncate(text.trim_end().len());
         Some(text)
@@ -171,12 +172,14 @@ mod tests {
             "VALUE   =            -1.25D+02 / c",
             "COUNT   =                  17",
             "EMPTY   =",
+            "SOURCE  = 'a\u{1b}[31m\nb'",
             "END",
         ]);
         let (header, start) = Header::read(&bytes, 0).unwrap();
         assert_eq!(start, BLOCK);
         assert!(header.is_true("SIMPLE"));
         assert_eq!(header.text("OBJECT").as_deref(), Some("M'87"));
+        assert_eq!(header.text("SOURCE").as_deref(), Some("a [31m b"));
         assert_eq!(header.number("VALUE"), Ok(Some(-125.0)));
         assert_eq!(header.integer("COUNT"), Ok(Some(17)));
         assert_eq!(header.number("NOTHING"), Ok(None));

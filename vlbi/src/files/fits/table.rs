@@ -57,13 +57,14 @@ impl<'a> Table<'a> {
         self.columns.iter().find(|column| column.name == name)
     }
 
-    /// Text of a column of characters, without what follows a NUL or trailing blanks.
+    /// Text of a column of characters, without what follows a NUL or trailing blanks. Control characters, which the
+    /// standard does not allow, are blanks.
     pub fn text(&self, row: usize, name: &str) -> Option<String> {
         let column = self.column(name).filter(|column| column.code == 'A')?;
         let start = row * self.row_size + column.offset;
         let cell = self.data.get(start..start + column.repeat)?;
         let cell = cell.split(|byte| *byte == 0).next()?;
-        Some(String::from_utf8_lossy(cell).trim().to_owned())
+        Some(String::from_utf8_lossy(cell).replace(char::is_control, " ").trim().to_owned())
     }
 
     /// Value `index` of a cell as a number.
