@@ -3,7 +3,7 @@
 use super::cell::{Cell, area};
 use super::cell_map::CellMap;
 use super::light::Light;
-use super::{DEEPEST, HIDDEN};
+use super::{DEEPEST, EDGE, HIDDEN};
 use crate::picture::pixels::Pixel;
 
 /// A pixel that has got as many samples, of a ray each or of several along photon rings, gets no more.
@@ -18,6 +18,8 @@ pub(super) struct Cut {
     pub(super) cells: Vec<Cell>,
     /// Largest intensity of its rays and its neighbours' first ones.
     pub(super) bright: f64,
+    /// Whether a neighbour's first ray sees another piece of the picture.
+    pub(super) edge: bool,
     /// The brightest light of the disc, where edges of it are near.
     pub(super) disc: f64,
     /// The first rays of its neighbours, row by row, its own in the middle.
@@ -35,7 +37,7 @@ impl Cut {
     pub(super) fn whole(
         pixel: usize,
         [column, row]: [usize; 2],
-        [bright, disc]: [f64; 2],
+        ([bright, disc], edge): ([f64; 2], bool),
         around: [Light; 9],
     ) -> Self {
         let (cells, contrast) = (Vec::new(), 0.0);
@@ -46,6 +48,7 @@ impl Cut {
             row,
             cells,
             bright,
+            edge,
             disc,
             around,
             contrast,
@@ -112,8 +115,9 @@ impl Cut {
         contrast
     }
 
-    /// The cells to be cut next, the worst ones, moved to the end; how many.
+    /// The cells to be cut next, the worst ones, moved to the end; how many. `tolerance` is that of a smooth pixel.
     pub(super) fn worst(&mut self, tolerance: f64) -> usize {
+        let tolerance = if self.edge { EDGE * tolerance } else { tolerance };
         self.find_seams();
         if self.error() <= tolerance || self.samples >= MOST_SAMPLES {
             return 0;

@@ -33,6 +33,10 @@ const DEEPEST: u32 = 6;
 /// The light between two lensing bands that no ray has met, in terms of what is around.
 const HIDDEN: f64 = 1.0 / 16.0;
 
+/// By how many times as much as a smooth pixel one with an edge may be off: it takes so many more rays that each of them
+/// gains less.
+const EDGE: f64 = 8.0;
+
 /// What is seen, through which pixels, and by how much each may be off.
 pub(super) struct Adaptive<'a> {
     pub prepared: &'a PreparedScene,
@@ -187,7 +191,8 @@ impl Adaptive<'_> {
                     rings.is_some_and(|rings| rings.count(square) > 0)
                 };
                 if contrast.is_some() || error > tolerance || ring() {
-                    cuts.push(Cut::whole(pixels.len(), [column, row], [bright, disc], around));
+                    let light = ([bright, disc], contrast.is_some());
+                    cuts.push(Cut::whole(pixels.len(), [column, row], light, around));
                 }
                 pixels.push(Pixel { missed, ..of_one_ray(center, error) });
             }

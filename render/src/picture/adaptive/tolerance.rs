@@ -1,6 +1,6 @@
 //! What single pixels may be off by so that the picture is not off by more than asked.
 
-use super::Adaptive;
+use super::{Adaptive, EDGE};
 use crate::Error;
 use crate::picture::grid::Grid;
 use crate::picture::workspace::Workspace;
@@ -16,7 +16,7 @@ const COARSE: usize = 128;
 /// The error that each pixel may have so that the whole picture's relative L1 error stays below
 /// `image_error`, from a picture of the same field with at most [`COARSE`] pixels a side.
 ///
-/// From its pixels to k² smaller ones each, the error of smooth ones falls as k^−2; where an edge
+/// Pixels with an edge may be off by [`EDGE`] times as much. From its pixels to k² smaller ones each, the error of smooth ones falls as k^−2; where an edge
 /// runs through, k of them have it, with the same error.
 pub(in crate::picture) fn tolerance(
     prepared: &PreparedScene,
@@ -38,7 +38,7 @@ pub(in crate::picture) fn tolerance(
         errors.extend(pixels.iter().map(|pixel| (pixel.error / (k * k), k * k)));
         // Those that are to be cut in any case are the ones with an edge.
         for cut in cuts {
-            errors[cut.pixel] = (pixels[cut.pixel].error, k);
+            errors[cut.pixel] = (pixels[cut.pixel].error / EDGE, EDGE * k);
         }
         let sum: f64 = pixels.iter().map(|pixel| (pixel.intensity + pixel.missed) * k * k).sum();
         Ok((errors, sum))
