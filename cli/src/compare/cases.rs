@@ -2,10 +2,9 @@
 
 use super::experiment::Experiment;
 use super::labels::called;
-use super::recipe::Recipe;
+use super::recipe::{Choice, Recipe};
 use super::source::Source;
 use anyhow::{anyhow, bail};
-use kerrlight_tomo::representation::Registry;
 use std::collections::HashSet;
 use std::sync::Arc;
 use toml::Table;
@@ -28,33 +27,6 @@ pub enum Status<R = serde_json::Value> {
     Failed(String),
     /// It has not been run, or was interrupted.
     Open,
-}
-
-/// Which cases are run, and how.
-#[derive(Clone, Default)]
-pub struct Choice {
-    /// Seeds, in place of the experiment's.
-    pub seeds: Option<u64>,
-    /// `factor=level` that are kept.
-    pub only: Vec<String>,
-    /// Whether the experiment's quick settings are used.
-    pub quick: bool,
-    /// `key=value` for all cases.
-    pub set: Vec<String>,
-    /// Representations that the program adds.
-    pub registry: Registry,
-}
-
-impl Choice {
-    /// Whether some cases are left out.
-    pub fn is_restricted(&self) -> bool {
-        self.seeds.is_some() || !self.only.is_empty()
-    }
-
-    /// All cases, with the same settings.
-    pub fn unrestricted(&self) -> Self {
-        Self { seeds: None, only: Vec::new(), ..self.clone() }
-    }
 }
 
 impl Case {

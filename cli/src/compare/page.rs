@@ -1,7 +1,8 @@
 //! What a comparison leaves: results, tables, pictures and one page of them.
 
-use super::cases::{Case, Choice, Status};
+use super::cases::{Case, Status};
 use super::experiment::Experiment;
+use super::recipe::Choice;
 use super::runner::Runner;
 use super::summary::Summary;
 use super::{changes, figures, quick, ran, tables, verdicts};

@@ -1,17 +1,44 @@
 //! What settings of cases are made of. They are made when they are wanted: those of a hundred thousand cases would fill
 //! the memory, and to check each of them would take minutes.
 
-use super::cases::Choice;
 use super::experiment::{Experiment, Factor, Level};
 use super::source::Source;
 use crate::fit;
 use crate::paths;
 use anyhow::{Context, anyhow, bail};
 use kerrlight_tomo::fit::settings::merge;
+use kerrlight_tomo::representation::Registry;
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use toml::{Table, Value};
+
+/// Which cases are run, and how.
+#[derive(Clone, Default)]
+pub struct Choice {
+    /// Seeds, in place of the experiment's.
+    pub seeds: Option<u64>,
+    /// `factor=level` that are kept.
+    pub only: Vec<String>,
+    /// Whether the experiment's quick settings are used.
+    pub quick: bool,
+    /// `key=value` for all cases.
+    pub set: Vec<String>,
+    /// Representations that the program adds.
+    pub registry: Registry,
+}
+
+impl Choice {
+    /// Whether some cases are left out.
+    pub fn is_restricted(&self) -> bool {
+        self.seeds.is_some() || !self.only.is_empty()
+    }
+
+    /// All cases, with the same settings.
+    pub fn unrestricted(&self) -> Self {
+        Self { seeds: None, only: Vec::new(), ..self.clone() }
+    }
+}
 
 /// What the settings of all cases are made of.
 pub struct Recipe {

@@ -1,10 +1,12 @@
 //! What is said of a world that was found: lines, sentences, and distances from a known one.
 
-use super::world_search::ALIKE;
 use super::{labels, world_scan};
 use kerrlight_tomo::fit::verdict::EXCESS;
 use kerrlight_tomo::fit::world::Parameter;
 use serde_json::{Value, json};
+
+/// χ²/2 above the best below which a search is taken to have ended at the same world, however few the data are.
+pub const ALIKE: f64 = 3.0;
 
 /// χ²/N with digits that tell.
 fn reduced(chi2: f64) -> String {

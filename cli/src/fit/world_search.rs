@@ -173,9 +173,6 @@ fn true_world(file: &FitFile, measured: &Measured) -> anyhow::Result<Option<Worl
     Ok(measured.truth.as_ref().map(|_| setup::true_world(file)).transpose()?)
 }
 
-/// χ²/2 above the best below which a search is taken to have ended at the same world, however few the data are.
-pub const ALIKE: f64 = 3.0;
-
 /// Whether a search ended where the best one did: within 1.5 of each parameter's scale, the width of a first population,
 /// and with χ²/2 above the best by no more than its scatter by chance, √(N/2) for N data.
 fn is_same(free: &[Free], trial: &Trial, trials: &[Trial]) -> bool {
@@ -187,7 +184,7 @@ fn is_same(free: &[Free], trial: &Trial, trials: &[Trial]) -> bool {
             let apart = parameter.difference(trial.end.get(*parameter), best.end.get(*parameter));
             apart.abs() < 1.5 * parameter.scale()
         };
-        above <= (0.5 * data).sqrt().max(ALIKE) && free.iter().all(is_near)
+        above <= (0.5 * data).sqrt().max(world_results::ALIKE) && free.iter().all(is_near)
     })
 }
 

@@ -6,6 +6,7 @@
 mod evidence;
 mod expected;
 mod fields;
+mod found;
 mod pictured;
 mod problem;
 mod progress;
@@ -18,10 +19,10 @@ mod words;
 
 pub use evidence::{Compared, Evidence, Judged};
 pub use fields::{carried, compare, recovered, recovered_at, true_volume, true_volume_at};
+pub use found::{Choice, Found, FoundAxis, Searched, Stage};
 pub use problem::Problem;
 pub use progress::{At, Event, Now, Progress, Resumed, Silent};
-pub use search::{Choice, Found, Placed, Searched, Stage, settled};
-pub use start::FoundAxis;
+pub use search::{Placed, settled};
 pub use words::{range_of, short};
 
 use crate::Error;

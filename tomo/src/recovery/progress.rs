@@ -1,7 +1,6 @@
 //! What a fit tells while it runs, and what it keeps.
 
-use super::search::{Choice, Found, Stage};
-use super::start::FoundAxis;
+use super::found::{Choice, Found, FoundAxis, Stage};
 use crate::Error;
 use crate::fit::journal::{Forgetful, Journal};
 use crate::fit::linear::{LinearProgress, LinearSolution};

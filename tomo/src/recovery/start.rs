@@ -1,13 +1,12 @@
 //! What a fit starts from: an axis, the solution of a linear problem, leakage.
 
+use super::found::FoundAxis;
 use super::progress::{At, Event, Progress};
 use super::search::weighed;
 use super::{Fit, Stopped};
 use crate::Error;
 use crate::fit::linear::{Change, Ending, LinearProgress, LinearSolution, Voxels};
-use crate::fit::scan::{
-    AxisLoss, AxisProblem, AxisScan, AxisSettings, Effort, refine_axis, scan_axis,
-};
+use crate::fit::scan::{AxisLoss, AxisProblem, AxisSettings, Effort, refine_axis, scan_axis};
 use crate::fit::settings::{AxisScan as AxisScanSettings, AxisSearch, FitFile, Kind, Start};
 use crate::fit::setup::{self, CoarseView, Given, HeldData, Measured, SolvedLeakage};
 use crate::fit::{Batch, Beside, Field, Motion, State, Trainer};
@@ -15,22 +14,6 @@ use crate::representation::{Representation, Workspace};
 use core::ops::ControlFlow;
 use kerrlight_render::dynamics::Axis;
 use std::sync::{Mutex, PoisonError};
-
-/// The axis that a scan has found.
-#[derive(Clone, Debug)]
-pub struct FoundAxis {
-    /// On the whole sphere.
-    pub scan: AxisScan,
-    /// Near the best one, with a finer grid.
-    pub refined: Option<AxisLoss>,
-}
-
-impl FoundAxis {
-    /// The best axis.
-    pub fn axis(&self) -> Axis {
-        self.refined.unwrap_or(self.scan.best).axis
-    }
-}
 
 /// First step of the refinement: half of what lattice points of 200 are apart by, and its halvings.
 const STEP: f64 = 0.06;

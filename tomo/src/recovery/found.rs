@@ -1,0 +1,110 @@
+//! What searches find, and what of it a fit goes on with.
+
+use super::problem::Problem;
+use crate::fit::FluxDatum;
+use crate::fit::scan::{AxisLoss, AxisScan};
+use crate::fit::settings::{FitFile, UnknownWorld};
+use crate::fit::setup::{self, BandScan, FoundWorld, Held, Rotation};
+use crate::fit::world::World;
+use kerrlight_render::dynamics::Axis;
+
+/// What is looked for before the emission is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Stage {
+    /// The parameters of the world that are not known.
+    World,
+    /// The same, by the light curve of a flare in an orbital band.
+    Band,
+    /// A rotation of all position angles.
+    Rotation,
+    /// A weight, by data that are held out.
+    Weight,
+}
+
+/// What a search has found.
+#[derive(Clone, Copy)]
+#[non_exhaustive]
+pub enum Found<'a> {
+    /// The world, of these settings and data.
+    World(&'a Problem, &'a UnknownWorld, &'a FoundWorld),
+    /// Worlds and bands.
+    Band(&'a Problem, &'a BandScan),
+    /// A rotation.
+    Rotation(&'a Problem, &'a Rotation),
+    /// Values of a weight.
+    Weight(&'a FitFile, &'a [Held]),
+}
+
+/// What a search has found, of its own.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum Searched {
+    /// The world, with its errors.
+    World(Box<FoundWorld>),
+    /// Worlds and bands, with their probabilities.
+    Band(BandScan),
+    /// A rotation.
+    Rotation(Rotation),
+}
+
+/// What of it the rest of the fit goes on with.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Choice {
+    /// The world.
+    World(World),
+    /// The best band.
+    Band {
+        /// Degrees.
+        inclination_deg: f64,
+        /// Degrees east of north.
+        position_angle_deg: f64,
+        /// Of the angular velocity.
+        rotation_factor: f64,
+        /// What the background is expected to be, Jy with its standard deviation.
+        background: Option<Vec<FluxDatum>>,
+    },
+    /// Degrees.
+    Rotation(f64),
+    /// Dimensionless, in the unit of its setting.
+    Weight(f64),
+}
+
+impl Found<'_> {
+    /// What the fit goes on with.
+    pub fn choice(&self) -> Choice {
+        match self {
+            Found::World(_, _, found) => Choice::World(found.world),
+            Found::Band(_, scan) => {
+                let best = &scan.worlds[scan.best];
+                Choice::Band {
+                    inclination_deg: best.inclination_deg,
+                    position_angle_deg: best.position_angle_deg,
+                    rotation_factor: best.rotation_factor,
+                    background: scan.background.clone(),
+                }
+            }
+            Found::Rotation(_, rotation) => Choice::Rotation(rotation.angle_deg),
+            Found::Weight(_, held) => {
+                Choice::Weight(setup::best_held(held).map_or(f64::NAN, |best| best.value))
+            }
+        }
+    }
+}
+
+/// The axis that a scan has found.
+#[derive(Clone, Debug)]
+pub struct FoundAxis {
+    /// On the whole sphere.
+    pub scan: AxisScan,
+    /// Near the best one, with a finer grid.
+    pub refined: Option<AxisLoss>,
+}
+
+impl FoundAxis {
+    /// The best axis.
+    pub fn axis(&self) -> Axis {
+        self.refined.unwrap_or(self.scan.best).axis
+    }
+}
