@@ -10,7 +10,7 @@ use anyhow::Context;
 use kerrlight_tomo::fit::settings::{DataFiles, FitFile, Loss, LossKind, Noise};
 use kerrlight_tomo::fit::setup::Measured;
 use kerrlight_tomo::fit::verdict::{
-    Errors, Outcome, Statistics, Tested, Verdict, ZeroSpacing, judge, worst,
+    Errors, Expected, Outcome, Statistics, Tested, Verdict, ZeroSpacing, judge, worst,
 };
 use kerrlight_tomo::frames::Frames;
 use kerrlight_tomo::interferometry::products::debiased_amplitude;
@@ -24,6 +24,8 @@ pub struct Judged {
     pub terms: Vec<(String, Tested)>,
     /// Flux at zero spacing, where short baselines have measured it.
     pub flux: Option<ZeroSpacing>,
+    /// Whether a model that lacks it is at fault.
+    flux_counts: bool,
     /// Names of the stations.
     stations: Vec<String>,
     /// Times of the frames: M; hours of UTC of a static image.
@@ -114,14 +116,15 @@ impl Evidence<'_> {
         let knows_flux =
             |loss: &Loss| loss.data.is_visibilities() || loss.data == LossKind::Amplitudes;
         // Gains that are free may be what is missing.
-        let knows = self.measured.gains.is_none() && self.losses.iter().any(knows_flux);
-        let judged = flux.filter(|_| knows);
+        let flux_counts = self.measured.gains.is_none() && self.losses.iter().any(knows_flux);
+        let judged = flux.filter(|_| flux_counts);
         let observation = self.measured.visibilities.as_ref().map(|(observation, _)| observation);
         let stations = observation.map(|o| o.stations.iter().map(|s| s.name.clone()).collect());
         Ok(Judged {
             verdict: judge(&tested, judged),
             terms,
             flux,
+            flux_counts,
             stations: stations.unwrap_or_default(),
             times: self.measured.times.clone(),
             is_static: self.file.is_none(),
@@ -156,6 +159,19 @@ impl Evidence<'_> {
 }
 
 impl Judged {
+    /// Judges once more with what fits of the same model to other noise leave of each kind of data: mean and standard deviation
+    /// of χ² per datum. `count` is how many fits these are.
+    pub fn expect(&mut self, drawn: &[[f64; 2]], count: usize) {
+        // The mean is as uncertain as its fits are few.
+        let beyond = (1.0 + 1.0 / count.max(1) as f64).sqrt();
+        for ((_, tested), [mean, deviation]) in self.terms.iter_mut().zip(drawn) {
+            let Expected { chi2, spread, .. } = &mut tested.expected;
+            (*chi2, *spread) = (*mean, spread.max(beyond * deviation));
+        }
+        let tested: Vec<Tested> = self.terms.iter().map(|(_, tested)| tested.clone()).collect();
+        self.verdict = judge(&tested, self.flux.filter(|_| self.flux_counts));
+    }
+
     /// For results.json.
     pub fn json(&self) -> Value {
         let outcome = match self.verdict.outcome {

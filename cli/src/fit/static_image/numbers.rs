@@ -3,7 +3,7 @@
 use super::Found;
 use crate::fit::closures;
 use crate::usage::usage;
-use kerrlight_tomo::fit::static_image::{Candidate, Ring, Survey};
+use kerrlight_tomo::fit::static_image::{Candidate, Ring, ShapeFit, Survey};
 use serde_json::{Map, Value, json};
 
 /// A number of a ring.
@@ -114,12 +114,27 @@ impl Found<'_> {
         if let Some(polarized) = &self.polarized {
             polarized.add_to(&mut results);
         }
+        let shape = |fit: &ShapeFit| {
+            let sizes: Map<String, Value> = (fit.sizes.iter())
+                .map(|(name, value, _)| ((*name).to_owned(), json!(value)))
+                .collect();
+            json!({
+                "shape": fit.shape.name(),
+                "sizes": sizes,
+                "flux_jy": fit.flux_jy,
+                "chi2_per_datum": fit.chi2,
+                "criterion": fit.criterion,
+            })
+        };
+        results["shapes"] = self.shapes.iter().map(shape).collect();
+        let [with, all] = self.survey.with_ring();
+        results["images_with_ring"] = json!({"count": with, "of": all});
         self.add_ring(&mut results);
         results
     }
 
     fn add_ring(&self, results: &mut Value) {
-        let Some(ring) = &self.survey.found().ring else { return };
+        let Some(ring) = &self.ring() else { return };
         for (name, number) in RING {
             results[name] = json!(number(ring));
             results[format!("{name}_error")] = json!(error(&self.survey, name, number));

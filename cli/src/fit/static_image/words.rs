@@ -7,20 +7,54 @@ use crate::fit::closures;
 use crate::fit::results::medium;
 use crate::report::Part;
 use kerrlight_tomo::fit::settings::{Loss, StartImage};
-use kerrlight_tomo::fit::static_image::Survey;
+use kerrlight_tomo::fit::static_image::{ShapeFit, Survey};
 
-/// The ring in a sentence.
-pub fn ring(survey: &Survey) -> Option<String> {
+/// The ring in a sentence: its numbers where one is claimed, and why none is where the image has one.
+pub fn ring(survey: &Survey, shapes: &[ShapeFit]) -> Option<String> {
     let ring = survey.found().ring?;
+    if let Some(doubt) = doubt(survey, shapes) {
+        return Some(format!("The image looks like a ring, but {doubt}: no ring is claimed."));
+    }
     let [diameter, width, angle, ..] =
         RING.map(|(name, number)| (number(&ring), error(survey, name, number)));
+    let [with, all] = survey.with_ring();
+    let others = match with == all {
+        true => String::new(),
+        false => format!(" {with} of {all} images that the data allow have one."),
+    };
     Some(format!(
-        "The image has a ring of {} µas, {} µas wide, brightest at {}° east of north.",
+        "The image has a ring of {} µas, {} µas wide, brightest at {}° east of north.{others}",
         with_error(diameter.0, diameter.1, 1),
         with_error(width.0, width.1, 1),
         with_error(angle.0, angle.1, 0)
     ))
 }
+
+/// Why the ring of an image is not claimed: other images that the data allow have none, or a shape without a hole fits better
+/// than a ring and a crescent.
+pub fn doubt(survey: &Survey, shapes: &[ShapeFit]) -> Option<String> {
+    let [with, all] = survey.with_ring();
+    if (with as f64) < LEAST_AGREEMENT * all as f64 {
+        return Some(format!("{with} of {all} images that the data allow have one"));
+    }
+    let least = |is_ring: bool| {
+        let kind = shapes.iter().filter(|fit| fit.shape.is_ring() == is_ring);
+        kind.min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+    };
+    let (ring, other) = (least(true)?, least(false)?);
+    (other.criterion < ring.criterion).then(|| {
+        format!(
+            "a {} fits the data better than a {} (χ² with a penalty on parameters {:.0} and {:.0})",
+            other.shape.name(),
+            ring.shape.name(),
+            other.criterion,
+            ring.criterion
+        )
+    })
+}
+
+/// Part of the images that the data allow which have to have a ring.
+const LEAST_AGREEMENT: f64 = 0.8;
 
 /// What fits of the image with other noise leave: an image and gains take up a part of the noise of the data.
 pub fn draws(survey: &Survey, losses: &[Loss]) -> Option<String> {
@@ -141,7 +175,8 @@ impl Found<'_> {
         for (name, chi2) in &self.beside {
             text.push(format!("χ² {chi2:.2} per data point of {name}, which were not fitted."));
         }
-        text.extend(ring(&self.survey));
+        text.extend(ring(&self.survey, &self.shapes));
+        text.push(shapes_beside(&self.shapes));
         if self.file.ring.is_some() && self.survey.found().ring.is_none() {
             text.push("The image has no ring between the radii that were asked for.".to_owned());
         }
@@ -172,6 +207,18 @@ impl Found<'_> {
         }
         text
     }
+}
+
+/// Simple shapes in a sentence, the one that fits best first.
+fn shapes_beside(shapes: &[ShapeFit]) -> String {
+    let mut all: Vec<&ShapeFit> = shapes.iter().collect();
+    all.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    let one = |fit: &&ShapeFit| format!("{} {:.0}", fit.shape.name(), fit.criterion);
+    let all: Vec<String> = all.iter().map(one).collect();
+    format!(
+        "Simple shapes with the same gains, by χ² with a penalty on their parameters, the least first: {}.",
+        all.join(", ")
+    )
 }
 
 fn start(start: StartImage) -> String {

@@ -50,9 +50,9 @@ pub struct Candidate {
 /// What came out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
-    /// Strengths with the loss of frames that were held out.
+    /// Strengths with the loss of frames that were held out, of fits that came to a minimum.
     pub held: Vec<Held>,
-    /// The strength: the one that predicts held-out frames best.
+    /// The strength: the largest that predicts held-out frames as well as the best within a standard error.
     pub strength: f64,
     /// Images from all starts, in their order.
     pub starts: Vec<Candidate>,
@@ -91,22 +91,24 @@ impl Survey {
         self.starts.iter().filter(as_good).chain(&self.strengths)
     }
 
+    /// How many of the draws, and of the images that data do not tell from the best, have a ring, and how many these are.
+    pub fn with_ring(&self) -> [usize; 2] {
+        let all = || self.draws.iter().chain(self.alternatives());
+        [all().filter(|image| image.ring.is_some()).count(), all().count()]
+    }
+
     /// Error of a number of the ring: root mean square distance of the draws from it, and of the images that data do not tell
-    /// from it, added in quadrature; none without draws, or where one of the images has no ring.
+    /// from it, added in quadrature, over those that have a ring; none with less than two such draws.
     pub fn ring_error(&self, number: impl Fn(&Ring) -> f64) -> Option<f64> {
-        let all = |images: &mut dyn Iterator<Item = &Candidate>| -> Option<Vec<f64>> {
-            images.map(|image| image.ring.as_ref().map(&number)).collect()
-        };
         let here = number(self.found().ring.as_ref()?);
-        let square = |values: &[f64]| {
-            values.iter().map(|x| (x - here).powi(2)).sum::<f64>() / values.len() as f64
+        let square = |images: &mut dyn Iterator<Item = &Candidate>| -> (f64, usize) {
+            let rings = images.filter_map(|image| image.ring.as_ref());
+            let apart: Vec<f64> = rings.map(|ring| (number(ring) - here).powi(2)).collect();
+            (apart.iter().sum::<f64>() / apart.len().max(1) as f64, apart.len())
         };
-        let draws = all(&mut self.draws.iter())?;
-        let others = all(&mut self.alternatives())?;
-        if draws.len() < 2 {
-            return None;
-        }
-        Some((square(&draws) + square(&others)).sqrt())
+        let (draws, count) = square(&mut self.draws.iter());
+        let (others, _) = square(&mut self.alternatives());
+        (count >= 2).then(|| (draws + others).sqrt())
     }
 }
 
@@ -129,7 +131,10 @@ pub fn survey(
     let Some(starts) = search.starts(middle, &frames) else { return Ok(None) };
     let Some(held) = search.hold_out(least(&starts), &measured.times) else { return Ok(None) };
     let allowed = allowed(&held);
-    let strength = best_held(&held).map_or(1.0, |best| best.value);
+    let strength = match held.is_empty() {
+        true => middle,
+        false => allowed.last().copied().unwrap_or(middle),
+    };
     let starts = match strength == middle {
         true => Some(starts),
         false => search.starts(strength, &frames),
@@ -156,6 +161,23 @@ pub(super) fn allowed(held: &[Held]) -> Vec<f64> {
     let mut values: Vec<f64> = held.iter().filter(good).map(|held| held.value).collect();
     values.sort_by(f64::total_cmp);
     values
+}
+
+/// Without strengths of which fewer than half of the parts are known, then without parts that are not known of all others: NaN
+/// stands for a fit that did not come to a minimum, which says nothing. Nothing is left where fewer than two parts are.
+fn voting(mut held: Vec<Held>) -> Vec<Held> {
+    let known = |held: &Held| held.losses.iter().filter(|loss| loss.is_finite()).count();
+    held.retain(|one| 2 * known(one) >= one.losses.len());
+    let parts = held.first().map_or(0, |one| one.losses.len());
+    let votes = |part: &usize| held.iter().all(|one| one.losses[*part].is_finite());
+    let kept: Vec<usize> = (0..parts).filter(votes).collect();
+    if kept.len() < 2 {
+        return Vec::new();
+    }
+    for one in &mut held {
+        one.losses = kept.iter().map(|part| one.losses[*part]).collect();
+    }
+    held
 }
 
 /// What `loss` says of each strength and each part of the frames; none if it says nothing of one.
@@ -259,9 +281,13 @@ impl Search<'_> {
         held(settings, |strength, fold| {
             let found =
                 self.solved(Stage::HeldOut, (start, strength), &part(fold, true), self.flux())?;
+            if !found.solution.has_converged {
+                return Some(f64::NAN);
+            }
             let unseen = self.problem(strength, &part(fold, false), self.flux());
             Some(unseen.misfit(&found.solution.image))
         })
+        .map(voting)
     }
 
     /// Images of the measurement of the best image with other noise, and of a flux drawn from its prior, each from the best
@@ -298,6 +324,24 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// One fit of four that ended early takes its part from all strengths; a strength of which most did says nothing.
+    #[test]
+    fn exact_fits_without_a_minimum_do_not_vote() {
+        let held = |value, losses: [f64; 4]| Held { value, losses: losses.to_vec() };
+        let n = f64::NAN;
+        let all = vec![
+            held(1.0, [n, n, 3.0, n]),
+            held(3.0, [n, 2.0, 3.0, 4.0]),
+            held(9.0, [406.0, 2.5, 3.5, 4.5]),
+        ];
+        let left = voting(all);
+        assert_eq!(left.iter().map(|one| one.value).collect::<Vec<_>>(), [3.0, 9.0]);
+        assert_eq!(left[0].losses, [2.0, 3.0, 4.0]);
+        assert_eq!(left[1].losses, [2.5, 3.5, 4.5]);
+        assert!(voting(vec![held(1.0, [n, n, 3.0, 4.0]), held(3.0, [n, n, n, 4.0])]).len() == 1);
+        assert!(voting(vec![held(1.0, [n, 2.0, n, n])]).is_empty());
+    }
 
     #[test]
     fn exact_scans_are_held_out_whole() {
