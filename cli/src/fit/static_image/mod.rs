@@ -22,7 +22,7 @@ use kerrlight_tomo::fit::FrameTerm;
 use kerrlight_tomo::fit::settings::{Loss, LossKind, StaticImageFile, StrengthSettings};
 use kerrlight_tomo::fit::setup::Measured;
 use kerrlight_tomo::fit::static_image::{
-    PolarizedSurvey, Ring, ShapeFit, Stage, Survey, fit_shapes, survey, survey_polarized,
+    PolarizedSurvey, Ring, Shape, ShapeFit, Stage, Survey, fit_shapes, survey, survey_polarized,
 };
 use kerrlight_tomo::fit::verdict::{Statistics, Tested};
 use kerrlight_tomo::frames::Frames;
@@ -97,8 +97,19 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
     judged.expect(&numbers::chi2_of_draws(&survey), survey.draws.len());
     let gains = Gains::beside(&evidence, &movie, folder)?;
     let beside = beside(file, measured, &survey);
-    let found =
-        Found { file, measured, folder, survey, shapes, movie, judged, gains, polarized, beside, begun };
+    let found = Found {
+        file,
+        measured,
+        folder,
+        survey,
+        shapes,
+        movie,
+        judged,
+        gains,
+        polarized,
+        beside,
+        begun,
+    };
     found.images()?;
     let results = found.results();
     folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
@@ -147,7 +158,8 @@ fn searched(
     let values = |s: &Option<StrengthSettings>| s.as_ref().map_or(0, |s| s.values.len() * s.folds);
     let draws = file.image.draws.unwrap_or(0);
     let of_polarized = file.polarization.as_ref().map_or(0, |p| values(&p.strength) + 1 + draws);
-    let all = file.image.starts.len() + values(&file.strength) + draws + of_polarized;
+    let all =
+        file.image.starts.len() + Shape::ALL.len() + values(&file.strength) + draws + of_polarized;
     let keeper = Keeper::brief(STOPPED);
     let bar = progress::held_out(all as u64);
     let done = AtomicU64::new(0);
@@ -164,8 +176,8 @@ fn searched(
         !keeper.stopped()
     };
     let stopped = || Interrupted(STOPPED.to_owned());
-    let found = survey(file, measured, &watch)?.ok_or_else(stopped)?;
     let shapes = fit_shapes(file, measured, &|| !keeper.stopped())?.ok_or_else(stopped)?;
+    let found = survey(file, measured, &shapes, &watch)?.ok_or_else(stopped)?;
     let of_polarized = match polarized {
         None => None,
         Some(measured) => {

@@ -126,7 +126,7 @@ impl Found<'_> {
             title: "Held-out frames".to_owned(),
             caption: "Weighted χ² per data point of frames that were not fitted, against the factor on all penalties; bars are \
                       standard errors of the difference from the best. Too weak penalties fit noise, too strong ones cannot \
-                      fit the data. The least is taken."
+                      fit the data. The largest within a standard error of the least is taken."
                 .to_owned(),
             x: Axis { label: "factor on the penalties".to_owned(), unit: String::new(), log: true },
             y: Axis { label: "loss of held-out data".to_owned(), unit: String::new(), log: false },
@@ -146,7 +146,8 @@ impl Found<'_> {
         let numbers =
             |chi2: &[f64]| chi2.iter().map(|chi2| format!("{chi2:.2}")).collect::<Vec<_>>();
         let shape = |fit: &ShapeFit| {
-            let sizes = fit.sizes.iter().map(|(name, value, unit)| format!("{name} {value:.1} {unit}"));
+            let sizes =
+                fit.sizes.iter().map(|(name, value, unit)| format!("{name} {value:.1} {unit}"));
             let sizes = sizes.collect::<Vec<_>>().join(", ");
             let head = [fit.shape.name().to_owned(), sizes, format!("{:.3}", fit.flux_jy)];
             [&head[..], &numbers(&fit.chi2)[..], &[format!("{:.0}", fit.criterion)]].concat()

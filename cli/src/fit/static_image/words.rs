@@ -123,7 +123,7 @@ impl Found<'_> {
                 image.flux_sigma_jy,
                 format_args!("{:.3}", self.survey.found().solution.image.iter().sum::<f64>())
             ),
-            format!("Starts: {}.", starts.join("; ")),
+            format!("Starts: {}; then the simple shapes that fit the data.", starts.join("; ")),
         ];
         let envelope = self.file.envelope.map(|envelope| {
             format!(
@@ -141,7 +141,7 @@ impl Found<'_> {
         }
         if !self.survey.held.is_empty() {
             text.push(format!(
-                "The factor is the one of {} that predicts frames best which were not fitted.",
+                "The factor is the largest of {} that predicts frames which were not fitted as well as the best, within a standard error.",
                 self.survey.held.len()
             ));
         }
@@ -203,7 +203,10 @@ impl Found<'_> {
         }
         text.extend(self.polarized.iter().flat_map(Polarized::not_concluded));
         if !self.survey.found().solution.has_converged {
-            text.push("The optimiser had not come to its end after image.iterations.".to_owned());
+            text.push(
+                "That this is the minimum: where the optimiser ended the loss still has a slope (image.iterations)."
+                    .to_owned(),
+            );
         }
         text
     }

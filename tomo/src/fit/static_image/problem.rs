@@ -77,9 +77,13 @@ impl ImageProblem<'_> {
         let (shares, _) = self.light(parameters);
         let floor = DARK / shares.len() as f64;
         let all = parameters.iter().zip(&shares);
-        let (bright, most) = all.fold((0.0, 0.0), |so_far: (f64, f64), (x, share)| {
-            if *share > so_far.1 { (*x, *share) } else { so_far }
-        });
+        let (bright, most) =
+            all.fold(
+                (0.0, 0.0),
+                |so_far: (f64, f64), (x, share)| {
+                    if *share > so_far.1 { (*x, *share) } else { so_far }
+                },
+            );
         let mut slope = gradient.last().map_or(0.0, |g| g.abs());
         for ((x, share), g) in parameters.iter_mut().zip(&shares).zip(gradient) {
             if *share < floor && *g < 0.0 {

@@ -131,9 +131,8 @@ impl Sky<'_> {
 
     /// Part of the directions whose brightest point between the radii is well above the centre and not far below the brightest.
     fn coverage(&self, centre: [f64; 2], central: f64) -> f64 {
-        let most = |angle: f64| {
-            self.radii.iter().map(|r| self.on(centre, angle, *r)).fold(0.0, f64::max)
-        };
+        let most =
+            |angle: f64| self.radii.iter().map(|r| self.on(centre, angle, *r)).fold(0.0, f64::max);
         let light: Vec<f64> = directions().map(most).collect();
         let brightest = light.iter().copied().fold(0.0, f64::max);
         let enough = (ABOVE_CENTRE * central).max(ABOVE_BRIGHTEST * brightest);

@@ -33,6 +33,8 @@ pub struct ShapeFit {
     pub shape: Shape,
     /// Its sizes: name, value, and unit.
     pub sizes: Vec<(&'static str, f64, &'static str)>,
+    /// Shares of the flux in the pixels.
+    pub shares: Vec<f64>,
     /// Its flux, Jy.
     pub flux_jy: f64,
     /// χ² per datum of each kind.
@@ -66,7 +68,8 @@ impl Shape {
     /// Parameters to start from for a source of this size, µas. Lengths are logarithms of µas, offsets are in sizes.
     fn starts(self, size: f64) -> Vec<Vec<f64>> {
         let l = size.ln();
-        let turns = |count: usize| (0..count).map(move |k| (TAU * k as f64 / count as f64).sin_cos());
+        let turns =
+            |count: usize| (0..count).map(move |k| (TAU * k as f64 / count as f64).sin_cos());
         let around = [0.75f64, 1.0, 1.35];
         match self {
             Self::Gaussian => vec![vec![l, 0.0, 0.0], vec![l - 0.5, 0.0, 0.0]],
@@ -75,9 +78,9 @@ impl Shape {
             Self::Crescent => turns(4)
                 .flat_map(|(s, c)| around.iter().map(move |f| vec![l + f.ln(), l - 1.0, s, c]))
                 .collect(),
-            Self::Double => turns(12)
-                .map(|(s, c)| vec![l - 0.7, l - 0.7, 0.4 * s, 0.4 * c, 0.2])
-                .collect(),
+            Self::Double => {
+                turns(12).map(|(s, c)| vec![l - 0.7, l - 0.7, 0.4 * s, 0.4 * c, 0.2]).collect()
+            }
         }
     }
 
@@ -223,6 +226,7 @@ fn best(
     Some(ShapeFit {
         shape,
         sizes: shape.sizes(&found.parameters[1..], size),
+        shares: shape.shares(&found.parameters[1..], size, grid),
         flux_jy: here.iter().sum(),
         chi2,
         criterion: total + found.parameters.len() as f64 * count.max(1.0).ln(),
@@ -231,12 +235,13 @@ fn best(
 
 /// χ² and number of the data that are not made of each other: log closure amplitudes repeat what amplitudes with gains say.
 fn independent(problem: &ImageProblem<'_>, file: &StaticImageFile, chi2: &[f64]) -> (f64, f64) {
-    let has_amplitudes = file.loss.iter().any(|loss| {
-        matches!(loss.data, LossKind::Amplitudes | LossKind::Visibilities)
-    });
+    let has_amplitudes = file
+        .loss
+        .iter()
+        .any(|loss| matches!(loss.data, LossKind::Amplitudes | LossKind::Visibilities));
     let repeats = |kind: LossKind| kind == LossKind::LogClosureAmplitudes && has_amplitudes;
     let kinds = file.loss.iter().zip(problem.counts()).zip(chi2);
-    kinds.filter(|((loss, _), _)| !repeats(loss.data)).fold((0.0, 0.0), |sum, ((_, n), chi2)| {
-        (sum.0 + chi2 * n as f64, sum.1 + n as f64)
-    })
+    kinds
+        .filter(|((loss, _), _)| !repeats(loss.data))
+        .fold((0.0, 0.0), |sum, ((_, n), chi2)| (sum.0 + chi2 * n as f64, sum.1 + n as f64))
 }

@@ -62,7 +62,6 @@ pub fn solve(
         let loss = problem.value_and_gradient(&parameters, &mut gradient);
         let slope = problem.raise(&mut parameters, &gradient);
         let has_converged = slope <= FLAT * loss;
-        if std::env::var("DBG").is_ok() { eprintln!("solve strength {} loss {loss:.6} slope {slope:.4} iterations {used} inner {} {:?}", problem.strength, found.iterations, problem.chi2(&image)); }
         let goes_on = least - loss > FALL * loss && used < iterations;
         if has_converged || !goes_on {
             return Some(Solution { parameters, image, loss, iterations: used, has_converged });
@@ -94,7 +93,8 @@ pub(super) fn minimum(
             Step::NoDescent | Step::NotFinite => break,
         }
         let before = losses.len().checked_sub(SPAN + 1).map(|k| losses[k]);
-        has_settled = before.is_some_and(|before| before - losses[losses.len() - 1] < FALL * before);
+        has_settled =
+            before.is_some_and(|before| before - losses[losses.len() - 1] < FALL * before);
     }
     let loss = state.value.unwrap_or(f64::NAN);
     let slope: f64 = state.numbers[..parameters.len()].iter().map(|g| g.abs()).sum();

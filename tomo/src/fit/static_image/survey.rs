@@ -3,7 +3,7 @@
 
 use super::solve::{Solution, solve};
 use super::start;
-use super::{FluxPrior, ImageProblem, Ring};
+use super::{FluxPrior, ImageProblem, Ring, ShapeFit};
 use crate::Error;
 use crate::fit::linear::Prior;
 use crate::fit::settings::{StaticImageFile, StrengthSettings};
@@ -112,20 +112,25 @@ impl Survey {
     }
 }
 
-/// Finds the image of measured visibilities; none if `watch` said no.
+/// Finds the image of measured visibilities, from the starts of the settings and then from shapes that fit the same data; none if
+/// `watch` said no.
 ///
 /// # Errors
 /// If a loss has no data.
 pub fn survey(
     file: &StaticImageFile,
     measured: &Measured,
+    shapes: &[ShapeFit],
     watch: &SurveyWatch<'_>,
 ) -> Result<Option<Survey>, Error> {
     let grid = file.image.grid()?;
     let terms = measured.visibility_terms(&file.loss, grid.pixels())?;
     let envelope =
         file.envelope.map(|envelope| (start::envelope(envelope.fwhm_uas, grid), envelope.weight));
-    let search = Search { file, grid, priors: file.priors()?, envelope, terms: &terms, watch };
+    let shapes = shapes.iter().map(|fit| start::shape(&fit.shares));
+    let begin = file.image.starts.iter().map(|start| start::image(*start, grid)).chain(shapes);
+    let (priors, begin) = (file.priors()?, begin.collect());
+    let search = Search { file, grid, priors, envelope, begin, terms: &terms, watch };
     let frames: Vec<usize> = (0..measured.times.len()).collect();
     let middle = file.strength.as_ref().map_or(1.0, |s| s.values[s.values.len() / 2]);
     let Some(starts) = search.starts(middle, &frames) else { return Ok(None) };
@@ -216,6 +221,8 @@ struct Search<'a> {
     grid: ImageGrid,
     priors: Vec<Prior>,
     envelope: Option<(Vec<f64>, f64)>,
+    /// Shares of the flux in the pixels, for each start.
+    begin: Vec<Vec<f64>>,
     terms: &'a [Weighted<dyn FrameTerm<f64>>],
     watch: &'a SurveyWatch<'a>,
 }
@@ -240,8 +247,7 @@ impl Search<'_> {
         flux: FluxPrior,
     ) -> Option<Candidate> {
         let problem = self.problem(strength, frames, flux);
-        let shares = start::image(self.file.image.starts[start], self.grid);
-        let begin = problem.parameters_of(&shares);
+        let begin = problem.parameters_of(&self.begin[start]);
         self.from(stage, &problem, &begin, start)
     }
 
@@ -267,7 +273,7 @@ impl Search<'_> {
 
     fn starts(&self, strength: f64, frames: &[usize]) -> Option<Vec<Candidate>> {
         let of = |k: usize| self.solved(Stage::Starts, (k, strength), frames, self.flux());
-        (0..self.file.image.starts.len()).into_par_iter().map(of).collect()
+        (0..self.begin.len()).into_par_iter().map(of).collect()
     }
 
     /// The loss of frames that were not fitted, for each strength; nothing where one is given.
