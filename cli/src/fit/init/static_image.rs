@@ -99,7 +99,9 @@ fn resolved_width(observation: &Observation, flux_jy: f64) -> Option<f64> {
     let width = |[count, lengths, power, variance]: &[f64; 4]| {
         let (power, variance, length) =
             (power / count, variance / (count * count), lengths / count);
-        let counts = (0.05 * longest..=0.5 * longest).contains(&length) && power > 9.0 * variance && power < flux_jy.powi(2);
+        let counts = (0.05 * longest..=0.5 * longest).contains(&length)
+            && power > 9.0 * variance
+            && power < flux_jy.powi(2);
         let fall = 0.5 * (flux_jy.powi(2) / power).ln();
         counts.then(|| (4.0 * LN_2 * fall).sqrt() / (PI * length) / MICROARCSECOND)
     };

@@ -146,13 +146,8 @@ impl Found<'_> {
         });
     }
 
-    /// Scatter of the flux over the draws.
+    /// Error of the flux, as of numbers of the ring.
     fn flux_error(&self) -> Option<f64> {
-        let fluxes: Vec<f64> =
-            self.survey.draws.iter().map(|draw| draw.solution.image.iter().sum()).collect();
-        let count = fluxes.len() as f64;
-        let mean = fluxes.iter().sum::<f64>() / count;
-        let square: f64 = fluxes.iter().map(|x| (x - mean).powi(2)).sum();
-        (fluxes.len() > 1).then(|| (square / (count - 1.0)).sqrt())
+        self.survey.error(|image| Some(image.solution.image.iter().sum()))
     }
 }

@@ -159,8 +159,8 @@ impl Found<'_> {
             return vec!["No draws were asked for: numbers have no errors.".to_owned()];
         }
         let mut text = vec![format!(
-            "Errors add in quadrature how far {draws} images of measurements of this image with other noise, and of a flux drawn \
-             from its prior, are from it (root mean square, what the method distorts included), and how far {others} images are \
+            "Errors add in quadrature how far {draws} images of measurements of this image with other noise, with a flux drawn from its \
+             prior, an envelope 10 % wider or narrower (one standard deviation), and starts and factors that are as good, are from it (root mean square, what the method distorts included), and how far {others} images are \
              that the data do not tell from the best: of other starts with a loss within 1 %, and of other factors that predict \
              held-out frames as well. The kind of penalty, the field and the size of pixels stay what they are: what they \
              decide is in no error."

@@ -97,13 +97,18 @@ impl Survey {
         [all().filter(|image| image.ring.is_some()).count(), all().count()]
     }
 
-    /// Error of a number of the ring: root mean square distance of the draws from it, and of the images that data do not tell
-    /// from it, added in quadrature, over those that have a ring; none with less than two such draws.
+    /// Error of a number of the ring: as [`error`](Self::error), over images that have a ring.
     pub fn ring_error(&self, number: impl Fn(&Ring) -> f64) -> Option<f64> {
-        let here = number(self.found().ring.as_ref()?);
+        self.error(|image| image.ring.as_ref().map(&number))
+    }
+
+    /// Error of a number of the image: root mean square distance of the draws from it, and of the images that data do not tell
+    /// from it, added in quadrature, over those that have the number; none with less than two such draws.
+    pub fn error(&self, number: impl Fn(&Candidate) -> Option<f64>) -> Option<f64> {
+        let here = number(self.found())?;
         let square = |images: &mut dyn Iterator<Item = &Candidate>| -> (f64, usize) {
-            let rings = images.filter_map(|image| image.ring.as_ref());
-            let apart: Vec<f64> = rings.map(|ring| (number(ring) - here).powi(2)).collect();
+            let apart: Vec<f64> =
+                images.filter_map(&number).map(|there| (there - here).powi(2)).collect();
             (apart.iter().sum::<f64>() / apart.len().max(1) as f64, apart.len())
         };
         let (draws, count) = square(&mut self.draws.iter());
@@ -146,10 +151,15 @@ pub fn survey(
     };
     let Some(starts) = starts else { return Ok(None) };
     let best = least(&starts);
-    let others: Vec<f64> = allowed.into_iter().filter(|value| *value != strength).collect();
+    let others: Vec<f64> = allowed.iter().copied().filter(|value| *value != strength).collect();
     let of = |value: &f64| search.solved(Stage::Strengths, (best, *value), &frames, search.flux());
     let Some(strengths) = others.par_iter().map(of).collect() else { return Ok(None) };
-    let draws = search.draws(measured, &starts[best], &frames)?;
+    let least = starts[best].solution.loss;
+    let good = starts.iter().filter(|start| start.solution.loss <= 1.01 * least).collect();
+    // The image's own strength first: it is the one that draws have where the data choose none.
+    let chosen = [strength].into_iter().chain(others).collect();
+    let others = Others { starts: good, strengths: chosen };
+    let draws = search.draws(measured, (&starts[best], &others), &frames)?;
     Ok(draws.map(|draws| Survey { held, strength, starts, best, strengths, draws }))
 }
 
@@ -296,35 +306,54 @@ impl Search<'_> {
         .map(voting)
     }
 
-    /// Images of the measurement of the best image with other noise, and of a flux drawn from its prior, each from the best
-    /// image.
+    /// Images of the measurement of the best image with other noise, with a flux and a width of the envelope drawn from their
+    /// priors, each from one of the starts that are as good, with one of the strengths that are.
     fn draws(
         &self,
         measured: &Measured,
-        best: &Candidate,
+        (best, others): (&Candidate, &Others<'_>),
         frames: &[usize],
     ) -> Result<Option<Vec<Candidate>>, Error> {
         let one = |k: usize| -> Result<Option<Candidate>, Error> {
             let seed = self.file.seed.wrapping_add(1 + k as u64);
             let drawn = measured.redrawn(&self.file.loss, &best.solution.image, seed)?;
             let terms = drawn.visibility_terms(&self.file.loss, self.grid.pixels())?;
-            let noise: f64 = Pcg64::seed_from_u64(seed).sample(StandardNormal);
+            let mut random = Pcg64::seed_from_u64(seed);
+            let [of_flux, of_width]: [f64; 2] = [(); 2].map(|()| random.sample(StandardNormal));
             let FluxPrior { jy, sigma_jy } = self.flux();
             // A flux below 0 is none: far from it for any prior that says something.
-            let flux = FluxPrior { jy: (jy + noise * sigma_jy).max(0.01 * jy), sigma_jy };
+            let flux = FluxPrior { jy: (jy + of_flux * sigma_jy).max(0.01 * jy), sigma_jy };
+            let envelope = self.file.envelope.map(|envelope| {
+                let width = envelope.fwhm_uas * (ENVELOPE_SPREAD * of_width).exp();
+                (start::envelope(width, self.grid), envelope.weight)
+            });
+            let envelope = envelope.as_ref().map(|(shares, weight)| (&shares[..], *weight));
+            let strength = others.strengths[k % others.strengths.len()];
             let problem =
-                ImageProblem { terms: &terms, ..self.problem(best.strength, frames, flux) };
-            let mut begin = best.solution.parameters.clone();
+                ImageProblem { terms: &terms, envelope, ..self.problem(strength, frames, flux) };
+            let start = others.starts[k % others.starts.len()];
+            let mut begin = start.solution.parameters.clone();
             if let Some(last) = begin.last_mut() {
                 *last += (jy / flux.jy).ln();
             }
-            Ok(self.from(Stage::Draws, &problem, &begin, best.start))
+            Ok(self.from(Stage::Draws, &problem, &begin, start.start))
         };
         let draws = self.file.image.draws.unwrap_or(0);
         let all: Result<Vec<Option<Candidate>>, Error> =
             (0..draws).into_par_iter().map(one).collect();
         Ok(all?.into_iter().collect())
     }
+}
+
+/// Standard deviation of the logarithm of the envelope's width: how far those from different baselines are apart.
+const ENVELOPE_SPREAD: f64 = 0.1;
+
+/// What draws begin from and are penalised by.
+struct Others<'a> {
+    /// Starts with a loss within 1 % of the least.
+    starts: Vec<&'a Candidate>,
+    /// Strengths that are as good as the best.
+    strengths: Vec<f64>,
 }
 
 #[cfg(test)]

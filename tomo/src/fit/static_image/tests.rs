@@ -296,7 +296,9 @@ fn exact_a_disc_and_a_double_have_no_ring() {
         all.map(|[east, north]| of(east, north)).collect()
     };
     let bell = |x: f64| (-4.0 * core::f64::consts::LN_2 * x * x).exp();
-    let disc = light(&|x, y| 1.0 / (1.0 + (x.hypot(y) - 30.0).exp()) + 0.2 * bell((x.hypot(y) - 24.0) / 8.0));
+    let disc = light(&|x, y| {
+        1.0 / (1.0 + (x.hypot(y) - 30.0).exp()) + 0.2 * bell((x.hypot(y) - 24.0) / 8.0)
+    });
     assert_eq!(Ring::measure(&disc, grid, &RADII), None);
     let knot = |x: f64, y: f64| bell(x.hypot(y) / 14.0);
     let double = light(&|x, y| knot(x - 18.0, y) + 0.8 * knot(x + 18.0, y));
