@@ -50,7 +50,7 @@ pub fn of_visibilities(
         (Some(images), _) => (images.envelope_uas, images.source),
         (None, Some(width)) => (
             width,
-            "the Gaussian whose flux falls as that of baselines up to half of the longest, by their median",
+            "the second moment of a ring whose flux falls as that of baselines up to half of the longest, by their median",
         ),
         (None, None) => (0.48 * field, "light is expected within as much"),
     };
@@ -107,8 +107,12 @@ fn resolved_width(observation: &Observation, flux_jy: f64) -> Option<f64> {
     };
     let mut widths: Vec<f64> = intervals.values().filter_map(width).collect();
     widths.sort_by(f64::total_cmp);
-    (widths.len() >= 5).then(|| widths[widths.len() / 2])
+    (widths.len() >= 5).then(|| HOLLOW * widths[widths.len() / 2])
 }
+
+/// Width of the Gaussian with the second moment of a thin ring over that of the Gaussian which has the ring's visibility where a fifth of
+/// the flux is left: √(ln 2)/1.06. The envelope of what is hollow is no wider, and the data may ask for more.
+const HOLLOW: f64 = 0.785;
 
 /// Seconds of an average. The longer they are, the fewer closure quantities are left; a source that varies asks for frames in
 /// which all baselines see the same.
