@@ -14,7 +14,7 @@ const SEEN: &str = "observe image.csv --fov-uas 120 --array EHT2017 --source m87
 
 const QUICK: [&str; 5] = [
     "image.pixels=32",
-    "image.iterations=200",
+    "image.iterations=1000",
     "image.draws=4",
     "strength={values=[0.1,1.0],folds=3}",
     "image.starts=[{gaussian={fwhm_uas=60.0}}]",
