@@ -1,6 +1,6 @@
 //! What a folder of results was begun with: whoever joins runs the same cases, from any current folder.
 
-use super::cases::Choice;
+use super::recipe::Choice;
 use super::source::Source;
 use crate::checksum::{is_whole, sealed};
 use crate::lock::{self, Lock};

@@ -233,7 +233,8 @@ pub fn markdown(table: &Table) -> String {
 #[cfg(test)]
 pub mod tests {
     use super::*;
-    use crate::compare::cases::{Choice, expand};
+    use crate::compare::cases::expand;
+    use crate::compare::recipe::Choice;
     use crate::compare::source::Source;
 
     pub const TEXT: &str = r#"

@@ -92,7 +92,8 @@ pub fn of_table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::compare::cases::{Choice, Status, expand};
+    use crate::compare::cases::{Status, expand};
+    use crate::compare::recipe::Choice;
     use crate::compare::results::Results;
     use crate::compare::source::Source;
     use crate::compare::tables::tests::TEXT;

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::fit::settings::{DataFiles, FitFile, Loss, LossKind, Noise};
 use crate::fit::setup::Measured;
-use crate::fit::verdict::{Errors, Statistics, Tested, Verdict, ZeroSpacing, judge};
+use crate::fit::verdict::{Errors, Expected, Statistics, Tested, Verdict, ZeroSpacing, judge};
 use kerrlight_common::frames::Frames;
 use kerrlight_vlbi::products::debiased_amplitude;
 
@@ -16,6 +16,8 @@ pub struct Judged {
     pub terms: Vec<(String, Tested)>,
     /// Flux at zero spacing, where short baselines have measured it.
     pub flux: Option<ZeroSpacing>,
+    /// Whether a model that lacks it is at fault.
+    pub flux_counts: bool,
     /// Names of the stations.
     pub stations: Vec<String>,
     /// Times of the frames: M; hours of UTC of a static image.
@@ -112,14 +114,15 @@ impl Evidence<'_> {
         let knows_flux =
             |loss: &Loss| loss.data.is_visibilities() || loss.data == LossKind::Amplitudes;
         // Gains that are free may be what is missing.
-        let knows = self.measured.gains.is_none() && self.losses.iter().any(knows_flux);
-        let judged = flux.filter(|_| knows);
+        let flux_counts = self.measured.gains.is_none() && self.losses.iter().any(knows_flux);
+        let judged = flux.filter(|_| flux_counts);
         let observation = self.measured.visibilities.as_ref().map(|(observation, _)| observation);
         let stations = observation.map(|o| o.stations.iter().map(|s| s.name.clone()).collect());
         Ok(Judged {
             verdict: judge(&tested, judged),
             terms,
             flux,
+            flux_counts,
             stations: stations.unwrap_or_default(),
             times: self.measured.times.clone(),
             is_static: self.file.is_none(),
@@ -150,5 +153,20 @@ impl Evidence<'_> {
         let [measured_jy, model_jy] = sums.map(|sum| sum / weights);
         let error_jy = weights.powf(-0.5);
         Ok((count > 0).then_some(ZeroSpacing { measured_jy, error_jy, model_jy, count }))
+    }
+}
+
+impl Judged {
+    /// Judges once more with what fits of the same model to other noise leave of each kind of data: mean and standard
+    /// deviation of χ² per datum. `count` is how many fits these are.
+    pub fn expect(&mut self, drawn: &[[f64; 2]], count: usize) {
+        // The mean is as uncertain as its fits are few.
+        let beyond = (1.0 + 1.0 / count.max(1) as f64).sqrt();
+        for ((_, tested), [mean, deviation]) in self.terms.iter_mut().zip(drawn) {
+            let Expected { chi2, spread, .. } = &mut tested.expected;
+            (*chi2, *spread) = (*mean, spread.max(beyond * deviation));
+        }
+        let tested: Vec<Tested> = self.terms.iter().map(|(_, tested)| tested.clone()).collect();
+        self.verdict = judge(&tested, self.flux.filter(|_| self.flux_counts));
     }
 }

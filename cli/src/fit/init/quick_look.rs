@@ -19,7 +19,7 @@ impl QuickLook {
         let mut file = StaticImageFile::parse(settings).ok()?;
         (file.strength, file.ring, file.image.draws) = (None, None, None);
         let measured = Measured::of_static(&file, observation.clone(), name).ok()?;
-        let survey = survey(&file, &measured, &|_, _| true).ok()??;
+        let survey = survey(&file, &measured, &[], &|_, _| true).ok()??;
         let terms = measured.visibility_terms::<f64>(&file.loss, file.image.pixels.pow(2)).ok()?;
         let frames = 0..measured.times.len();
         let counts = terms.iter().map(|weighted| {

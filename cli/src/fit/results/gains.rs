@@ -80,12 +80,19 @@ impl Gains {
         }
     }
 
+    /// Whether phases were solved for: one that was has an error.
+    fn has_phases(&self) -> bool {
+        self.table.gains.iter().any(|gain| gain.errors[1] > 0.0)
+    }
+
     /// For results.json.
     pub fn json(&self) -> Value {
+        let has_phases = self.has_phases();
         let station = |s: Summary<'_>| {
             json!({
                 "station": s.station, "scans": s.scans, "amplitude": s.mean, "scatter": s.scatter,
-                "amplitude_error": s.errors[0], "phase_error_deg": s.errors[1].to_degrees(),
+                "amplitude_error": s.errors[0],
+                "phase_error_deg": has_phases.then(|| s.errors[1].to_degrees()),
                 "largest_log_amplitude": s.largest,
             })
         };
@@ -104,8 +111,15 @@ impl Gains {
 
     /// Sentences for the report.
     pub fn sentences(&self) -> Vec<String> {
+        let (kind, phases) = match self.has_phases() {
+            true => ("Complex gains", "Phases count from the station with the strongest data."),
+            false => (
+                "Amplitudes of gains",
+                "Their phases were not solved for: the data that were fitted do not change with them.",
+            ),
+        };
         let mut all = vec![format!(
-            "Complex gains of {} stations were solved for in every frame beside the model; {TABLE} has them, and `kerrlight convert IN OUT --gains {TABLE}` takes them out of data. Phases count from the station with the strongest data. A factor on all amplitudes and the flux of the source are told apart by the priors of the amplitudes alone.",
+            "{kind} of {} stations were solved for in every frame beside the model; {TABLE} has them, and `kerrlight convert IN OUT --gains {TABLE}` takes them out of data. {phases} A factor on all amplitudes and the flux of the source are told apart by the priors of the amplitudes alone.",
             self.table.stations().len()
         )];
         if let Some(GainDistance { scale, rms, median, .. }) = self.distance {
@@ -120,6 +134,7 @@ impl Gains {
 
     /// A line for every station.
     pub fn details(&self) -> Table {
+        let has_phases = self.has_phases();
         let row = |s: Summary<'_>| {
             vec![
                 s.station.to_owned(),
@@ -127,7 +142,10 @@ impl Gains {
                 format!("{:.3}", s.mean),
                 format!("{:.3}", s.scatter),
                 format!("{:.3}", s.errors[0]),
-                format!("{:.2}", s.errors[1].to_degrees()),
+                match has_phases {
+                    true => format!("{:.2}", s.errors[1].to_degrees()),
+                    false => "not solved for".to_owned(),
+                },
             ]
         };
         let head = ["station", "frames", "amplitude", "scatter", "σ of ln|g|", "σ of phase (°)"];

@@ -22,7 +22,9 @@ use kerrlight_common::frames::Frames;
 use kerrlight_tomo::fit::FrameTerm;
 use kerrlight_tomo::fit::settings::{Loss, LossKind, StaticImageFile, StrengthSettings};
 use kerrlight_tomo::fit::setup::Measured;
-use kerrlight_tomo::fit::static_image::{PolarizedSurvey, Stage, Survey, survey, survey_polarized};
+use kerrlight_tomo::fit::static_image::{
+    PolarizedSurvey, Ring, Shape, ShapeFit, Stage, Survey, fit_shapes, survey, survey_polarized,
+};
 use kerrlight_tomo::fit::verdict::{Statistics, Tested};
 use kerrlight_vlbi::files::images;
 use polarized::Polarized;
@@ -47,6 +49,8 @@ struct Found<'a> {
     measured: &'a Measured,
     folder: &'a Folder,
     survey: Survey,
+    /// Simple shapes that were fitted to the same data.
+    shapes: Vec<ShapeFit>,
     /// The image once a frame.
     movie: Frames<f32>,
     judged: Judged,
@@ -83,17 +87,29 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
     let Prepared { file, measured, .. } = prepared;
     let begun = Instant::now();
     folder.file(folder::LOG)?.write(b"")?;
-    let (survey, polarized) = searched(prepared)?;
+    let (survey, shapes, polarized) = searched(prepared)?;
     let image: Vec<f32> = survey.found().solution.image.iter().map(|x| *x as f32).collect();
     let movie = Frames::of(image.repeat(measured.times.len()), image.len());
     let evidence = Evidence { file: None, losses: &file.loss, seed: file.seed, measured };
     let (polarized, tested) = told(prepared, polarized, folder)?.unzip();
     let others = tested.into_iter().collect();
-    let judged = evidence.judged_beside(compared(file, measured, &survey)?, &movie, others)?;
+    let mut judged = evidence.judged_beside(compared(file, measured, &survey)?, &movie, others)?;
+    judged.expect(&numbers::chi2_of_draws(&survey), survey.draws.len());
     let gains = Gains::beside(&evidence, &movie, folder)?;
     let beside = beside(file, measured, &survey);
-    let found =
-        Found { file, measured, folder, survey, movie, judged, gains, polarized, beside, begun };
+    let found = Found {
+        file,
+        measured,
+        folder,
+        survey,
+        shapes,
+        movie,
+        judged,
+        gains,
+        polarized,
+        beside,
+        begun,
+    };
     found.images()?;
     let results = found.results();
     folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
@@ -119,7 +135,9 @@ fn told(
 }
 
 /// The search, with its progress; an error if a signal stops it.
-fn searched(prepared: &Prepared) -> anyhow::Result<(Survey, Option<PolarizedSurvey>)> {
+fn searched(
+    prepared: &Prepared,
+) -> anyhow::Result<(Survey, Vec<ShapeFit>, Option<PolarizedSurvey>)> {
     let Prepared { file, measured, polarized } = prepared;
     let (rows, frames) = (
         measured.visibilities.iter().flat_map(|(seen, _)| seen.stokes_i()).count(),
@@ -140,7 +158,8 @@ fn searched(prepared: &Prepared) -> anyhow::Result<(Survey, Option<PolarizedSurv
     let values = |s: &Option<StrengthSettings>| s.as_ref().map_or(0, |s| s.values.len() * s.folds);
     let draws = file.image.draws.unwrap_or(0);
     let of_polarized = file.polarization.as_ref().map_or(0, |p| values(&p.strength) + 1 + draws);
-    let all = file.image.starts.len() + values(&file.strength) + draws + of_polarized;
+    let all =
+        file.image.starts.len() + Shape::ALL.len() + values(&file.strength) + draws + of_polarized;
     let keeper = Keeper::brief(STOPPED);
     let bar = progress::held_out(all as u64);
     let done = AtomicU64::new(0);
@@ -157,7 +176,8 @@ fn searched(prepared: &Prepared) -> anyhow::Result<(Survey, Option<PolarizedSurv
         !keeper.stopped()
     };
     let stopped = || Interrupted(STOPPED.to_owned());
-    let found = survey(file, measured, &watch)?.ok_or_else(stopped)?;
+    let shapes = fit_shapes(file, measured, &|| !keeper.stopped())?.ok_or_else(stopped)?;
+    let found = survey(file, measured, &shapes, &watch)?.ok_or_else(stopped)?;
     let of_polarized = match polarized {
         None => None,
         Some(measured) => {
@@ -165,7 +185,7 @@ fn searched(prepared: &Prepared) -> anyhow::Result<(Survey, Option<PolarizedSurv
         }
     };
     bar.finish_and_clear();
-    Ok((found, of_polarized))
+    Ok((found, shapes, of_polarized))
 }
 
 /// Residuals of the data that were fitted.
@@ -243,11 +263,17 @@ impl Found<'_> {
         self.folder.file("draws.npz")?.write(&bytes)
     }
 
+    /// The ring, where one is claimed.
+    fn ring(&self) -> Option<Ring> {
+        let ring = self.survey.found().ring?;
+        words::doubt(&self.survey, &self.shapes).is_none().then_some(ring)
+    }
+
     /// The verdict and the ring in a line.
     fn worth(&self) -> String {
         let polarized = self.polarized.as_ref().map(Polarized::sentence);
         let draws = words::draws(&self.survey, &self.file.loss);
-        let all = draws.into_iter().chain(words::ring(&self.survey)).chain(polarized);
+        let all = draws.into_iter().chain(words::ring(&self.survey, &self.shapes)).chain(polarized);
         self.judged.worth() + &all.map(|sentence| format!("\n{sentence}")).collect::<String>()
     }
 }

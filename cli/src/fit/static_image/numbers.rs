@@ -4,7 +4,7 @@ use super::Found;
 use crate::fit::closures;
 use crate::fit::results::verdict;
 use crate::usage::usage;
-use kerrlight_tomo::fit::static_image::{Candidate, Ring, Survey};
+use kerrlight_tomo::fit::static_image::{Candidate, Ring, ShapeFit, Survey};
 use serde_json::{Map, Value, json};
 
 /// A number of a ring.
@@ -115,12 +115,27 @@ impl Found<'_> {
         if let Some(polarized) = &self.polarized {
             polarized.add_to(&mut results);
         }
+        let shape = |fit: &ShapeFit| {
+            let sizes: Map<String, Value> = (fit.sizes.iter())
+                .map(|(name, value, _)| ((*name).to_owned(), json!(value)))
+                .collect();
+            json!({
+                "shape": fit.shape.name(),
+                "sizes": sizes,
+                "flux_jy": fit.flux_jy,
+                "chi2_per_datum": fit.chi2,
+                "criterion": fit.criterion,
+            })
+        };
+        results["shapes"] = self.shapes.iter().map(shape).collect();
+        let [with, all] = self.survey.with_ring();
+        results["images_with_ring"] = json!({"count": with, "of": all});
         self.add_ring(&mut results);
         results
     }
 
     fn add_ring(&self, results: &mut Value) {
-        let Some(ring) = &self.survey.found().ring else { return };
+        let Some(ring) = &self.ring() else { return };
         for (name, number) in RING {
             results[name] = json!(number(ring));
             results[format!("{name}_error")] = json!(error(&self.survey, name, number));
@@ -132,13 +147,8 @@ impl Found<'_> {
         });
     }
 
-    /// Scatter of the flux over the draws.
+    /// Error of the flux, as of numbers of the ring.
     fn flux_error(&self) -> Option<f64> {
-        let fluxes: Vec<f64> =
-            self.survey.draws.iter().map(|draw| draw.solution.image.iter().sum()).collect();
-        let count = fluxes.len() as f64;
-        let mean = fluxes.iter().sum::<f64>() / count;
-        let square: f64 = fluxes.iter().map(|x| (x - mean).powi(2)).sum();
-        (fluxes.len() > 1).then(|| (square / (count - 1.0)).sqrt())
+        self.survey.error(|image| Some(image.solution.image.iter().sum()))
     }
 }

@@ -10,7 +10,7 @@ use crate::fit::results::page::settings;
 use crate::fit::results::verdict::{self, Evidence};
 use crate::fit::results::{plots, residuals};
 use crate::report::{Axis, LinePlot, Marks, Outcome, Report, Series, Table};
-use kerrlight_tomo::fit::static_image::Candidate;
+use kerrlight_tomo::fit::static_image::{Candidate, ShapeFit};
 use serde_json::Value;
 
 /// What the numbers of a ring are called, their units and what they mean.
@@ -75,7 +75,7 @@ impl Found<'_> {
         let report = Report {
             title: self.file.title.clone(),
             notice: Some(verdict::notice(&self.judged)),
-            summary: words::ring(&self.survey)
+            summary: words::ring(&self.survey, &self.shapes)
                 .into_iter()
                 .chain(self.polarized.as_ref().map(Polarized::sentence))
                 .collect(),
@@ -83,7 +83,9 @@ impl Found<'_> {
             results: self.outcomes(results),
             figures: [figure].into_iter().chain(polarized).collect(),
             plots: all_plots,
-            details: details.into_iter().flatten().chain([self.images_table()]).collect(),
+            details: (details.into_iter().flatten())
+                .chain([self.shapes_table(), self.images_table()])
+                .collect(),
             settings: settings(self.file)?,
             ..Report::default()
         };
@@ -93,7 +95,7 @@ impl Found<'_> {
     fn outcomes(&self, results: &Value) -> Vec<Outcome> {
         let of_ring = RING.iter().zip(MEANINGS).filter_map(|((key, number), meaning)| {
             let (name, unit, digits, text) = meaning;
-            let value = number(self.survey.found().ring.as_ref()?);
+            let value = number(&self.ring()?);
             Some(Outcome {
                 name: name.to_owned(),
                 value: with_error(value, error(&self.survey, key, *number), digits),
@@ -129,7 +131,7 @@ impl Found<'_> {
             title: "Held-out frames".to_owned(),
             caption: "Weighted χ² per data point of frames that were not fitted, against the factor on all penalties; bars are \
                       standard errors of the difference from the best. Too weak penalties fit noise, too strong ones cannot \
-                      fit the data. The least is taken."
+                      fit the data. The largest within a standard error of the least is taken."
                 .to_owned(),
             x: Axis { label: "factor on the penalties".to_owned(), unit: String::new(), log: true },
             y: Axis { label: "loss of held-out data".to_owned(), unit: String::new(), log: false },
@@ -140,6 +142,40 @@ impl Found<'_> {
                 marks: Marks::Joined,
             }],
         })
+    }
+
+    /// Simple shapes with their sizes and what they fit, beside the image.
+    fn shapes_table(&self) -> Table {
+        let kinds: Vec<String> =
+            self.file.loss.iter().map(|loss| format!("χ² of {}", super::name(loss.data))).collect();
+        let numbers =
+            |chi2: &[f64]| chi2.iter().map(|chi2| format!("{chi2:.2}")).collect::<Vec<_>>();
+        let shape = |fit: &ShapeFit| {
+            let sizes =
+                fit.sizes.iter().map(|(name, value, unit)| format!("{name} {value:.1} {unit}"));
+            let sizes = sizes.collect::<Vec<_>>().join(", ");
+            let head = [fit.shape.name().to_owned(), sizes, format!("{:.3}", fit.flux_jy)];
+            [&head[..], &numbers(&fit.chi2)[..], &[format!("{:.0}", fit.criterion)]].concat()
+        };
+        let found = self.survey.found();
+        let flux = format!("{:.3}", found.solution.image.iter().sum::<f64>());
+        let head = ["the image".to_owned(), String::new(), flux];
+        let image = [&head[..], &numbers(&found.chi2)[..], &["–".to_owned()]].concat();
+        Table {
+            title: "Simple shapes".to_owned(),
+            caption: "Shapes that were fitted to the same data with the same gains, for a sanity check: χ² per data point, and χ² of \
+                      all independent data plus the number of parameters times the logarithm of that of the data. The less \
+                      that is, the better; 10 less is strong evidence."
+                .to_owned(),
+            head: ["shape", "sizes", "flux (Jy)"]
+                .map(str::to_owned)
+                .into_iter()
+                .chain(kinds)
+                .chain(["criterion".to_owned()])
+                .collect(),
+            rows: self.shapes.iter().map(shape).chain([image]).collect(),
+            links: Vec::new(),
+        }
     }
 
     /// Every image that was found, with what it fits.

@@ -7,20 +7,54 @@ use crate::fit::closures;
 use crate::fit::results::medium;
 use crate::report::Part;
 use kerrlight_tomo::fit::settings::{Loss, StartImage};
-use kerrlight_tomo::fit::static_image::Survey;
+use kerrlight_tomo::fit::static_image::{ShapeFit, Survey};
 
-/// The ring in a sentence.
-pub fn ring(survey: &Survey) -> Option<String> {
+/// The ring in a sentence: its numbers where one is claimed, and why none is where the image has one.
+pub fn ring(survey: &Survey, shapes: &[ShapeFit]) -> Option<String> {
     let ring = survey.found().ring?;
+    if let Some(doubt) = doubt(survey, shapes) {
+        return Some(format!("The image looks like a ring, but {doubt}: no ring is claimed."));
+    }
     let [diameter, width, angle, ..] =
         RING.map(|(name, number)| (number(&ring), error(survey, name, number)));
+    let [with, all] = survey.with_ring();
+    let others = match with == all {
+        true => String::new(),
+        false => format!(" {with} of {all} images that the data allow have one."),
+    };
     Some(format!(
-        "The image has a ring of {} µas, {} µas wide, brightest at {}° east of north.",
+        "The image has a ring of {} µas, {} µas wide, brightest at {}° east of north.{others}",
         with_error(diameter.0, diameter.1, 1),
         with_error(width.0, width.1, 1),
         with_error(angle.0, angle.1, 0)
     ))
 }
+
+/// Why the ring of an image is not claimed: other images that the data allow have none, or a shape without a hole fits better
+/// than a ring and a crescent.
+pub fn doubt(survey: &Survey, shapes: &[ShapeFit]) -> Option<String> {
+    let [with, all] = survey.with_ring();
+    if (with as f64) < LEAST_AGREEMENT * all as f64 {
+        return Some(format!("{with} of {all} images that the data allow have one"));
+    }
+    let least = |is_ring: bool| {
+        let kind = shapes.iter().filter(|fit| fit.shape.is_ring() == is_ring);
+        kind.min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+    };
+    let (ring, other) = (least(true)?, least(false)?);
+    (other.criterion < ring.criterion).then(|| {
+        format!(
+            "a {} fits the data better than a {} (χ² with a penalty on parameters {:.0} and {:.0})",
+            other.shape.name(),
+            ring.shape.name(),
+            other.criterion,
+            ring.criterion
+        )
+    })
+}
+
+/// Part of the images that the data allow which have to have a ring.
+const LEAST_AGREEMENT: f64 = 0.8;
 
 /// What fits of the image with other noise leave: an image and gains take up a part of the noise of the data.
 pub fn draws(survey: &Survey, losses: &[Loss]) -> Option<String> {
@@ -89,7 +123,7 @@ impl Found<'_> {
                 image.flux_sigma_jy,
                 format_args!("{:.3}", self.survey.found().solution.image.iter().sum::<f64>())
             ),
-            format!("Starts: {}.", starts.join("; ")),
+            format!("Starts: {}; then the simple shapes that fit the data.", starts.join("; ")),
         ];
         let envelope = self.file.envelope.map(|envelope| {
             format!(
@@ -107,7 +141,7 @@ impl Found<'_> {
         }
         if !self.survey.held.is_empty() {
             text.push(format!(
-                "The factor is the one of {} that predicts frames best which were not fitted.",
+                "The factor is the largest of {} that predicts frames which were not fitted as well as the best, within a standard error.",
                 self.survey.held.len()
             ));
         }
@@ -125,8 +159,8 @@ impl Found<'_> {
             return vec!["No draws were asked for: numbers have no errors.".to_owned()];
         }
         let mut text = vec![format!(
-            "Errors add in quadrature how far {draws} images of measurements of this image with other noise, and of a flux drawn \
-             from its prior, are from it (root mean square, what the method distorts included), and how far {others} images are \
+            "Errors add in quadrature how far {draws} images of measurements of this image with other noise, with a flux drawn from its \
+             prior, an envelope 10 % wider or narrower (one standard deviation), and starts and factors that are as good, are from it (root mean square, what the method distorts included), and how far {others} images are \
              that the data do not tell from the best: of other starts with a loss within 1 %, and of other factors that predict \
              held-out frames as well. The kind of penalty, the field and the size of pixels stay what they are: what they \
              decide is in no error."
@@ -141,7 +175,8 @@ impl Found<'_> {
         for (name, chi2) in &self.beside {
             text.push(format!("χ² {chi2:.2} per data point of {name}, which were not fitted."));
         }
-        text.extend(ring(&self.survey));
+        text.extend(ring(&self.survey, &self.shapes));
+        text.push(shapes_beside(&self.shapes));
         if self.file.ring.is_some() && self.survey.found().ring.is_none() {
             text.push("The image has no ring between the radii that were asked for.".to_owned());
         }
@@ -168,10 +203,25 @@ impl Found<'_> {
         }
         text.extend(self.polarized.iter().flat_map(Polarized::not_concluded));
         if !self.survey.found().solution.has_converged {
-            text.push("The optimiser had not come to its end after image.iterations.".to_owned());
+            text.push(
+                "That this is the minimum: where the optimiser ended the loss still has a slope (image.iterations)."
+                    .to_owned(),
+            );
         }
         text
     }
+}
+
+/// Simple shapes in a sentence, the one that fits best first.
+fn shapes_beside(shapes: &[ShapeFit]) -> String {
+    let mut all: Vec<&ShapeFit> = shapes.iter().collect();
+    all.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    let one = |fit: &&ShapeFit| format!("{} {:.0}", fit.shape.name(), fit.criterion);
+    let all: Vec<String> = all.iter().map(one).collect();
+    format!(
+        "Simple shapes with the same gains, by χ² with a penalty on their parameters, the least first: {}.",
+        all.join(", ")
+    )
 }
 
 fn start(start: StartImage) -> String {

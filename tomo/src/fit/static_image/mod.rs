@@ -8,6 +8,7 @@ mod beam;
 mod polarized;
 mod problem;
 mod ring;
+mod shapes;
 mod solve;
 mod start;
 mod survey;
@@ -20,5 +21,6 @@ pub use polarized::{
 };
 pub use problem::{FluxPrior, ImageProblem};
 pub use ring::Ring;
+pub use shapes::{Shape, ShapeFit, fit_shapes};
 pub use solve::Solution;
 pub use survey::{Candidate, Stage, Survey, SurveyWatch, survey};

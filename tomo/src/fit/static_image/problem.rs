@@ -6,6 +6,9 @@
 use crate::fit::linear::Prior;
 use crate::fit::{FrameTerm, Shape, Weighted};
 
+/// Part of the mean light below which a pixel is dark.
+const DARK: f64 = 1e-3;
+
 /// A Gaussian prior of the flux.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FluxPrior {
@@ -60,9 +63,63 @@ impl ImageProblem<'_> {
         shares.into_iter().map(|share| share * flux).collect()
     }
 
+    /// Factors on parameters under which the entropy has about the same bend with each: roots of the expected shares over
+    /// their mean. The outskirts, where hardly any light is expected, keep a tenth of the mean.
+    pub(super) fn scales(&self) -> Vec<f64> {
+        let pixels = self.side * self.side;
+        let of = |k: usize| self.envelope.map_or(1.0, |(expected, _)| expected[k] * pixels as f64);
+        (0..pixels).map(|k| of(k).sqrt().max(0.1)).chain([1.0]).collect()
+    }
+
+    /// The sum of all slopes, that of a pixel as if it had [`DARK`] of the mean light where it is darker and the gradient wants it
+    /// brighter; gives it that much.
+    pub(super) fn raise(&self, parameters: &mut [f64], gradient: &[f64]) -> f64 {
+        let (shares, _) = self.light(parameters);
+        let floor = DARK / shares.len() as f64;
+        let all = parameters.iter().zip(&shares);
+        let (bright, most) =
+            all.fold(
+                (0.0, 0.0),
+                |so_far: (f64, f64), (x, share)| {
+                    if *share > so_far.1 { (*x, *share) } else { so_far }
+                },
+            );
+        let mut slope = gradient.last().map_or(0.0, |g| g.abs());
+        for ((x, share), g) in parameters.iter_mut().zip(&shares).zip(gradient) {
+            if *share < floor && *g < 0.0 {
+                slope -= g * floor / share;
+                *x = bright + (floor / most).ln();
+            } else {
+                slope += g.abs();
+            }
+        }
+        slope
+    }
+
     /// Data of a kind in the frames that count.
     fn count(&self, term: &dyn FrameTerm<f64>) -> usize {
         self.frames.iter().map(|frame| term.degrees_of_freedom(*frame)).sum()
+    }
+
+    /// Number of data of each kind.
+    pub(super) fn counts(&self) -> Vec<usize> {
+        self.terms.iter().map(|term| self.count(&*term.term)).collect()
+    }
+
+    /// The loss of the data and of a flux (over its expectation) alone, and its gradient with respect to the pixels, without that
+    /// of the flux's prior.
+    pub(super) fn data_and_gradient(&self, image: &[f64], flux: f64) -> (f64, Vec<f64>) {
+        let mut gradient = vec![0.0; image.len()];
+        let one = |Weighted { weight, term }: &Weighted<dyn FrameTerm<f64>>| {
+            weight * self.term(&**term, image, *weight, &mut gradient)
+        };
+        let value: f64 = self.terms.iter().map(one).sum();
+        (value + self.flux_prior(self.flux.jy * flux).0, gradient)
+    }
+
+    /// The slope of the prior of the flux with its logarithm, at a flux over its expectation.
+    pub(super) fn flux_slope(&self, flux: f64) -> f64 {
+        self.flux_prior(self.flux.jy * flux).1
     }
 
     /// χ² per datum of each kind of data.

@@ -23,6 +23,9 @@ pub struct Ring {
     pub asymmetry: f64,
     /// Mean brightness at the centre over that at the ring's radius.
     pub central_brightness: f64,
+    /// Part of the directions in which the ring is twice as bright as the centre, and a twentieth as bright as where it is
+    /// brightest.
+    pub coverage: f64,
 }
 
 /// Directions.
@@ -31,6 +34,13 @@ const DIRECTIONS: usize = 120;
 const SAMPLES: f64 = 6.0;
 /// Part of the directions whose brightest point may lie at a limit of the radii: there is no ring with more.
 const MOST_AT_LIMITS: f64 = 0.1;
+/// Mean brightness at the centre over that of the ring: what is brighter inside is a disc.
+const MOST_CENTRAL: f64 = 0.5;
+/// Part of the directions that a ring has light in: two knots have gaps between them, a crescent one.
+const LEAST_COVERAGE: f64 = 0.7;
+/// Brightness over that of the centre, and over that of the brightest direction, from which on a direction has light.
+const ABOVE_CENTRE: f64 = 2.0;
+const ABOVE_BRIGHTEST: f64 = 0.05;
 /// Radius of what counts as the centre, µas (the published 5 µas).
 const CENTRE: f64 = 5.0;
 
@@ -43,7 +53,7 @@ struct Sky<'a> {
 
 impl Ring {
     /// The ring of an image: it encloses the centroid of the light. None where fewer than nine directions in ten have their
-    /// brightest point between the radii, whatever the centre.
+    /// brightest point between the radii, whatever the centre, where it is filled, and where it has gaps.
     pub fn measure(pixels: &[f64], grid: ImageGrid, settings: &RingSettings) -> Option<Self> {
         let pixel = grid.pixel_rad / MICROARCSECOND;
         let (least, most) = (settings.least_radius_uas, settings.most_radius_uas);
@@ -57,6 +67,12 @@ impl Ring {
         let scatter = (square / peaks.len() as f64).sqrt();
         let width_uas = sky.width(centre, most);
         let [position_angle_deg, asymmetry] = sky.moment(centre, [mean, width_uas]);
+        let central = sky.within(centre, CENTRE);
+        let coverage = sky.coverage(centre, central);
+        let central_brightness = central / sky.around(centre, mean);
+        if !(central_brightness <= MOST_CENTRAL && coverage >= LEAST_COVERAGE) {
+            return None;
+        }
         Some(Ring {
             centre_uas: centre,
             diameter_uas: 2.0 * mean,
@@ -64,7 +80,8 @@ impl Ring {
             width_uas,
             position_angle_deg,
             asymmetry,
-            central_brightness: sky.within(centre, CENTRE) / sky.around(centre, mean),
+            central_brightness,
+            coverage,
         })
     }
 }
@@ -110,6 +127,16 @@ impl Sky<'_> {
         let peaks: Vec<f64> = directions().filter_map(brightest).collect();
         let missing = (DIRECTIONS - peaks.len()) as f64;
         (missing <= MOST_AT_LIMITS * DIRECTIONS as f64).then_some(peaks)
+    }
+
+    /// Part of the directions whose brightest point between the radii is well above the centre and not far below the brightest.
+    fn coverage(&self, centre: [f64; 2], central: f64) -> f64 {
+        let most =
+            |angle: f64| self.radii.iter().map(|r| self.on(centre, angle, *r)).fold(0.0, f64::max);
+        let light: Vec<f64> = directions().map(most).collect();
+        let brightest = light.iter().copied().fold(0.0, f64::max);
+        let enough = (ABOVE_CENTRE * central).max(ABOVE_BRIGHTEST * brightest);
+        light.iter().filter(|light| **light >= enough).count() as f64 / DIRECTIONS as f64
     }
 
     /// Relative scatter of the distances about a centre.

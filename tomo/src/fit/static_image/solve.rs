@@ -14,13 +14,16 @@ pub struct Solution {
     pub loss: f64,
     /// Iterations that were made.
     pub iterations: usize,
-    /// Whether the loss had ceased to fall.
+    /// Whether the gradient says that this is a minimum.
     pub has_converged: bool,
 }
 
 /// Iterations over which the loss has to fall by [`FALL`] of itself to go on.
 const SPAN: usize = 20;
 const FALL: f64 = 1e-4;
+/// Sum of all slopes with the logarithm of light over the loss, at a minimum at most: pixels that change by 1 % each, whichever way,
+/// change the loss by less than 0.15 %.
+const FLAT: f64 = 0.15;
 
 /// Where L-BFGS came to.
 pub(super) struct Minimum {
@@ -31,20 +34,44 @@ pub(super) struct Minimum {
 }
 
 /// The minimum that L-BFGS comes to from these parameters; none if `go_on` said no.
+///
+/// It steps in parameters times [`ImageProblem::scales`]. Where it ends, dark pixels that the gradient wants brighter are
+/// raised, and it begins again from there, until the gradient says that this is a minimum.
 pub fn solve(
     problem: &ImageProblem<'_>,
     start: &[f64],
     iterations: usize,
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Option<Solution> {
-    let mut objective = |x: &[f64], g: &mut [f64]| problem.value_and_gradient(x, g);
-    let Minimum { parameters, loss, iterations, has_converged } =
-        minimum(&mut objective, start, iterations, go_on)?;
-    let image = problem.image(&parameters);
-    Some(Solution { parameters, image, loss, iterations, has_converged })
+    let scales = problem.scales();
+    let plain = |x: &[f64]| -> Vec<f64> { x.iter().zip(&scales).map(|(x, s)| x / s).collect() };
+    let mut objective = |x: &[f64], g: &mut [f64]| {
+        let value = problem.value_and_gradient(&plain(x), g);
+        g.iter_mut().zip(&scales).for_each(|(g, s)| *g /= s);
+        value
+    };
+    let mut parameters = start.to_vec();
+    let (mut least, mut used) = (f64::INFINITY, 0);
+    loop {
+        let scaled: Vec<f64> = parameters.iter().zip(&scales).map(|(x, s)| x * s).collect();
+        let found = minimum(&mut objective, &scaled, iterations - used, go_on)?;
+        parameters = plain(&found.parameters);
+        used += found.iterations;
+        let image = problem.image(&parameters);
+        let mut gradient = vec![0.0; parameters.len()];
+        let loss = problem.value_and_gradient(&parameters, &mut gradient);
+        let slope = problem.raise(&mut parameters, &gradient);
+        let has_converged = slope <= FLAT * loss;
+        let goes_on = least - loss > FALL * loss && used < iterations;
+        if has_converged || !goes_on {
+            return Some(Solution { parameters, image, loss, iterations: used, has_converged });
+        }
+        least = loss;
+    }
 }
 
-/// The same of a function that returns its value and overwrites its gradient.
+/// The same of a function that returns its value and overwrites its gradient. Where no step along a direction helps, it
+/// begins again along the gradient.
 pub(super) fn minimum(
     mut objective: &mut dyn FnMut(&[f64], &mut [f64]) -> f64,
     start: &[f64],
@@ -55,25 +82,22 @@ pub(super) fn minimum(
     let mut parameters = start.to_vec();
     let mut state = LbfgsState::new(parameters.len(), lbfgs.memory);
     let mut losses: Vec<f64> = Vec::new();
-    let mut has_converged = false;
-    while losses.len() < iterations && !has_converged {
+    let mut has_settled = false;
+    while losses.len() < iterations && !has_settled {
         if !go_on() {
             return None;
         }
         match lbfgs.step(&mut objective, &mut state, &mut parameters) {
             Step::Taken { value, .. } => losses.push(value),
+            Step::NoDescent if state.pairs > 0 => state.pairs = 0,
             Step::NoDescent | Step::NotFinite => break,
         }
         let before = losses.len().checked_sub(SPAN + 1).map(|k| losses[k]);
-        has_converged =
+        has_settled =
             before.is_some_and(|before| before - losses[losses.len() - 1] < FALL * before);
     }
-    let ended = losses.len() < iterations;
     let loss = state.value.unwrap_or(f64::NAN);
-    Some(Minimum {
-        parameters,
-        loss,
-        iterations: losses.len(),
-        has_converged: (has_converged || ended) && loss.is_finite(),
-    })
+    let slope: f64 = state.numbers[..parameters.len()].iter().map(|g| g.abs()).sum();
+    let has_converged = slope <= FLAT * loss;
+    Some(Minimum { parameters, loss, iterations: losses.len(), has_converged })
 }

@@ -31,6 +31,13 @@ pub fn image(start: StartImage, grid: ImageGrid) -> Vec<f64> {
     })
 }
 
+/// The same of a shape that was fitted.
+pub fn shape(found: &[f64]) -> Vec<f64> {
+    let floor = FLOOR * found.iter().copied().fold(0.0, f64::max);
+    let sum = 1.0 + floor * found.len() as f64;
+    found.iter().map(|share| (share + floor) / sum).collect()
+}
+
 /// Shares of light that depends on the distance from the middle alone, µas.
 fn shares(grid: ImageGrid, light: impl Fn(f64) -> f64) -> Vec<f64> {
     let of = |k: usize| {

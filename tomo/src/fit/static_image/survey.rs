@@ -3,7 +3,7 @@
 
 use super::solve::{Solution, solve};
 use super::start;
-use super::{FluxPrior, ImageProblem, Ring};
+use super::{FluxPrior, ImageProblem, Ring, ShapeFit};
 use crate::Error;
 use crate::fit::linear::Prior;
 use crate::fit::settings::{StaticImageFile, StrengthSettings};
@@ -50,9 +50,9 @@ pub struct Candidate {
 /// What came out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
-    /// Strengths with the loss of frames that were held out.
+    /// Strengths with the loss of frames that were held out, of fits that came to a minimum.
     pub held: Vec<Held>,
-    /// The strength: the one that predicts held-out frames best.
+    /// The strength: the largest that predicts held-out frames as well as the best within a standard error.
     pub strength: f64,
     /// Images from all starts, in their order.
     pub starts: Vec<Candidate>,
@@ -91,55 +91,75 @@ impl Survey {
         self.starts.iter().filter(as_good).chain(&self.strengths)
     }
 
-    /// Error of a number of the ring: root mean square distance of the draws from it, and of the images that data do not tell
-    /// from it, added in quadrature; none without draws, or where one of the images has no ring.
+    /// How many of the draws, and of the images that data do not tell from the best, have a ring, and how many these are.
+    pub fn with_ring(&self) -> [usize; 2] {
+        let all = || self.draws.iter().chain(self.alternatives());
+        [all().filter(|image| image.ring.is_some()).count(), all().count()]
+    }
+
+    /// Error of a number of the ring: as [`error`](Self::error), over images that have a ring.
     pub fn ring_error(&self, number: impl Fn(&Ring) -> f64) -> Option<f64> {
-        let all = |images: &mut dyn Iterator<Item = &Candidate>| -> Option<Vec<f64>> {
-            images.map(|image| image.ring.as_ref().map(&number)).collect()
+        self.error(|image| image.ring.as_ref().map(&number))
+    }
+
+    /// Error of a number of the image: root mean square distance of the draws from it, and of the images that data do not tell
+    /// from it, added in quadrature, over those that have the number; none with less than two such draws.
+    pub fn error(&self, number: impl Fn(&Candidate) -> Option<f64>) -> Option<f64> {
+        let here = number(self.found())?;
+        let square = |images: &mut dyn Iterator<Item = &Candidate>| -> (f64, usize) {
+            let apart: Vec<f64> =
+                images.filter_map(&number).map(|there| (there - here).powi(2)).collect();
+            (apart.iter().sum::<f64>() / apart.len().max(1) as f64, apart.len())
         };
-        let here = number(self.found().ring.as_ref()?);
-        let square = |values: &[f64]| {
-            values.iter().map(|x| (x - here).powi(2)).sum::<f64>() / values.len() as f64
-        };
-        let draws = all(&mut self.draws.iter())?;
-        let others = all(&mut self.alternatives())?;
-        if draws.len() < 2 {
-            return None;
-        }
-        Some((square(&draws) + square(&others)).sqrt())
+        let (draws, count) = square(&mut self.draws.iter());
+        let (others, _) = square(&mut self.alternatives());
+        (count >= 2).then(|| (draws + others).sqrt())
     }
 }
 
-/// Finds the image of measured visibilities; none if `watch` said no.
+/// Finds the image of measured visibilities, from the starts of the settings and then from shapes that fit the same data; none if
+/// `watch` said no.
 ///
 /// # Errors
 /// If a loss has no data.
 pub fn survey(
     file: &StaticImageFile,
     measured: &Measured,
+    shapes: &[ShapeFit],
     watch: &SurveyWatch<'_>,
 ) -> Result<Option<Survey>, Error> {
     let grid = file.image.grid()?;
     let terms = measured.visibility_terms(&file.loss, grid.pixels())?;
     let envelope =
         file.envelope.map(|envelope| (start::envelope(envelope.fwhm_uas, grid), envelope.weight));
-    let search = Search { file, grid, priors: file.priors()?, envelope, terms: &terms, watch };
+    let shapes = shapes.iter().map(|fit| start::shape(&fit.shares));
+    let begin = file.image.starts.iter().map(|start| start::image(*start, grid)).chain(shapes);
+    let (priors, begin) = (file.priors()?, begin.collect());
+    let search = Search { file, grid, priors, envelope, begin, terms: &terms, watch };
     let frames: Vec<usize> = (0..measured.times.len()).collect();
     let middle = file.strength.as_ref().map_or(1.0, |s| s.values[s.values.len() / 2]);
     let Some(starts) = search.starts(middle, &frames) else { return Ok(None) };
     let Some(held) = search.hold_out(least(&starts), &measured.times) else { return Ok(None) };
     let allowed = allowed(&held);
-    let strength = best_held(&held).map_or(1.0, |best| best.value);
+    let strength = match held.is_empty() {
+        true => middle,
+        false => allowed.last().copied().unwrap_or(middle),
+    };
     let starts = match strength == middle {
         true => Some(starts),
         false => search.starts(strength, &frames),
     };
     let Some(starts) = starts else { return Ok(None) };
     let best = least(&starts);
-    let others: Vec<f64> = allowed.into_iter().filter(|value| *value != strength).collect();
+    let others: Vec<f64> = allowed.iter().copied().filter(|value| *value != strength).collect();
     let of = |value: &f64| search.solved(Stage::Strengths, (best, *value), &frames, search.flux());
     let Some(strengths) = others.par_iter().map(of).collect() else { return Ok(None) };
-    let draws = search.draws(measured, &starts[best], &frames)?;
+    let least = starts[best].solution.loss;
+    let good = starts.iter().filter(|start| start.solution.loss <= 1.01 * least).collect();
+    // The image's own strength first: it is the one that draws have where the data choose none.
+    let chosen = [strength].into_iter().chain(others).collect();
+    let others = Others { starts: good, strengths: chosen };
+    let draws = search.draws(measured, (&starts[best], &others), &frames)?;
     Ok(draws.map(|draws| Survey { held, strength, starts, best, strengths, draws }))
 }
 
@@ -156,6 +176,23 @@ pub(super) fn allowed(held: &[Held]) -> Vec<f64> {
     let mut values: Vec<f64> = held.iter().filter(good).map(|held| held.value).collect();
     values.sort_by(f64::total_cmp);
     values
+}
+
+/// Without strengths of which fewer than half of the parts are known, then without parts that are not known of all others: NaN
+/// stands for a fit that did not come to a minimum, which says nothing. Nothing is left where fewer than two parts are.
+fn voting(mut held: Vec<Held>) -> Vec<Held> {
+    let known = |held: &Held| held.losses.iter().filter(|loss| loss.is_finite()).count();
+    held.retain(|one| 2 * known(one) >= one.losses.len());
+    let parts = held.first().map_or(0, |one| one.losses.len());
+    let votes = |part: &usize| held.iter().all(|one| one.losses[*part].is_finite());
+    let kept: Vec<usize> = (0..parts).filter(votes).collect();
+    if kept.len() < 2 {
+        return Vec::new();
+    }
+    for one in &mut held {
+        one.losses = kept.iter().map(|part| one.losses[*part]).collect();
+    }
+    held
 }
 
 /// What `loss` says of each strength and each part of the frames; none if it says nothing of one.
@@ -194,6 +231,8 @@ struct Search<'a> {
     grid: ImageGrid,
     priors: Vec<Prior>,
     envelope: Option<(Vec<f64>, f64)>,
+    /// Shares of the flux in the pixels, for each start.
+    begin: Vec<Vec<f64>>,
     terms: &'a [Weighted<dyn FrameTerm<f64>>],
     watch: &'a SurveyWatch<'a>,
 }
@@ -218,8 +257,7 @@ impl Search<'_> {
         flux: FluxPrior,
     ) -> Option<Candidate> {
         let problem = self.problem(strength, frames, flux);
-        let shares = start::image(self.file.image.starts[start], self.grid);
-        let begin = problem.parameters_of(&shares);
+        let begin = problem.parameters_of(&self.begin[start]);
         self.from(stage, &problem, &begin, start)
     }
 
@@ -245,7 +283,7 @@ impl Search<'_> {
 
     fn starts(&self, strength: f64, frames: &[usize]) -> Option<Vec<Candidate>> {
         let of = |k: usize| self.solved(Stage::Starts, (k, strength), frames, self.flux());
-        (0..self.file.image.starts.len()).into_par_iter().map(of).collect()
+        (0..self.begin.len()).into_par_iter().map(of).collect()
     }
 
     /// The loss of frames that were not fitted, for each strength; nothing where one is given.
@@ -259,34 +297,46 @@ impl Search<'_> {
         held(settings, |strength, fold| {
             let found =
                 self.solved(Stage::HeldOut, (start, strength), &part(fold, true), self.flux())?;
+            if !found.solution.has_converged {
+                return Some(f64::NAN);
+            }
             let unseen = self.problem(strength, &part(fold, false), self.flux());
             Some(unseen.misfit(&found.solution.image))
         })
+        .map(voting)
     }
 
-    /// Images of the measurement of the best image with other noise, and of a flux drawn from its prior, each from the best
-    /// image.
+    /// Images of the measurement of the best image with other noise, with a flux and a width of the envelope drawn from their
+    /// priors, each from one of the starts that are as good, with one of the strengths that are.
     fn draws(
         &self,
         measured: &Measured,
-        best: &Candidate,
+        (best, others): (&Candidate, &Others<'_>),
         frames: &[usize],
     ) -> Result<Option<Vec<Candidate>>, Error> {
         let one = |k: usize| -> Result<Option<Candidate>, Error> {
             let seed = self.file.seed.wrapping_add(1 + k as u64);
             let drawn = measured.redrawn(&self.file.loss, &best.solution.image, seed)?;
             let terms = drawn.visibility_terms(&self.file.loss, self.grid.pixels())?;
-            let noise: f64 = Pcg64::seed_from_u64(seed).sample(StandardNormal);
+            let mut random = Pcg64::seed_from_u64(seed);
+            let [of_flux, of_width]: [f64; 2] = [(); 2].map(|()| random.sample(StandardNormal));
             let FluxPrior { jy, sigma_jy } = self.flux();
             // A flux below 0 is none: far from it for any prior that says something.
-            let flux = FluxPrior { jy: (jy + noise * sigma_jy).max(0.01 * jy), sigma_jy };
+            let flux = FluxPrior { jy: (jy + of_flux * sigma_jy).max(0.01 * jy), sigma_jy };
+            let envelope = self.file.envelope.map(|envelope| {
+                let width = envelope.fwhm_uas * (ENVELOPE_SPREAD * of_width).exp();
+                (start::envelope(width, self.grid), envelope.weight)
+            });
+            let envelope = envelope.as_ref().map(|(shares, weight)| (&shares[..], *weight));
+            let strength = others.strengths[k % others.strengths.len()];
             let problem =
-                ImageProblem { terms: &terms, ..self.problem(best.strength, frames, flux) };
-            let mut begin = best.solution.parameters.clone();
+                ImageProblem { terms: &terms, envelope, ..self.problem(strength, frames, flux) };
+            let start = others.starts[k % others.starts.len()];
+            let mut begin = start.solution.parameters.clone();
             if let Some(last) = begin.last_mut() {
                 *last += (jy / flux.jy).ln();
             }
-            Ok(self.from(Stage::Draws, &problem, &begin, best.start))
+            Ok(self.from(Stage::Draws, &problem, &begin, start.start))
         };
         let draws = self.file.image.draws.unwrap_or(0);
         let all: Result<Vec<Option<Candidate>>, Error> =
@@ -295,9 +345,38 @@ impl Search<'_> {
     }
 }
 
+/// Standard deviation of the logarithm of the envelope's width: how far those from different baselines are apart.
+const ENVELOPE_SPREAD: f64 = 0.1;
+
+/// What draws begin from and are penalised by.
+struct Others<'a> {
+    /// Starts with a loss within 1 % of the least.
+    starts: Vec<&'a Candidate>,
+    /// Strengths that are as good as the best.
+    strengths: Vec<f64>,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// One fit of four that ended early takes its part from all strengths; a strength of which most did says nothing.
+    #[test]
+    fn exact_fits_without_a_minimum_do_not_vote() {
+        let held = |value, losses: [f64; 4]| Held { value, losses: losses.to_vec() };
+        let n = f64::NAN;
+        let all = vec![
+            held(1.0, [n, n, 3.0, n]),
+            held(3.0, [n, 2.0, 3.0, 4.0]),
+            held(9.0, [406.0, 2.5, 3.5, 4.5]),
+        ];
+        let left = voting(all);
+        assert_eq!(left.iter().map(|one| one.value).collect::<Vec<_>>(), [3.0, 9.0]);
+        assert_eq!(left[0].losses, [2.0, 3.0, 4.0]);
+        assert_eq!(left[1].losses, [2.5, 3.5, 4.5]);
+        assert!(voting(vec![held(1.0, [n, n, 3.0, 4.0]), held(3.0, [n, n, n, 4.0])]).len() == 1);
+        assert!(voting(vec![held(1.0, [n, 2.0, n, n])]).is_empty());
+    }
 
     #[test]
     fn exact_scans_are_held_out_whole() {

@@ -217,7 +217,7 @@ fn exact_gradients_of_the_loss() {
 #[test]
 fn exact_a_ring_is_found_through_gains() {
     let file = StaticImageFile::parse(SETTINGS).unwrap();
-    let found = survey(&file, &measured(&file, 2), &|_, _| true).unwrap().unwrap();
+    let found = survey(&file, &measured(&file, 2), &[], &|_, _| true).unwrap().unwrap();
     let image = found.found();
     let ring = image.ring.expect("a ring");
     let error = found.ring_error(|ring| ring.diameter_uas).expect("an error");
@@ -236,17 +236,82 @@ fn exact_closures_alone_find_a_ring() {
     let text = [&SETTINGS[..gains], &SETTINGS[next..]].concat();
     assert!(loss < next);
     let file = StaticImageFile::parse(&text.replace("draws = 6\n", "")).unwrap();
-    let found = survey(&file, &measured(&file, 3), &|_, _| true).unwrap().unwrap();
+    let found = survey(&file, &measured(&file, 3), &[], &|_, _| true).unwrap().unwrap();
     let ring = found.starts[0].ring.expect("a ring");
     assert!((ring.diameter_uas - 44.0).abs() < 3.0, "{ring:?}");
     assert!((ring.position_angle_deg - 170.0).abs() < 25.0, "{ring:?}");
+}
+
+/// An optimiser that is stopped is not at a minimum; one that begins where nearly all pixels have no light comes to the loss that
+/// one comes to which begins with light everywhere.
+#[test]
+fn exact_the_gradient_says_whether_a_fit_has_converged() {
+    let file = StaticImageFile::parse(SETTINGS).unwrap();
+    let measured = measured(&file, 2);
+    let grid = file.image.grid().unwrap();
+    let terms = measured.visibility_terms::<f64>(&file.loss, grid.pixels()).unwrap();
+    let envelope = start::envelope(45.0, grid);
+    let problem = ImageProblem {
+        terms: &terms,
+        frames: (0..measured.times.len()).collect(),
+        priors: &[],
+        envelope: Some((&envelope, 1.0)),
+        strength: 1.0,
+        flux: FluxPrior { jy: 0.6, sigma_jy: 0.05 },
+        side: 32,
+    };
+    let begin = problem.parameters_of(&start::image(file.image.starts[0], grid));
+    let solved = |begin: &[f64], most: usize| solve::solve(&problem, begin, most, &|| true);
+    assert!(!solved(&begin, 1).unwrap().has_converged);
+    let found = solved(&begin, 2000).unwrap();
+    assert!(found.has_converged, "{} after {}", found.loss, found.iterations);
+    let mut dark = begin.clone();
+    (0..1024).filter(|k| k % 32 < 14).for_each(|k| dark[k] -= 60.0);
+    let raised = solved(&dark, 2000).unwrap();
+    assert!(raised.loss < 1.02 * found.loss, "{} {}", raised.loss, found.loss);
+}
+
+/// A ring through gains is fitted best by a crescent with its diameter and direction, and not as well by what has no hole.
+#[test]
+fn exact_shapes_tell_a_ring_from_what_has_no_hole() {
+    let file = StaticImageFile::parse(SETTINGS).unwrap();
+    let found = fit_shapes(&file, &measured(&file, 2), &|| true).unwrap().unwrap();
+    let best = found.iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion)).unwrap();
+    assert_eq!(best.shape, Shape::Crescent, "{found:?}");
+    let [diameter, width, direction] = [0, 1, 2].map(|k| best.sizes[k].1);
+    assert!((diameter - 44.0).abs() < 2.0 && (width - 16.0).abs() < 5.0, "{diameter} {width}");
+    assert!((direction - 170.0).abs() < 10.0, "{direction}");
+    for fit in found.iter().filter(|fit| !fit.shape.is_ring()) {
+        assert!(fit.criterion > best.criterion + 10.0, "{fit:?}");
+    }
+}
+
+/// A disc is filled, and two knots leave gaps on the circle that joins them; a crescent that is dark on one side has one gap.
+#[test]
+fn exact_a_disc_and_a_double_have_no_ring() {
+    let grid = grid(60);
+    let light = |of: &dyn Fn(f64, f64) -> f64| -> Vec<f64> {
+        let place = |k: usize| [grid.east(k % 60), grid.north(k / 60)].map(|x| x / MICROARCSECOND);
+        let all = (0..grid.pixels()).map(place);
+        all.map(|[east, north]| of(east, north)).collect()
+    };
+    let bell = |x: f64| (-4.0 * core::f64::consts::LN_2 * x * x).exp();
+    let disc = light(&|x, y| {
+        1.0 / (1.0 + (x.hypot(y) - 30.0).exp()) + 0.2 * bell((x.hypot(y) - 24.0) / 8.0)
+    });
+    assert_eq!(Ring::measure(&disc, grid, &RADII), None);
+    let knot = |x: f64, y: f64| bell(x.hypot(y) / 14.0);
+    let double = light(&|x, y| knot(x - 18.0, y) + 0.8 * knot(x + 18.0, y));
+    assert_eq!(Ring::measure(&double, grid, &RADII), None);
+    let crescent = ring(grid, [42.0, 14.0], [0.0, 0.0], [0.9, 170.0]);
+    assert!(Ring::measure(&crescent, grid, &RADII).is_some());
 }
 
 /// A watch that says no ends the search without a result; too few frames to hold some out are an error.
 #[test]
 fn exact_the_search_can_be_stopped() {
     let file = StaticImageFile::parse(SETTINGS).unwrap();
-    assert!(survey(&file, &measured(&file, 4), &|_, _| false).unwrap().is_none());
+    assert!(survey(&file, &measured(&file, 4), &[], &|_, _| false).unwrap().is_none());
     let text = format!("{SETTINGS}[strength]\nvalues = [0.5, 1.0]\nfolds = 9\n");
     let file = StaticImageFile::parse(&text).unwrap();
     let error = Measured::of_static(&file, observed(4), "data").err().unwrap().to_string();

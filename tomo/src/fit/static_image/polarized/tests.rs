@@ -141,7 +141,7 @@ fn found(text: &str, seed: u64, leakage: Option<f64>) -> PolarizedSurvey {
     let file = StaticImageFile::parse(text).unwrap();
     let seen = observed(seed, leakage);
     let measured = Measured::of_static(&file, seen.clone(), "data").unwrap();
-    let intensity = survey(&file, &measured, &|_, _| true).unwrap().unwrap();
+    let intensity = survey(&file, &measured, &[], &|_, _| true).unwrap().unwrap();
     let polarized = Measured::of_static_polarized(&file, seen, "data").unwrap().unwrap();
     survey_polarized(&file, &polarized, &intensity, &|_, _| true).unwrap().unwrap()
 }

@@ -1,0 +1,247 @@
+//! Simple shapes that are fitted to the data of an image, with the same gains: what the image has to do better than.
+
+use super::ImageProblem;
+use super::solve::minimum;
+use crate::Error;
+use crate::fit::settings::{LossKind, StaticImageFile};
+use crate::fit::setup::Measured;
+use crate::fit::static_image::FluxPrior;
+use core::f64::consts::{LN_2, TAU};
+use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_vlbi::operator::ImageGrid;
+use rayon::prelude::*;
+
+/// A shape with a few parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    /// An elliptical Gaussian.
+    Gaussian,
+    /// A round disc of even brightness.
+    Disc,
+    /// A round ring of even brightness with a Gaussian cross-section.
+    Ring,
+    /// The same, brighter on one side.
+    Crescent,
+    /// Two round Gaussians.
+    Double,
+}
+
+/// A shape with the parameters for which it fits best.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShapeFit {
+    /// Which shape.
+    pub shape: Shape,
+    /// Its sizes: name, value, and unit.
+    pub sizes: Vec<(&'static str, f64, &'static str)>,
+    /// Shares of the flux in the pixels.
+    pub shares: Vec<f64>,
+    /// Its flux, Jy.
+    pub flux_jy: f64,
+    /// χ² per datum of each kind.
+    pub chi2: Vec<f64>,
+    /// χ² of all independent data, plus the number of parameters times the logarithm of that of the data (Schwarz 1978, Annals
+    /// of Statistics 6, 461): the less, the better.
+    pub criterion: f64,
+}
+
+impl Shape {
+    /// All of them.
+    pub const ALL: [Self; 5] =
+        [Self::Gaussian, Self::Disc, Self::Ring, Self::Crescent, Self::Double];
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gaussian => "Gaussian",
+            Self::Disc => "disc",
+            Self::Ring => "ring",
+            Self::Crescent => "crescent",
+            Self::Double => "double",
+        }
+    }
+
+    /// Whether it is dark inside.
+    pub fn is_ring(self) -> bool {
+        matches!(self, Self::Ring | Self::Crescent)
+    }
+
+    /// Parameters to start from for a source of this size, µas. Lengths are logarithms of µas, offsets are in sizes.
+    fn starts(self, size: f64) -> Vec<Vec<f64>> {
+        let l = size.ln();
+        let turns =
+            |count: usize| (0..count).map(move |k| (TAU * k as f64 / count as f64).sin_cos());
+        let around = [0.75f64, 1.0, 1.35];
+        match self {
+            Self::Gaussian => vec![vec![l, 0.0, 0.0], vec![l - 0.5, 0.0, 0.0]],
+            Self::Disc => [1.2f64, 1.6, 2.1].iter().map(|f| vec![l + f.ln()]).collect(),
+            Self::Ring => around.iter().map(|f| vec![l + f.ln(), l - 1.0]).collect(),
+            Self::Crescent => turns(4)
+                .flat_map(|(s, c)| around.iter().map(move |f| vec![l + f.ln(), l - 1.0, s, c]))
+                .collect(),
+            Self::Double => {
+                turns(12).map(|(s, c)| vec![l - 0.7, l - 0.7, 0.4 * s, 0.4 * c, 0.2]).collect()
+            }
+        }
+    }
+
+    /// Shares of the flux in the pixels of a grid.
+    fn shares(self, x: &[f64], size: f64, grid: ImageGrid) -> Vec<f64> {
+        let pixel = grid.pixel_rad / MICROARCSECOND;
+        // Nothing is narrower than pixels tell.
+        let width = |ln: f64| ln.clamp(-5.0, 9.0).exp().hypot(pixel);
+        let bell = |square: f64, ln: f64| (-4.0 * LN_2 * square / width(ln).powi(2)).exp();
+        let light = |east: f64, north: f64| match self {
+            Self::Gaussian => {
+                let h = x[1].hypot(x[2]).min(3.0);
+                let part = if h > 0.0 { h.sinh() / h } else { 1.0 };
+                let round = h.cosh() * (east * east + north * north);
+                let long = x[1] * (east * east - north * north) + 2.0 * x[2] * east * north;
+                bell((round + part * long).max(0.0), x[0])
+            }
+            Self::Disc => {
+                // An edge of a pixel.
+                let inside = (0.5 * width(x[0]) - east.hypot(north)) / pixel;
+                1.0 / (1.0 + (-4.0 * inside).exp())
+            }
+            Self::Ring => bell((east.hypot(north) - 0.5 * width(x[0])).powi(2), x[1]),
+            Self::Crescent => {
+                let r = east.hypot(north).max(1e-9);
+                let side = (x[2] * east + x[3] * north) / r;
+                bell((r - 0.5 * width(x[0])).powi(2), x[1]) * side.exp()
+            }
+            Self::Double => {
+                let off = [0.5 * size * x[2], 0.5 * size * x[3]];
+                let one = |sign: f64, ln: f64| {
+                    let square = (east - sign * off[0]).powi(2) + (north - sign * off[1]).powi(2);
+                    bell(square, ln) / width(ln).powi(2)
+                };
+                let first = 1.0 / (1.0 + (-x[4]).exp());
+                first * one(1.0, x[0]) + (1.0 - first) * one(-1.0, x[1])
+            }
+        };
+        let of = |k: usize| {
+            let place = [grid.east(k % grid.width), grid.north(k / grid.width)];
+            light(place[0] / MICROARCSECOND, place[1] / MICROARCSECOND)
+        };
+        let all: Vec<f64> = (0..grid.pixels()).map(of).collect();
+        let sum: f64 = all.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        all.into_iter().map(|x| x / sum).collect()
+    }
+
+    /// Names, values and units of its sizes.
+    fn sizes(self, x: &[f64], size: f64) -> Vec<(&'static str, f64, &'static str)> {
+        let turn = |east: f64, north: f64| east.atan2(north).to_degrees().rem_euclid(360.0);
+        match self {
+            Self::Gaussian => {
+                let h = x[1].hypot(x[2]).min(3.0);
+                // The longer axis is where the form is least.
+                let angle = 0.5 * (-x[2]).atan2(x[1]).to_degrees();
+                vec![
+                    ("major axis", (x[0] + 0.5 * h).exp(), "µas"),
+                    ("minor axis", (x[0] - 0.5 * h).exp(), "µas"),
+                    ("position angle", angle.rem_euclid(180.0), "°"),
+                ]
+            }
+            Self::Disc => vec![("diameter", x[0].exp(), "µas")],
+            Self::Ring => vec![("diameter", x[0].exp(), "µas"), ("width", x[1].exp(), "µas")],
+            Self::Crescent => vec![
+                ("diameter", x[0].exp(), "µas"),
+                ("width", x[1].exp(), "µas"),
+                ("brightest direction", turn(x[2], x[3]), "°"),
+            ],
+            Self::Double => vec![
+                ("distance", size * x[2].hypot(x[3]), "µas"),
+                ("direction", turn(x[2], x[3]), "°"),
+                ("width of one", x[0].exp(), "µas"),
+                ("width of the other", x[1].exp(), "µas"),
+            ],
+        }
+    }
+}
+
+/// Fits all shapes; none if `go_on` said no.
+///
+/// # Errors
+/// If a loss has no data.
+pub fn fit_shapes(
+    file: &StaticImageFile,
+    measured: &Measured,
+    go_on: &(dyn Fn() -> bool + Sync),
+) -> Result<Option<Vec<ShapeFit>>, Error> {
+    let grid = file.image.grid()?;
+    let terms = measured.visibility_terms(&file.loss, grid.pixels())?;
+    let problem = ImageProblem {
+        terms: &terms,
+        frames: (0..measured.times.len()).collect(),
+        priors: &[],
+        envelope: None,
+        strength: 1.0,
+        flux: FluxPrior { jy: file.image.flux_jy, sigma_jy: file.image.flux_sigma_jy },
+        side: file.image.pixels,
+    };
+    let one = |shape: &Shape| best(*shape, &problem, (file, grid), go_on);
+    Ok(Shape::ALL.par_iter().map(one).collect())
+}
+
+/// Iterations from one start, at most.
+const ITERATIONS: usize = 60;
+
+fn best(
+    shape: Shape,
+    problem: &ImageProblem<'_>,
+    (file, grid): (&StaticImageFile, ImageGrid),
+    go_on: &(dyn Fn() -> bool + Sync),
+) -> Option<ShapeFit> {
+    let size = 0.32 * file.image.field_uas;
+    let image = |x: &[f64]| -> Vec<f64> {
+        let (flux, sizes) = x.split_first().unwrap_or((&0.0, &[]));
+        let shares = shape.shares(sizes, size, grid);
+        shares.into_iter().map(|share| share * file.image.flux_jy * flux.exp()).collect()
+    };
+    let solved = |start: Vec<f64>| {
+        let mut objective = |x: &[f64], g: &mut [f64]| {
+            let here = image(x);
+            let (value, of_image) = problem.data_and_gradient(&here, x[0].exp());
+            for (k, g) in g.iter_mut().enumerate() {
+                const STEP: f64 = 1e-4;
+                let moved = |step: f64| {
+                    let mut x = x.to_vec();
+                    x[k] += step;
+                    image(&x)
+                };
+                let ends = moved(STEP).into_iter().zip(moved(-STEP));
+                *g = ends.zip(&of_image).map(|((a, b), g)| (a - b) * g).sum::<f64>() / (2.0 * STEP);
+            }
+            g[0] += problem.flux_slope(x[0].exp());
+            value
+        };
+        let begin: Vec<f64> = [0.0].into_iter().chain(start).collect();
+        minimum(&mut objective, &begin, ITERATIONS, go_on)
+    };
+    let all: Option<Vec<_>> = shape.starts(size).into_par_iter().map(solved).collect();
+    let found = all?.into_iter().min_by(|a, b| a.loss.total_cmp(&b.loss))?;
+    let here = image(&found.parameters);
+    let chi2 = problem.chi2(&here);
+    let (total, count) = independent(problem, file, &chi2);
+    Some(ShapeFit {
+        shape,
+        sizes: shape.sizes(&found.parameters[1..], size),
+        shares: shape.shares(&found.parameters[1..], size, grid),
+        flux_jy: here.iter().sum(),
+        chi2,
+        criterion: total + found.parameters.len() as f64 * count.max(1.0).ln(),
+    })
+}
+
+/// χ² and number of the data that are not made of each other: log closure amplitudes repeat what amplitudes with gains say.
+fn independent(problem: &ImageProblem<'_>, file: &StaticImageFile, chi2: &[f64]) -> (f64, f64) {
+    let has_amplitudes = file
+        .loss
+        .iter()
+        .any(|loss| matches!(loss.data, LossKind::Amplitudes | LossKind::Visibilities));
+    let repeats = |kind: LossKind| kind == LossKind::LogClosureAmplitudes && has_amplitudes;
+    let kinds = file.loss.iter().zip(problem.counts()).zip(chi2);
+    kinds
+        .filter(|((loss, _), _)| !repeats(loss.data))
+        .fold((0.0, 0.0), |sum, ((_, n), chi2)| (sum.0 + chi2 * n as f64, sum.1 + n as f64))
+}
