@@ -148,7 +148,8 @@ fn exact_plunging_matter_on_both_ways_to_trace() {
         assert!(plunging > 30, "{plunging}");
         let dark = look_by("elliptic", None);
         for (a, b) in closed.iter().zip(&dark).filter(|(a, _)| a.disc_images >> 16 == 0) {
-            assert_eq!(a, b);
+            // How a ray passes the disc depends on where the disc ends.
+            assert_eq!(a, &RayResult { passes: a.passes, ..*b });
         }
     }
 }
