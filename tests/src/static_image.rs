@@ -16,7 +16,7 @@ const QUICK: [&str; 5] = [
     "image.pixels=32",
     "image.iterations=1000",
     "image.draws=4",
-    "strength={values=[0.1,1.0],folds=3}",
+    "strength={values=[10.0,30.0],folds=3}",
     "image.starts=[{gaussian={fwhm_uas=60.0}}]",
 ];
 
