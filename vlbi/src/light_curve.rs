@@ -1,6 +1,6 @@
 //! Light curves: the flux of an unresolved source over time, in Stokes parameters.
 //!
-//! Position angles are those of [`kerrlight_render::polarization`]: of the electric vector, from north towards east, Q = P cos 2χ,
+//! Position angles are those of `kerrlight_render::polarization`: of the electric vector, from north towards east, Q = P cos 2χ,
 //! U = P sin 2χ (IAU 1973). Circular feeds measure RR = I + V, LL = I − V, RL = Q + iU, LR = Q − iU.
 
 use super::array::Station;

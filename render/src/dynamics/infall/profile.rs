@@ -107,7 +107,7 @@ impl<N: Elementary> Profile<N> {
         lift(values[k]) + part * (lift(v0) + part * (lift(c) + part * lift(d)))
     }
 
-    /// The fall from [`FARTHEST`](super::FARTHEST) to inside of any horizon, or the rise from there.
+    /// The fall from the farthest radius to inside of any horizon, or the rise from there.
     pub fn trajectory(&self) -> Trajectory<N> {
         let lift = |x: N| Along { value: x, slope: [N::constant(0.0)] };
         let at = move |r: Along<N>| -> Point<Along<N>> {
