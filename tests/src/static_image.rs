@@ -238,7 +238,7 @@ fn exact_images_are_like_the_skies_that_were_observed() {
     for (name, sky, least) in SKIES {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path();
-        write_image(path, 120, |east, north| sky(east, north));
+        write_image(path, 120, sky);
         succeed(path, &SEEN.split(' ').collect::<Vec<_>>());
         succeed(path, &["fit", "--data", "data.uvfits", "-o", "run"]);
         let found = results(&path.join("run"));

@@ -1,6 +1,7 @@
 //! Settings of a static image, guessed from visibilities.
 
 use super::polarized::Tables;
+use super::sources::PublishedImages;
 use super::{Source, complete, digits, gains, has_closures, plain_words, read, short_baselines};
 use anyhow::Context;
 use core::f64::consts::{LN_2, PI};
@@ -41,19 +42,11 @@ pub fn of_visibilities(
     let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
     let published = source.and_then(|source| source.image.as_ref());
     let field = published.map_or(5.0 * beam, |images| images.field_uas);
-    let seen = resolved_width(observation, flux).map(|width| width.clamp(beam, 0.48 * field));
     let field_why = published.map_or(
         "five times what the longest baseline resolves: all compact light lies in this field",
         |images| images.source,
     );
-    let (envelope, envelope_why) = match (published, seen) {
-        (Some(images), _) => (images.envelope_uas, images.source),
-        (None, Some(width)) => (
-            width,
-            "the second moment of a ring whose flux falls as that of baselines up to half of the longest, by their median",
-        ),
-        (None, None) => (0.48 * field, "light is expected within as much"),
-    };
+    let (envelope, envelope_why) = envelope(observation, published, [flux, beam, field]);
     let scaled = |part: f64| digits(part * field);
     let fields = [
         ("title", format!("{}{day}", plain_words(name))),
@@ -77,6 +70,23 @@ pub fn of_visibilities(
         ("path", path.to_owned()),
     ];
     complete(include_str!("image.toml"), &fields)
+}
+
+/// Width of the envelope, µas, and why: as published, or as wide as the fall of the flux says, at least the beam.
+fn envelope(
+    observation: &Observation,
+    published: Option<&PublishedImages>,
+    [flux, beam, field]: [f64; 3],
+) -> (f64, &'static str) {
+    let seen = resolved_width(observation, flux).map(|width| width.clamp(beam, 0.48 * field));
+    match (published, seen) {
+        (Some(images), _) => (images.envelope_uas, images.source),
+        (None, Some(width)) => (
+            width,
+            "the second moment of a ring whose flux falls as that of baselines up to half of the longest, by their median",
+        ),
+        (None, None) => (0.48 * field, "light is expected within as much"),
+    }
 }
 
 /// Full width at half maximum of a round Gaussian, µas, that has the flux of the shortest baselines that resolve it: the median over

@@ -65,6 +65,19 @@ fn candidate(image: &Candidate) -> Value {
     })
 }
 
+/// A shape as it is listed.
+fn shape(fit: &ShapeFit) -> Value {
+    let sizes: Map<String, Value> =
+        fit.sizes.iter().map(|(name, value, _)| ((*name).to_owned(), json!(value))).collect();
+    json!({
+        "shape": fit.shape.name(),
+        "sizes": sizes,
+        "flux_jy": fit.flux_jy,
+        "chi2_per_datum": fit.chi2,
+        "criterion": fit.criterion,
+    })
+}
+
 impl Found<'_> {
     /// All numbers.
     pub fn results(&self) -> Value {
@@ -115,18 +128,6 @@ impl Found<'_> {
         if let Some(polarized) = &self.polarized {
             polarized.add_to(&mut results);
         }
-        let shape = |fit: &ShapeFit| {
-            let sizes: Map<String, Value> = (fit.sizes.iter())
-                .map(|(name, value, _)| ((*name).to_owned(), json!(value)))
-                .collect();
-            json!({
-                "shape": fit.shape.name(),
-                "sizes": sizes,
-                "flux_jy": fit.flux_jy,
-                "chi2_per_datum": fit.chi2,
-                "criterion": fit.criterion,
-            })
-        };
         results["shapes"] = self.shapes.iter().map(shape).collect();
         let [with, all] = self.survey.with_ring();
         results["images_with_ring"] = json!({"count": with, "of": all});
