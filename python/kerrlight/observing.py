@@ -137,9 +137,9 @@ def observe(
         if times.shape != (frames,):
             raise ValueError(f"frame_hours has the shape {times.shape}, not ({frames},): an hour for every image")
         hours = times.tolist()
-    for name, given in (("utc", utc), ("gmst", gmst), ("elevation_deg", elevation_deg)):
-        if given is not None and np.shape(given) != (2,):
-            raise ValueError(f"{name} has the shape {np.shape(given)}, not (2,): from and to")
+    for name, ends in (("utc", utc), ("gmst", gmst), ("elevation_deg", elevation_deg)):
+        if ends is not None and np.shape(ends) != (2,):
+            raise ValueError(f"{name} has the shape {np.shape(ends)}, not (2,): from and to")
     chosen = stations(array) if isinstance(array, (str, PathLike)) else tuple(array)
     plan = {
         "stations": [
@@ -166,8 +166,8 @@ def observe(
         "seed": 0 if seed is None else int(seed),
     }
     height, width = movie.shape[-2:]
-    flat = [
-        None if given is None else np.require(given, requirements=["C", "A"]).reshape(-1)
-        for given in (movie, *polarized)
-    ]
-    return Observation._of(_core.observe(flat[0], flat[1:], (width, height, float(field_uas)), plan))
+    def flat(images: np.ndarray) -> np.ndarray:
+        return np.require(images, requirements=["C", "A"]).reshape(-1)
+
+    others = [None if given is None else flat(given) for given in polarized]
+    return Observation._of(_core.observe(flat(movie), others, (width, height, float(field_uas)), plan))
