@@ -288,8 +288,8 @@ def r_equatorial(
     :param th_o: inclination (radians).
 
     >>> radius, mino, total, last = r_equatorial(0.94, 1e4, 0.3, 0, [6.0, 0.5], [1.0, 0.5])
-    >>> bool(abs(radius[0] - 5.15) < 0.01), last.tolist()
-    (True, [0.0, -1.0])
+    >>> bool(abs(radius[0] - 4.919) < 0.001), last.tolist()
+    (True, [1.0, -1.0])
     """
     mbar = whole("mbar", mbar, 0, MOST_CROSSINGS - 1)
     rays = Kerr(a).observer(inclination_rad=th_o, radius=r_o).trace(
