@@ -1,10 +1,13 @@
 //! Stokes parameters.
 
 use core::ops::{AddAssign, Mul};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// One of the four.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
+)]
 pub enum StokesParameter {
     /// Intensity.
     I,

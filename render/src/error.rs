@@ -5,11 +5,12 @@ use crate::emission::mesh::MeshError;
 use crate::emission::sky::{CatalogueError, PanoramaError};
 use crate::image::animation::AnimationError;
 use crate::picture::RenderError;
-use crate::scene::{SceneError, shown};
+use crate::scene::SceneError;
 use crate::volume::metrics::Mismatch;
 use crate::volume::vti::VtiError;
 use crate::volume::{VolumeError, VolumeFileError};
 use kerrlight_common::numpy::NumpyError;
+use kerrlight_common::toml_file::shown;
 use kerrlight_geodesic::Error as OutOfRange;
 use std::borrow::Cow;
 

@@ -6,9 +6,11 @@
 
 mod deserializer;
 mod error;
+mod keys;
 mod serializer;
 
 pub use error::ReadError;
+pub use keys::{Key, Keys, OutOfRange, Range, shown};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;

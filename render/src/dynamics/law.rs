@@ -4,12 +4,13 @@ use super::infall::{Falling, Law, Profile};
 use super::{AngularVelocity, Perturbation};
 use crate::Error;
 use kerrlight_geodesic::infall::Mixture;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// How matter moves about an axis, as scenes and fits write it: a law of the angular velocity Ω(r), or one of both Ω and
 /// dr/dt.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Velocity {
@@ -17,22 +18,28 @@ pub enum Velocity {
     Keplerian {
         /// M; for circular geodesics about the hole's axis its spin. Without it, a ξ_z of the hole and the axis.
         #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = -1.0, max = 1.0), extend("unit" = "a/M, as Ω = 1/(r^{3/2} + drag)"))]
         drag: Option<f64>,
     },
     /// rate (radius/r)^exponent.
     PowerLaw {
         /// Where the rate is reached, M.
+        #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
         radius: f64,
         /// Radians per M.
+        #[schemars(range(min = -1e3, max = 1e3), extend("unit" = "radians per M"))]
         rate: f64,
         /// 1.5: Keplerian without spin, 0: like a rigid body.
+        #[schemars(range(min = -20.0, max = 20.0), extend("unit" = "an exponent"))]
         exponent: f64,
     },
     /// Linear between these, held beyond the first and the last.
     Table {
         /// Growing, M.
+        #[schemars(inner(range(min = 1e-3, max = 1e6)), extend("unit" = "M"))]
         radii: Vec<f64>,
         /// Radians per M.
+        #[schemars(inner(range(min = -1e3, max = 1e3)), extend("unit" = "radians per M"))]
         rates: Vec<f64>,
     },
     /// Another law, and a Gaussian process over the radius.
@@ -41,28 +48,35 @@ pub enum Velocity {
     /// ([`kerrlight_geodesic::infall`]; Cárdenas-Avendaño, Lupsasca & Zhu 2023).
     Infall {
         /// ξ: specific angular momentum over that of circular geodesics, 0 to 1.
+        #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "an angular momentum over that of circular orbits"))]
         xi: f64,
         /// β_r: 1, the radial velocity of circular orbits and their plunge; 0, that of free fall.
+        #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "0: free fall, 1: circular"))]
         beta_r: f64,
         /// β_φ: the same of the angular velocity.
+        #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "0: free fall, 1: circular"))]
         beta_phi: f64,
         /// The spin as the flow sees it, M; without it, a ξ_z of the hole and the axis.
         #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = -1.0, max = 1.0), extend("unit" = "a/M"))]
         drag: Option<f64>,
     },
     /// Monotone cubics between these, held beyond the first and the last.
     Profile {
         /// Growing, M.
+        #[schemars(inner(range(min = 1e-3, max = 1e6)), extend("unit" = "M"))]
         radii: Vec<f64>,
         /// Ω, radians per M.
+        #[schemars(inner(range(min = -1e3, max = 1e3)), extend("unit" = "radians per M"))]
         angular: Vec<f64>,
         /// dr/dt, dimensionless: all below 0, all above 0, or all 0.
+        #[schemars(inner(range(min = -1.0, max = 1.0)), extend("unit" = "dr/dt"))]
         radial: Vec<f64>,
     },
 }
 
 /// A law and a Gaussian process over the radius, which is drawn from a seed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Perturbed {
     /// The law without it.

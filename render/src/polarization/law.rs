@@ -3,10 +3,11 @@
 use super::{Gas, Stokes, SynchrotronView, view};
 use crate::Error;
 use kerrlight_geodesic::{ScreenPoint, ZamoFrame};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What the components of a field are along.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Components {
     /// The Boyer–Lindquist coordinates: B^θ and B^φ are angles.
@@ -16,7 +17,7 @@ pub enum Components {
 }
 
 /// Whose the components of a field are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FieldFrame {
     /// What the gas measures, as in [`MagneticField`](super::MagneticField).
@@ -28,7 +29,7 @@ pub enum FieldFrame {
 }
 
 /// What the strength of the field is measured in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Normalisation {
     /// Its own unit.
@@ -38,22 +39,26 @@ pub enum Normalisation {
 }
 
 /// A mixture of fields, B^r = radial sinⁿθ + vertical cos θ, B^θ = −vertical sin θ, B^φ = toroidal.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MixedField {
     /// Along +z.
+    #[schemars(range(min = -1e12, max = 1e12), extend("unit" = "a share of the field"))]
     pub vertical: f64,
     /// Away from the hole.
+    #[schemars(range(min = -1e12, max = 1e12), extend("unit" = "a share of the field"))]
     pub radial: f64,
     /// Around +z.
+    #[schemars(range(min = -1e12, max = 1e12), extend("unit" = "a share of the field"))]
     pub toroidal: f64,
     /// n: 0, the same at all latitudes; 1, none on the axis.
+    #[schemars(range(min = 0.0, max = 20.0), extend("unit" = "an exponent"))]
     pub radial_sine_power: f64,
 }
 
 /// How much light gas gives off, and how it is polarised: I ∝ g^a |b|^c sin^s θ_B per unit of emission, a linearly
 /// polarised part Π with the electric vector along k × b, and no V.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PolarizationLaw {
     /// The field.
@@ -63,16 +68,21 @@ pub struct PolarizationLaw {
     /// Whose they are.
     pub frame: FieldFrame,
     /// a, of the redshift factor along the affine parameter: 2 + spectral index in the textbook.
+    #[schemars(range(min = -20.0, max = 20.0), extend("unit" = "an exponent"))]
     pub redshift_power: f64,
     /// c, of the field's strength: 1 + spectral index in the textbook.
+    #[schemars(range(min = 0.0, max = 20.0), extend("unit" = "an exponent"))]
     pub field_power: f64,
     /// s, of the sine of the angle between field and light: 1 + spectral index in the textbook.
+    #[schemars(range(min = 0.0, max = 20.0), extend("unit" = "an exponent"))]
     pub sine_power: f64,
     /// Π, the linearly polarised part of the light, 0 to 1.
+    #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "a part of the light"))]
     pub fraction: f64,
     /// What |b| is measured in.
     pub normalisation: Normalisation,
     /// What is added to position angles on the sky, degrees east of north.
+    #[schemars(range(min = -360.0, max = 360.0), extend("unit" = "degrees east of north"))]
     pub turn_deg: f64,
 }
 

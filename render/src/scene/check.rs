@@ -2,10 +2,11 @@
 
 use super::check_sources::{check_disc, check_gas, check_mesh, check_sky, check_spot};
 use super::check_volume::{check_falls, check_volume};
-use super::invalid::{Invalid, number, positive, shown};
+use super::invalid::{Invalid, number, positive};
 use super::{Scene, Sky};
 use crate::Error;
 use crate::polarization::PowerLaw;
+use kerrlight_common::toml_file::shown;
 use kerrlight_geodesic::Kerr;
 
 pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {

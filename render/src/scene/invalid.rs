@@ -2,6 +2,7 @@
 
 use crate::Error;
 use kerrlight_common::toml_file::ReadError;
+use kerrlight_common::toml_file::shown;
 use toml_edit::{Document, Item};
 
 /// Why a scene text is not a scene.
@@ -58,16 +59,6 @@ pub(super) struct Invalid {
     key: String,
     value: Option<String>,
     allowed: String,
-}
-
-/// A number as a person would write it: `0.5`, `1e-12`.
-pub fn shown(value: f64) -> String {
-    let size = value.abs();
-    if size != 0.0 && size.is_finite() && !(1e-4..1e9).contains(&size) {
-        format!("{value:e}")
-    } else {
-        value.to_string()
-    }
 }
 
 impl Invalid {

@@ -15,7 +15,7 @@ mod sources;
 
 pub use crate::dynamics::{Perturbed, Velocity};
 pub use camera::{CameraConfig, CameraKey, CameraMotion, Pose};
-pub use invalid::{SceneError, line_of, shown};
+pub use invalid::{SceneError, line_of};
 pub use overrides::apply_override;
 pub use rotation::Rotation;
 pub use sources::{

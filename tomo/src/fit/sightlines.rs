@@ -9,6 +9,7 @@ use kerrlight_geodesic::{
     BlockRequest, BlockTracer, Integrator, Kerr, Observer, PathOfRay, PlaneCrossing, Quantities,
     RayBlock, RayVisitor, SphereNodes, TracedRay, View,
 };
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Where emission is looked for.
@@ -65,21 +66,24 @@ impl Region {
 }
 
 /// Where nodes lie on a ray.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Sampling {
     /// Gauss–Legendre panels in Mino time inside the sphere r_max, weights Σ dτ: the integral over
     /// the affine parameter.
     Gauss {
         /// Nodes of a panel, at most 16.
+        #[schemars(range(min = 1, max = 16), extend("unit" = "nodes of a panel"))]
         order: usize,
         /// Into how many panels each of the coarsest ones is cut.
+        #[schemars(range(min = 1, max = 1_000_000_000), extend("unit" = "cuts of the coarsest panels"))]
         split: u32,
     },
     /// Equidistant in Mino time over the whole ray, weights |x_i − x_{i−1}|: the sums of BH-NeRF
     /// (Levis et al. 2022). Needs an observer at a finite radius.
     EqualMinoTime {
         /// Nodes of a ray.
+        #[schemars(range(min = 2, max = 100_000), extend("unit" = "nodes of a ray"))]
         per_ray: usize,
     },
 }

@@ -7,16 +7,17 @@ use super::sightlines::Region;
 use crate::optimise::{Adam, Lbfgs, Muon, Polynomial};
 use crate::representation::Representation;
 use kerrlight_common::simd::Float;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What a step looks at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum BatchSize {
     /// That many random (ray, frame) pairs; for images alone.
-    Pixels(usize),
+    Pixels(#[schemars(range(min = 1, max = 1_000_000_000), extend("unit" = "pixels"))] usize),
     /// That many random frames, whole.
-    Frames(usize),
+    Frames(#[schemars(range(min = 1), extend("unit" = "frames"))] usize),
     /// All frames, whole: the same loss at every step.
     All,
 }

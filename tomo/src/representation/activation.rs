@@ -1,10 +1,11 @@
 //! From an unbounded number to an emissivity.
 
 use kerrlight_common::simd::{Float, Lanes, math};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The last function of a representation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Activation {

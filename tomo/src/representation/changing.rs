@@ -7,10 +7,11 @@ use kerrlight_geodesic::vector::norm;
 use kerrlight_render::dynamics::{
     AngularVelocity, Axis, Cotangents, Turned, pull_back, pull_back_vjp,
 };
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Which changes are allowed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Allowed {

@@ -7,22 +7,26 @@ use crate::observation::Observation;
 use core::f64::consts::PI;
 use rand::RngExt;
 use rand_distr::StandardNormal;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Random gains: V₁₂ becomes g₁ ḡ₂ V₁₂, the same for all hands.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GainErrors {
     /// Standard deviation of ln|g|, dimensionless, one number a station for the whole observation.
+    #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a standard deviation of ln |g|"))]
     pub constant_amplitude: f64,
     /// Standard deviation of ln|g|, dimensionless, another number a station and scan.
+    #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a standard deviation of ln |g|"))]
     pub scan_amplitude: f64,
     /// Whether arg g is random, uniform on the circle, for every station and scan, as the
     /// atmosphere makes it at millimetre wavelengths.
     pub random_phases: bool,
     /// Stations with a standard deviation of their own in place of `scan_amplitude`, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[schemars(extend("additionalProperties" = {"minimum": 0.0, "maximum": 10.0}, "unit" = "a standard deviation of ln |g|"))]
     pub stations: BTreeMap<String, f64>,
 }
 

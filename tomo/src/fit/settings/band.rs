@@ -1,10 +1,11 @@
 //! The search for a world in which a light curve is that of a flare in an orbital band.
 
 use crate::fit::linear::Roughness;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Numbers at equal distances.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Steps {
     /// The first.
@@ -12,6 +13,7 @@ pub struct Steps {
     /// The last.
     pub to: f64,
     /// From one to the next, above 0.
+    #[schemars(range(min = 1e-3))]
     pub step: f64,
 }
 
@@ -25,24 +27,32 @@ impl Steps {
 }
 
 /// Worlds that are compared, and what is thought of the emission in each.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BandSettings {
     /// Inclinations, degrees.
+    #[schemars(extend("minimum" = 0.0, "maximum" = 180.0, "unit" = "degrees"))]
     pub inclinations_deg: Steps,
     /// Angular velocities over that of `motion.velocity`; below 0 matter turns the other way.
+    #[schemars(inner(range(min = -10.0, max = 10.0)), extend("unit" = "a factor"))]
     pub rotation_factors: Vec<f64>,
     /// Position angles of the spin, degrees east of north.
+    #[schemars(inner(range(min = -360.0, max = 360.0)), extend("unit" = "degrees east of north"))]
     pub position_angles_deg: Vec<f64>,
     /// Radii of the band, M.
+    #[schemars(extend("minimum" = 1e-3, "maximum" = 1e6, "unit" = "M"))]
     pub radii: Steps,
     /// Standard deviations of the band across its circle, M.
+    #[schemars(inner(range(min = 1e-3, max = 1e6)), extend("unit" = "M"))]
     pub widths: Vec<f64>,
     /// Its standard deviation in z, M.
+    #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub height: f64,
     /// Correlation lengths of the emission, M.
+    #[schemars(inner(range(min = 1e-3, max = 1e6)), extend("unit" = "M"))]
     pub lengths: Vec<f64>,
     /// Rings between the axis and the largest radius of the region.
+    #[schemars(range(min = 4, max = 128), extend("unit" = "rings between the axis and region.r_max"))]
     pub nodes: usize,
     /// What shines beside the flare; nothing, without.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -50,7 +60,7 @@ pub struct BandSettings {
 }
 
 /// Light that no flare explains, in Q and in U: all combinations of these, each as probable.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BackgroundSettings {
     /// Standard deviation of what is constant, Jy.

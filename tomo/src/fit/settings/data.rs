@@ -2,11 +2,12 @@
 
 use super::{MeasuredCurve, Scattering, Variability};
 use kerrlight_render::polarization::StokesParameter;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// Measured data.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum DataFiles {
     /// Visibilities: UVFITS, eht-imaging's text, the EHT's tables or CSV.
@@ -14,13 +15,17 @@ pub enum DataFiles {
         /// The file, relative to the fit's.
         path: PathBuf,
         /// Rows this close in time are averaged and make a frame, s.
+        #[schemars(range(min = 0.0), extend("unit" = "seconds"))]
         average_s: f64,
         /// Part of each amplitude that is added to its error in quadrature: for what calibration has left.
+        #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "part of the amplitude"))]
         systematic: f64,
         /// Time of the first frame, M.
+        #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
         first_time: f64,
         /// Baselines shorter than this many wavelengths are left out: those within a site see extended emission too.
         #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 0.0), extend("unit" = "wavelengths"))]
         uv_min: Option<f64>,
         /// The interstellar medium that the light has passed.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -39,26 +44,29 @@ pub enum DataFiles {
 }
 
 /// Data and their share.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Loss {
     /// Which.
     pub data: LossKind,
     /// Factor on χ² per datum.
+    #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "a factor"))]
     pub weight: f64,
     /// Standard deviation of a pixel (image) or of the flux (light curve), Jy.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1e-15, max = 1e15), extend("unit" = "Jy"))]
     pub sigma: Option<f64>,
     /// Which of the Stokes parameters of a light curve; I, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stokes: Option<Vec<StokesParameter>>,
     /// Least signal-to-noise ratio of baselines of closure quantities.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "a signal-to-noise ratio"))]
     pub least_snr: Option<f64>,
 }
 
 /// Kinds of data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LossKind {
     /// Every pixel.

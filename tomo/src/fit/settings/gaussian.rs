@@ -3,10 +3,11 @@
 use super::{FitError, refuse};
 use crate::fit::linear::{Matern, Roughness};
 use crate::representation::Degree;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What of a field is Gaussian.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FieldKind {
     /// The emission.
@@ -16,32 +17,38 @@ pub enum FieldKind {
 }
 
 /// The prior of the voxels of a linear problem.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PriorOfVoxels {
     /// What is Gaussian.
     pub kind: FieldKind,
     /// Its mean, emission or the logarithm of that.
+    #[schemars(range(min = -1e12, max = 1e12), extend("unit" = "emission, or its logarithm"))]
     pub mean: f64,
     /// Its standard deviation at a point.
+    #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "a standard deviation"))]
     pub amplitude: f64,
     /// Of Matérn's covariance, M.
+    #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub correlation_length: f64,
     /// Its ν.
     pub matern: Roughness,
 }
 
 /// A truth that is drawn from such a prior, with the fit's seed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FieldSettings {
     /// What is Gaussian.
     pub kind: FieldKind,
     /// Its mean, emission or the logarithm of that.
+    #[schemars(range(min = -1e12, max = 1e12), extend("unit" = "emission, or its logarithm"))]
     pub mean: f64,
     /// Its standard deviation at a point.
+    #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "a standard deviation"))]
     pub amplitude: f64,
     /// Of Matérn's covariance, M.
+    #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub correlation_length: f64,
     /// Its ν.
     pub matern: Roughness,
@@ -49,6 +56,7 @@ pub struct FieldSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub negative: Option<Negative>,
     /// Nodes along each axis of the cube about the region.
+    #[schemars(range(min = 4, max = 256), extend("unit" = "nodes along each axis"))]
     pub nodes: usize,
     /// What is between them.
     #[serde(default = "cubic")]
@@ -56,7 +64,7 @@ pub struct FieldSettings {
 }
 
 /// What becomes of the negative parts of a field.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Negative {
     /// The field is moved to the nearest one that is nowhere negative, in the metric of its covariance.

@@ -2,17 +2,20 @@
 
 use super::{AxisSearch, FitError, FitFile, Kind, Linear, Start};
 use crate::Error;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Which setting is chosen, from which values, and how data are divided.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HeldOutSettings {
     /// The setting.
     pub setting: Weight,
     /// Its values, from which one is chosen.
+    #[schemars(inner(range(min = 0.0, max = 1e12)), extend("unit" = "a factor"))]
     pub values: Vec<f64>,
     /// Parts of the data, each of which is held out once: frame, or baseline, k belongs to part k modulo their number.
+    #[schemars(range(min = 2, max = 1000), extend("unit" = "parts of the data"))]
     pub folds: usize,
     /// What the data are divided by.
     #[serde(default)]
@@ -20,7 +23,7 @@ pub struct HeldOutSettings {
 }
 
 /// What is held out together.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum HeldOutBy {
     /// All data of a frame.
@@ -41,7 +44,7 @@ impl HeldOutBy {
 }
 
 /// A weight of the linear problem.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Weight {
     /// How much a change of emission costs.
     #[serde(rename = "change.weight")]

@@ -2,11 +2,12 @@
 
 use super::{FitError, refuse};
 use kerrlight_vlbi::gains::{GainPriors, PRIOR_TABLES, prior_table};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// What of the instrument the fit does not know.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InstrumentSettings {
     /// Complex gains of the stations, new ones in every frame.
@@ -18,34 +19,38 @@ pub struct InstrumentSettings {
 }
 
 /// Leakage that is solved for in turn with the emission.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LeakageSettings {
     /// Root mean square of |d| that is expected of d_R and d_L of all stations.
+    #[schemars(range(min = 1e-6, max = 1.0), extend("unit" = "a root mean square of |d|"))]
     pub amplitude: f64,
     /// Times that emission and leakage are solved for in turn, at most.
+    #[schemars(range(min = 1, max = 1000), extend("unit" = "times that both are solved for"))]
     pub rounds: usize,
 }
 
 /// Gains of stations that are solved for in every frame, beside every model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GainSettings {
     /// Whether phases are free.
     pub phases: GainPhases,
     /// Standard deviation of ln|g| of stations by name; 0: the amplitude is right.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[schemars(extend("additionalProperties" = {"minimum": 0.0, "maximum": 10.0}, "unit" = "a standard deviation of ln |g|"))]
     pub stations: BTreeMap<String, f64>,
     /// A table that comes with the program, for stations that are not listed: EHT2017 or ngEHT.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<String>,
     /// Standard deviation of ln|g| of all stations that neither has.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a standard deviation of ln |g|"))]
     pub amplitude: Option<f64>,
 }
 
 /// What is known of phases.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum GainPhases {
     /// Nothing, in any frame.

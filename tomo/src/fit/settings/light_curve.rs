@@ -3,11 +3,12 @@
 use super::Noise;
 use crate::fit::linear::Roughness;
 use kerrlight_render::polarization::StokesParameter;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// A number for some of the Stokes parameters.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case)]
 pub struct PerStokes {
@@ -38,16 +39,18 @@ impl PerStokes {
 }
 
 /// A light curve that is simulated.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SimulatedCurve {
     /// Hours of UTC of the samples.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = -1e4, max = 1e4)), extend("unit" = "hours of UTC"))]
     pub times_h: Option<Vec<f64>>,
     /// The same from a column of a file, relative to the fit's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub times: Option<PathBuf>,
     /// Time of the first sample, M.
+    #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub first_time: f64,
     /// Standard deviations, Jy.
     pub sigma: PerStokes,
@@ -61,11 +64,12 @@ pub struct SimulatedCurve {
     pub mean_flux: Option<MeanFlux>,
     /// Samples later than this many minutes after the first are not fitted: they judge the fit.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "minutes"))]
     pub validate_after_min: Option<f64>,
 }
 
 /// A background that is drawn, in Q and in U independent of each other.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SimulatedBackground {
     /// Standard deviation of a constant, Jy.
@@ -79,34 +83,40 @@ pub struct SimulatedBackground {
 }
 
 /// A mean of I.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeanFlux {
     /// Jy.
+    #[schemars(range(min = 1e-15, max = 1e15), extend("unit" = "Jy"))]
     pub jy: f64,
     /// Over so many minutes from the first sample on.
+    #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "minutes"))]
     pub minutes: f64,
 }
 
 /// A light curve of a file, and what is done with it, in this order.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeasuredCurve {
     /// The file, relative to the fit's.
     pub path: PathBuf,
     /// Time of the first sample that is left, M.
+    #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub first_time: f64,
     /// First and last hour of UTC; all, without.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = -1e4, max = 1e4)), extend("unit" = "hours of UTC"))]
     pub utc_h: Option<[f64; 2]>,
     /// Samples that are averaged; none, without.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = 1_000_000_000), extend("unit" = "samples"))]
     pub average: Option<usize>,
     /// Seconds over which samples are averaged; not at all, without.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub average_s: Option<f64>,
     /// Averages later than this many seconds after the one before are left out: they bridge gaps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "seconds"))]
     pub most_gap_s: Option<f64>,
     /// Standard deviations in Jy that take the place of the file's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -117,11 +127,14 @@ pub struct MeasuredCurve {
     /// What is added to position angles so that they are those of the source, degrees east of north: Faraday rotation
     /// that is taken back.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -360.0, max = 360.0), extend("unit" = "degrees east of north"))]
     pub derotation_deg: Option<f64>,
     /// I of all samples in place of the file's, Jy.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -1e15, max = 1e15), extend("unit" = "Jy"))]
     pub intensity: Option<f64>,
     /// Samples later than this many minutes after the first are not fitted: they judge the fit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "minutes"))]
     pub validate_after_min: Option<f64>,
 }

@@ -1,9 +1,10 @@
 //! What visibilities of a source behind the interstellar medium need besides: its scattering, and errors for what varies.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A known scattering screen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Scattering {
     /// Diffractive scattering towards Sgr A* (Johnson et al. 2018).
     #[serde(rename = "sgra")]
@@ -11,14 +12,17 @@ pub enum Scattering {
 }
 
 /// The scatter of visibilities of a source that varies about those of its mean image: σ = jy/(1 + (|u|/uv)²)^(power/2).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Variability {
     /// On short baselines, Jy, per real and imaginary part.
+    #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "Jy"))]
     pub jy: f64,
     /// The length of baselines from which on it falls, wavelengths.
+    #[schemars(range(min = 1.0), extend("unit" = "wavelengths"))]
     pub uv: f64,
     /// How steeply it falls.
+    #[schemars(range(min = 0.0, max = 20.0), extend("unit" = "an exponent"))]
     pub power: f64,
 }
 

@@ -11,12 +11,12 @@ mod faraday;
 mod gaussian;
 mod held_out;
 mod instrument;
+mod keys;
 mod light_curve;
 mod medium;
 mod penalties;
 mod plain;
 mod quiescent;
-mod ranges;
 mod recovery;
 mod simulation;
 mod static_image;
@@ -57,10 +57,11 @@ pub use world_search::{WorldSearch, WorldSteps, WorldView};
 use crate::Error;
 use kerrlight_common::toml_file;
 use kerrlight_render::polarization::PolarizationLaw;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The settings of a fit. Lengths and times in M = GM/c² unless a name says otherwise.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FitFile {
     /// One line that says what is fitted.
@@ -105,6 +106,7 @@ pub struct FitFile {
     /// `observer`, `region`, `effects` and `motion`; and what of the world the fit does not know
     /// ([`UnknownWorld`]).
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
+    #[schemars(with = "unknown_world::WorldKeys")]
     pub world: toml::Table,
     /// The array that sees the simulated movie.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -157,7 +159,7 @@ impl FitFile {
     /// ```
     pub fn parse(text: &str) -> Result<Self, Error> {
         let file = toml_file::read(text).map_err(FitError::Syntax)?;
-        ranges::check(text)?;
+        keys::check(text, Self::keys())?;
         Ok(file)
     }
 
@@ -170,9 +172,10 @@ impl FitFile {
 }
 
 /// The recovered volume.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
     /// Nodes of the volume along each axis.
+    #[schemars(range(min = 2, max = 512), extend("unit" = "nodes along each axis"))]
     pub nodes: usize,
 }

@@ -4,15 +4,17 @@ use super::{FitError, FitFile, Kind, Within, refuse};
 use crate::Error;
 use crate::fit::linear::Prior;
 use crate::fit::{Penalties, Probe, Regulariser};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A penalty.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PenaltySettings {
     /// Which: the other numbers are those of its kind.
     pub kind: PenaltyKind,
     /// Factor on its integral over the region.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a factor"))]
     pub weight: f64,
     /// Total variation: slope below which it is smoothed, emission per M.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -26,7 +28,7 @@ pub struct PenaltySettings {
 }
 
 /// Kinds of penalties.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum PenaltyKind {
@@ -41,10 +43,11 @@ pub enum PenaltyKind {
 }
 
 /// Where penalties look at a network.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeSettings {
     /// Nodes along each axis of the cube that holds the region.
+    #[schemars(range(min = 4, max = 256), extend("unit" = "nodes along each axis"))]
     pub nodes: usize,
 }
 

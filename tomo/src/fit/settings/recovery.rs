@@ -4,10 +4,11 @@ use super::{FieldKind, PriorOfVoxels};
 use crate::fit::BatchSize;
 use crate::representation::Activation;
 use crate::representation::Degree;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What is recovered.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Representation {
     /// Which: the other numbers are those of its kind.
@@ -35,12 +36,15 @@ pub struct Representation {
     pub degree: usize,
     /// Unit of length of a network, M.
     #[serde(default = "one")]
+    #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub length_scale: f64,
     /// Unit of time of a network, M.
     #[serde(default = "one")]
+    #[schemars(range(min = 1e-3, max = 1e9), extend("unit" = "M"))]
     pub time_scale: f64,
     /// Numbers of a representation that a program of one's own adds.
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
+    #[schemars(with = "std::collections::BTreeMap<String, schemars::Schema>")]
     pub own: toml::Table,
 }
 
@@ -53,7 +57,7 @@ impl Representation {
 }
 
 /// Kinds of representations.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// Network of the pulled-back point.
@@ -115,7 +119,7 @@ impl Kind {
 }
 
 /// How it is recovered.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Training {
     /// Rule of the steps.
@@ -124,20 +128,26 @@ pub struct Training {
     /// Steps.
     pub steps: u64,
     /// First learning rate, in units of the parameters.
+    #[schemars(range(min = 1e-12, max = 10.0), extend("unit" = "a learning rate"))]
     pub rate: f64,
     /// Last learning rate, in the same unit, reached linearly.
+    #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a learning rate"))]
     pub last_rate: f64,
     /// First learning rate of a grid, whose parameters are of another size than a network's; `rate`, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1e-12, max = 10.0), extend("unit" = "a learning rate"))]
     pub grid_rate: Option<f64>,
     /// Last learning rate of a grid.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a learning rate"))]
     pub grid_last_rate: Option<f64>,
     /// First learning rate of a feature grid; `rate`, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1e-12, max = 10.0), extend("unit" = "a learning rate"))]
     pub feature_rate: Option<f64>,
     /// Last learning rate of a feature grid.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a learning rate"))]
     pub feature_last_rate: Option<f64>,
     /// Steps over which rates grow to that.
     #[serde(default)]
@@ -151,26 +161,32 @@ pub struct Training {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub occupancy: Option<Occupancy>,
     /// Steps from one line of the log to the next.
+    #[schemars(range(min = 1), extend("unit" = "steps"))]
     pub log_every: u64,
     /// Most seconds from one checkpoint to the next.
     #[serde(default = "checkpoint_seconds")]
+    #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "seconds"))]
     pub checkpoint_seconds: f64,
 }
 
 /// The linear problem of voxels.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Linear {
     /// Largest emission that is allowed.
+    #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "the largest emission"))]
     pub upper: f64,
     /// Mean flux of a frame, Jy: what closure quantities alone do not know, and need.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1e-15, max = 1e15), extend("unit" = "Jy"))]
     pub flux_jy: Option<f64>,
     /// Factor on ∫ |∇e|² dV.
     #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a factor"))]
     pub smoothness: f64,
     /// Factor on ∫ e dV.
     #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a factor"))]
     pub sparsity: f64,
     /// A prior of the voxels; none, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -192,7 +208,7 @@ impl Linear {
 }
 
 /// From where parameters start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Start {
@@ -214,10 +230,11 @@ pub enum Start {
 }
 
 /// Mask of what shines.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Occupancy {
     /// Cells along each axis.
+    #[schemars(range(min = 2, max = 256), extend("unit" = "cells along each axis"))]
     pub cells: usize,
     /// Part of the peak below which a cell is empty.
     pub threshold: f64,
@@ -230,7 +247,7 @@ pub struct Occupancy {
 }
 
 /// What is known of the axis.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum AxisSearch {
     /// It is `motion.axis`.
@@ -242,29 +259,37 @@ pub enum AxisSearch {
         /// Where it starts.
         start: [f64; 3],
         /// First learning rate, in units of the parameters.
+        #[schemars(range(min = 1e-12, max = 10.0), extend("unit" = "a learning rate"))]
         rate: f64,
         /// Last learning rate, in the same unit, reached linearly.
+        #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a learning rate"))]
         last_rate: f64,
     },
 }
 
 /// A search of the whole sphere of axes.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AxisScan {
     /// Directions that are tried.
+    #[schemars(range(min = 12, max = 100_000), extend("unit" = "directions"))]
     pub directions: usize,
     /// Number of frames in use, spread over all.
+    #[schemars(range(min = 2), extend("unit" = "frames"))]
     pub frames: usize,
     /// Pixels along a side of the model that is fitted to them; all that there are if it is more than half of them.
+    #[schemars(range(min = 8), extend("unit" = "pixels along a side"))]
     pub pixels: usize,
     /// Nodes along each axis of a grid with which all pixels are then fitted, for axes near the best one; without
     /// it that is the scan's.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 8, max = 128), extend("unit" = "nodes along each axis"))]
     pub refine: Option<usize>,
     /// First learning rate (radians a step) of the refinement that follows; 0: the axis stays where the scan found it.
+    #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a learning rate"))]
     pub rate: f64,
     /// Last learning rate, in the same unit, reached linearly.
+    #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a learning rate"))]
     pub last_rate: f64,
 }
 
@@ -300,7 +325,7 @@ fn checkpoint_seconds() -> f64 {
 }
 
 /// Rules of steps.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Optimiser {

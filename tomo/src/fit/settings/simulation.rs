@@ -2,22 +2,26 @@
 
 use super::FieldSettings;
 use kerrlight_vlbi::noise::GainErrors;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Frames of a movie.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Movie {
     /// How many.
+    #[schemars(range(min = 1, max = 100_000), extend("unit" = "frames"))]
     pub frames: usize,
     /// Time of the first, M.
+    #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub from: f64,
     /// Time of the last, M.
+    #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub to: f64,
 }
 
 /// What is simulated.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Truth {
     /// Gaussian spots at the reference time.
@@ -38,17 +42,21 @@ pub struct Truth {
 }
 
 /// A Gaussian spot.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Spot {
     /// Where it was when it was round, M.
+    #[schemars(inner(range(min = -1e6, max = 1e6)), extend("unit" = "M"))]
     pub center: [f64; 3],
     /// Standard deviation, M.
+    #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub sigma: f64,
     /// Emission at its centre.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "emission at the centre"))]
     pub amplitude: f64,
     /// For how long differential rotation has wound it up until the reference time, in units of time.
     #[serde(default)]
+    #[schemars(range(min = -1e6, max = 1e6), extend("unit" = "M"))]
     pub wound_for: f64,
     /// When it shines; always, without it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -56,40 +64,51 @@ pub struct Spot {
 }
 
 /// An arc about the z axis, in the plane of the hole, with a Gaussian cross-section.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tube {
     /// Its radius, M.
+    #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub radius: f64,
     /// Standard deviation across it, M.
+    #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub sigma: f64,
     /// Azimuths of its ends, degrees.
+    #[schemars(inner(range(min = -720.0, max = 720.0)), extend("unit" = "degrees"))]
     pub azimuth_deg: [f64; 2],
     /// Emission on the arc, far from its ends.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "emission on the arc"))]
     pub amplitude: f64,
 }
 
 /// A ring on the screen about the hole, the same in every frame.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Ring {
     /// Its radius, M; 0 is a round spot.
+    #[schemars(range(min = 0.0, max = 1e6), extend("unit" = "M"))]
     pub radius: f64,
     /// Standard deviation across it, M.
+    #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub sigma: f64,
     /// Its flux, Jy.
+    #[schemars(range(min = 0.0, max = 1e15), extend("unit" = "Jy"))]
     pub flux_jy: f64,
     /// Its Q, Jy, with the same shape.
     #[serde(default)]
+    #[schemars(range(min = -1e15, max = 1e15), extend("unit" = "Jy"))]
     pub q_jy: f64,
     /// Its U, Jy.
     #[serde(default)]
+    #[schemars(range(min = -1e15, max = 1e15), extend("unit" = "Jy"))]
     pub u_jy: f64,
     /// By which part of its mean the brightest side is brighter.
     #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "a part of the mean brightness"))]
     pub asymmetry: f64,
     /// Where it is brightest, degrees east of north.
     #[serde(default)]
+    #[schemars(range(min = -360.0, max = 360.0), extend("unit" = "degrees east of north"))]
     pub brightest_deg: f64,
 }
 
@@ -119,16 +138,19 @@ impl Tube {
 }
 
 /// When emission appears and fades.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Shines {
     /// Time at which it has reached half of its brightness, M; it has been there for ever, without one.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub from: Option<f64>,
     /// Time at which it has faded to half, M; it never fades, without one.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub until: Option<f64>,
     /// Time constant of both, logistic functions 1/(1 + exp(−t/rise)), M.
+    #[schemars(range(min = 1e-6, max = 1e9), extend("unit" = "M"))]
     pub rise: f64,
 }
 
@@ -142,7 +164,7 @@ impl Shines {
 }
 
 /// What a letter looks like.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GlyphShape {
     /// Which letter.
@@ -156,11 +178,12 @@ pub struct GlyphShape {
     /// Standard deviation of its blurred edges, M.
     pub softness: f64,
     /// Emission in the middle of broad strokes.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "emission in the strokes"))]
     pub amplitude: f64,
 }
 
 /// The array that sees the simulated movie.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Observation {
     /// EHT2017, ngEHT, or a file in eht-imaging's format.
@@ -192,17 +215,20 @@ pub struct Observation {
     pub gains: Option<GainErrors>,
     /// Root mean square of |d| of the leakage of the stations' feeds, drawn once for each; none by default.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "a root mean square of |d|"))]
     pub leakage: Option<f64>,
     /// Part of each amplitude that the fit adds to its error in quadrature, none by default: for errors of gains,
     /// or where errors are so small that a loss has minima everywhere.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "part of the amplitude"))]
     pub systematic: Option<f64>,
     /// Time of the first scan, M.
+    #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub first_time: f64,
 }
 
 /// Noise of simulated data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Noise {

@@ -5,17 +5,18 @@ use super::penalties::priors_of;
 use super::static_polarization::check_strength;
 use super::{FitError, InstrumentSettings, Loss, LossKind, PenaltyKind, PenaltySettings, Within};
 use super::{Scattering, StaticPolarization, Variability};
-use super::{ranges, refuse};
+use super::{keys, refuse};
 use crate::Error;
 use crate::fit::linear::Prior;
 use kerrlight_common::toml_file;
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::operator::ImageGrid;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// The settings of a fit of a static image.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StaticImageFile {
     /// One line that says what is fitted.
@@ -49,56 +50,67 @@ pub struct StaticImageFile {
 }
 
 /// Pixels of a static image, its flux, and how it is looked for.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImageSettings {
     /// Pixels along a side.
+    #[schemars(range(min = 8, max = 512), extend("unit" = "pixels along a side"))]
     pub pixels: usize,
     /// Width of the square field, µas.
+    #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
     pub field_uas: f64,
     /// Flux that is expected of the field, Jy ...
+    #[schemars(range(min = 1e-12, max = 1e9), extend("unit" = "Jy"))]
     pub flux_jy: f64,
     /// ... and its standard deviation: a Gaussian prior.
+    #[schemars(range(min = 1e-12, max = 1e9), extend("unit" = "Jy"))]
     pub flux_sigma_jy: f64,
     /// Images to start from; the fit ends with the one that comes to the least loss.
     pub starts: Vec<StartImage>,
     /// Iterations of the optimiser from one start, at most.
+    #[schemars(range(min = 1, max = 1_000_000), extend("unit" = "iterations"))]
     pub iterations: usize,
     /// Fits of the image measured once more with other noise, which give errors; none without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 2, max = 1000), extend("unit" = "draws"))]
     pub draws: Option<usize>,
 }
 
 /// An image to start from, in the middle of the field.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum StartImage {
     /// A circle with a Gaussian cross-section.
     Ring {
         /// Its diameter, µas.
+        #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
         diameter_uas: f64,
         /// Its full width at half maximum, µas.
+        #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
         width_uas: f64,
     },
     /// A round Gaussian.
     Gaussian {
         /// Its full width at half maximum, µas.
+        #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
         fwhm_uas: f64,
     },
 }
 
 /// A round Gaussian in the middle of the field that light is expected in: the entropy relative to it is a penalty.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EnvelopeSettings {
     /// Its full width at half maximum, µas.
+    #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
     pub fwhm_uas: f64,
     /// Factor on Σ s ln(s/m), with shares s of the flux in the image and m in the Gaussian.
+    #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "a factor"))]
     pub weight: f64,
 }
 
 /// Data of a static image.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StaticData {
     /// Visibilities.
@@ -106,7 +118,7 @@ pub struct StaticData {
 }
 
 /// Visibilities of a source that does not change.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StaticVisibilities {
     /// UVFITS, eht-imaging's text, the EHT's tables or CSV; relative to the fit's file.
@@ -120,6 +132,7 @@ pub struct StaticVisibilities {
     pub uv_min: Option<f64>,
     /// The first and the last hour of UTC that count; all, without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = 0.0, max = 1000.0)), extend("unit" = "hours"))]
     pub utc_h: Option<[f64; 2]>,
     /// The interstellar medium that the light has passed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -130,22 +143,26 @@ pub struct StaticVisibilities {
 }
 
 /// Factors on all penalties, from which frames that are held out choose.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StrengthSettings {
     /// The factors.
+    #[schemars(inner(range(min = 1e-12, max = 1e12)), extend("unit" = "a factor"))]
     pub values: Vec<f64>,
     /// Parts of the frames, each of which is held out once: frame k belongs to part k modulo their number.
+    #[schemars(range(min = 2, max = 1000), extend("unit" = "parts of the frames"))]
     pub folds: usize,
 }
 
 /// Where a ring is looked for.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RingSettings {
     /// Least distance from the centre at which the brightest point of a direction may lie, µas.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "microarcseconds"))]
     pub least_radius_uas: f64,
     /// The largest one, µas.
+    #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
     pub most_radius_uas: f64,
 }
 
@@ -178,7 +195,7 @@ impl StaticImageFile {
     /// ```
     pub fn parse(text: &str) -> Result<Self, Error> {
         let file: Self = toml_file::read(text).map_err(FitError::Syntax)?;
-        ranges::check(text)?;
+        keys::check(text, Self::keys())?;
         file.check()?;
         Ok(file)
     }

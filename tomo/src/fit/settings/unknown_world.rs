@@ -1,18 +1,22 @@
 //! What of the world is not known.
 
 use super::world::SIMULATED;
-use super::{FitError, FitFile, LossKind, Within, WorldSearch};
+use super::{
+    Effects, FitError, FitFile, Hole, LossKind, Motion, Observer, Region, Within, WorldSearch,
+};
 use crate::Error;
 use crate::fit::world::{Free, KNOTS, Parameter, Prior, Scanned};
 use kerrlight_common::toml_file;
 use kerrlight_render::dynamics::Velocity;
+use kerrlight_render::polarization::PolarizationLaw;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
 /// Parameters of the world that are not known, each with its prior.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UnknownWorld {
     /// a, M.
@@ -51,8 +55,22 @@ pub struct UnknownWorld {
     pub search: WorldSearch,
 }
 
+/// All that a table `world` may hold.
+#[derive(JsonSchema)]
+#[expect(dead_code, reason = "its schema is all that is needed of it")]
+pub(super) struct WorldKeys {
+    hole: Option<Hole>,
+    observer: Option<Observer>,
+    region: Option<Region>,
+    effects: Option<Effects>,
+    motion: Option<Motion>,
+    polarization: Option<PolarizationLaw>,
+    #[schemars(flatten)]
+    unknown: UnknownWorld,
+}
+
 /// A prior, in the unit of its parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum PriorSettings {
     /// The same everywhere from the first to the second value.
@@ -223,8 +241,7 @@ impl UnknownWorld {
 
     fn check(&self) -> Result<(), Error> {
         self.free()?;
-        self.check_scan()?;
-        self.search.check()
+        self.check_scan()
     }
 }
 

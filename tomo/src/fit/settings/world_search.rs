@@ -1,14 +1,14 @@
 //! How a world that is not known is looked for.
 
-use super::FitError;
-use crate::Error;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How the world is looked for.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WorldSearch {
     /// Places to begin, all over the priors.
+    #[schemars(range(min = 1, max = 1000), extend("unit" = "searches"))]
     pub starts: usize,
     /// The search from each of them.
     pub coarse: WorldView,
@@ -22,32 +22,41 @@ pub struct WorldSearch {
 }
 
 /// How worlds are evaluated.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WorldView {
     /// Worlds, at most.
+    #[schemars(range(min = 1, max = 1_000_000), extend("unit" = "worlds"))]
     pub worlds: usize,
     /// Voxels along each axis of the volume that is solved for.
+    #[schemars(range(min = 2, max = 128), extend("unit" = "voxels along each axis"))]
     pub nodes: usize,
     /// Iterations of each solution over all voxels; the fine search adds up to six times as many over those that shine.
+    #[schemars(range(min = 1, max = 10_000), extend("unit" = "iterations"))]
     pub iterations: usize,
     /// Pixels along each side, about.
+    #[schemars(range(min = 2, max = 4096), extend("unit" = "pixels along a side"))]
     pub pixels: usize,
     /// Frames, about.
+    #[schemars(range(min = 2, max = 1_000_000), extend("unit" = "frames"))]
     pub frames: usize,
 }
 
 /// How worlds are evaluated where there is no population of them.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WorldSteps {
     /// Voxels along each axis of the volume that is solved for.
+    #[schemars(range(min = 2, max = 128), extend("unit" = "voxels along each axis"))]
     pub nodes: usize,
     /// Iterations of each solution over all voxels; up to six times as many follow over those that shine.
+    #[schemars(range(min = 1, max = 10_000), extend("unit" = "iterations"))]
     pub iterations: usize,
     /// Pixels along each side, about.
+    #[schemars(range(min = 2, max = 4096), extend("unit" = "pixels along a side"))]
     pub pixels: usize,
     /// Frames, about.
+    #[schemars(range(min = 2, max = 1_000_000), extend("unit" = "frames"))]
     pub frames: usize,
 }
 
@@ -64,32 +73,5 @@ impl WorldSearch {
             frames,
         };
         self.finest.map(view)
-    }
-
-    /// Refuses numbers out of their ranges.
-    ///
-    /// # Errors
-    /// The first one.
-    pub(super) fn check(&self) -> Result<(), Error> {
-        let within = |key: &str, value: usize, [low, high]: [usize; 2]| {
-            let allowed = format!("{low} to {high}");
-            let key = format!("world.search.{key}");
-            if (low..=high).contains(&value) {
-                Ok(())
-            } else {
-                Err(Error::from(FitError::range(key, value, &allowed)))
-            }
-        };
-        within("starts", self.starts, [1, 1000])?;
-        let finest = self.finest().map(|view| ("finest", view));
-        for (name, view) in [("coarse", self.coarse), ("fine", self.fine)].into_iter().chain(finest)
-        {
-            within(&format!("{name}.worlds"), view.worlds, [1, 1_000_000])?;
-            within(&format!("{name}.nodes"), view.nodes, [2, 128])?;
-            within(&format!("{name}.iterations"), view.iterations, [1, 10_000])?;
-            within(&format!("{name}.pixels"), view.pixels, [2, 4096])?;
-            within(&format!("{name}.frames"), view.frames, [2, 1_000_000])?;
-        }
-        Ok(())
     }
 }

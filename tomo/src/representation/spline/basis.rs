@@ -1,10 +1,11 @@
 //! Uniform B-splines: how much of each node's number a point takes.
 
 use kerrlight_common::simd::Float;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What is between the nodes of a grid: a sum of B-splines, one about each node (de Boor 1978).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Degree {
     /// Of degree 1: trilinear interpolation, with kinks where cells meet.

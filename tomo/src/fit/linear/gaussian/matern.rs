@@ -1,10 +1,11 @@
 //! Matérn's covariance (Matérn 1960), which the prior of a field has.
 
 use crate::Error;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How smooth a Matérn field is: its ν.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Roughness {
     /// ν = 1/2, covariance exp(−r/ℓ): continuous, with kinks everywhere.
     #[serde(rename = "1/2")]
