@@ -30,6 +30,7 @@ mod graphics_devices;
 mod held_out;
 mod interferometry;
 mod kerr_references;
+mod key_tables;
 mod leakage;
 mod lensing;
 #[cfg(unix)]

@@ -250,7 +250,7 @@ fn parse(text: &str) -> anyhow::Result<FitFile> {
         bail!("there is a table [image]: a static image has no volume, and this needs one");
     }
     FitFile::parse(text).map_err(|error| match error {
-        Error::Fit(FitError::Syntax(error)) => init::explained(&error),
+        Error::Fit(FitError::Syntax(error)) => init::explained(&error, FitFile::keys()),
         other => other.into(),
     })
 }

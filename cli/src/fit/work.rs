@@ -49,7 +49,7 @@ impl Work {
             return Ok(Work::Emission(Box::new(super::parse(text)?)));
         }
         let file = StaticImageFile::parse(text).map_err(|error| match error {
-            Error::Fit(FitError::Syntax(error)) => init::explained(&error),
+            Error::Fit(FitError::Syntax(error)) => init::explained(&error, StaticImageFile::keys()),
             other => other.into(),
         })?;
         Ok(Work::Image(Box::new(file)))

@@ -34,12 +34,33 @@ pub struct Key {
     pub kind: String,
     /// Documentation of its field.
     pub meaning: String,
+    /// Words or tables that it may be, each with its documentation.
+    pub choices: Vec<(String, String)>,
     /// Its range, if it is a number or numbers.
     pub range: Option<Range>,
     /// What stands for it where it is left out, as TOML; `None` if nothing does.
     pub default: Option<String>,
+    /// A value to begin with where nothing stands for it, as TOML.
+    pub example: Option<String>,
     /// Whether its table needs it.
     pub is_required: bool,
+}
+
+impl Key {
+    /// Meaning, range and values in a line.
+    pub fn note(&self) -> String {
+        let meaning = self.meaning.trim_end_matches('.');
+        let range = self.range.as_ref().filter(|range| range.is_given());
+        let range = range
+            .map(|range| format!("; {}", Range { unit: String::new(), ..range.clone() }.words()));
+        let words = self.kind.starts_with(['"', '{']).then(|| format!(": {}", self.kind));
+        format!("{meaning}{}{}", range.unwrap_or_default(), words.unwrap_or_default())
+    }
+
+    /// Whether it stands as a table of its own.
+    pub fn is_table(&self) -> bool {
+        matches!(&*self.kind, "table" | "list of table")
+    }
 }
 
 /// Least and largest value of a number, both allowed, and its unit.
@@ -76,6 +97,11 @@ impl Range {
         number >= self.least.unwrap_or(f64::MIN)
             && (number <= self.most.unwrap_or(f64::MAX)
                 || (self.least.is_some() && self.most.is_none() && !number.is_nan()))
+    }
+
+    /// Whether it says more than that a count is not negative.
+    pub fn is_given(&self) -> bool {
+        self.most.is_some() || self.least.is_some_and(|least| least != 0.0)
     }
 
     fn words(&self) -> String {
@@ -139,7 +165,7 @@ impl Keys {
         })
     }
 
-    /// The key at a dotted path, in which numbers of list elements and names of variants count as keys.
+    /// The key at a dotted path, in which names of variants count as keys, and numbers of list elements may be left out.
     pub fn at(&self, path: &str) -> Option<Key> {
         let (table, name) = path.rsplit_once('.').unwrap_or(("", path));
         self.table(table).into_iter().find(|key| key.name == name)
@@ -147,10 +173,8 @@ impl Keys {
 
     /// The keys of the table at a dotted path, those first that it needs; empty if it has none.
     pub fn table(&self, path: &str) -> Vec<Key> {
-        let names = path.split('.').filter(|name| !name.is_empty());
-        let parts = names.fold(self.root(), |parts, name| self.below(&parts, name));
         let mut keys = Vec::new();
-        for part in &parts {
+        for part in &self.tables_at(path) {
             let required = part.schema.get("required").and_then(Value::as_array);
             let required: Vec<&str> =
                 required.into_iter().flatten().filter_map(Value::as_str).collect();
@@ -171,9 +195,21 @@ impl Keys {
 
     /// The documentation of the table at a dotted path.
     pub fn about(&self, path: &str) -> String {
+        let own = self.at(path).map(|key| key.meaning).filter(|meaning| !meaning.is_empty());
+        let of_type =
+            || self.tables_at(path).iter().find_map(|part| text(part.schema, "description"));
+        own.or_else(of_type).unwrap_or_default()
+    }
+
+    /// What a value at a dotted path may be; of a list, its elements.
+    fn tables_at<'a>(&'a self, path: &str) -> Vec<Part<'a>> {
         let names = path.split('.').filter(|name| !name.is_empty());
         let parts = names.fold(self.root(), |parts, name| self.below(&parts, name));
-        parts.iter().find_map(|part| text(part.schema, "description")).unwrap_or_default()
+        let elements = |part: Part<'a>| match part.schema.get("items") {
+            Some(_) => self.below(&[part], "0"),
+            None => vec![part],
+        };
+        parts.into_iter().flat_map(elements).collect()
     }
 
     fn root(&self) -> Vec<Part<'_>> {
@@ -200,10 +236,13 @@ impl Keys {
     /// What the value of a name in a table, or of a number in a list, may be.
     fn below<'a>(&'a self, parts: &[Part<'a>], name: &str) -> Vec<Part<'a>> {
         let of = |part: &Part<'a>| -> Option<Vec<Part<'a>>> {
+            let items = part.schema.get("items");
+            if let (Some(items), Err(_)) = (items, name.parse::<usize>()) {
+                return Some(self.below(&self.parts(items, &part.range), name));
+            }
             let inner = part.schema.get("properties").and_then(|all| all.get(name));
-            let element = || name.parse::<usize>().ok().and_then(|_| part.schema.get("items"));
             let any = || part.schema.get("additionalProperties").filter(|value| value.is_object());
-            Some(self.parts(inner.or_else(element).or_else(any)?, &part.range))
+            Some(self.parts(inner.or(items).or_else(any)?, &part.range))
         };
         parts.iter().filter_map(of).flatten().collect()
     }
@@ -247,9 +286,13 @@ impl Keys {
     fn key(&self, name: &str, value: &Value, (table, is_required): (&Part<'_>, bool)) -> Key {
         let parts = self.parts(value, &table.range);
         let own = value.as_object();
-        let about = own.and_then(|own| text(own, "description"));
-        let meaning =
-            about.or_else(|| parts.iter().find_map(|part| text(part.schema, "description")));
+        let about = |part: &Part<'_>| text(part.schema, "description");
+        // A variant's documentation stands above its only property.
+        let only =
+            |part: &&Part<'_>| part.schema.get("properties")?.as_object().map(|all| all.len() == 1);
+        let of_variant = || Some(table).filter(|part| only(part) == Some(true)).and_then(about);
+        let meaning = own.and_then(|own| text(own, "description")).or_else(of_variant);
+        let meaning = meaning.or_else(|| parts.iter().find_map(about));
         let numbers = parts.iter().flat_map(|part| {
             let element = part.schema.get("items").map(|items| self.parts(items, &part.range));
             element.unwrap_or_else(|| vec![part.clone()])
@@ -260,10 +303,23 @@ impl Keys {
             name: name.to_owned(),
             kind: self.kind(&parts),
             meaning: meaning.unwrap_or_default(),
+            choices: self.choices(&parts),
             range,
-            default: default.map(Value::to_string),
+            default: default.map(inline),
+            example: own.and_then(|own| own.get("examples")?.get(0)).map(inline),
             is_required,
         }
+    }
+
+    /// Alternatives with their documentation, if there are several.
+    fn choices(&self, parts: &[Part<'_>]) -> Vec<(String, String)> {
+        let of = |part: &Part<'_>| {
+            let kind = self.kind_of(part);
+            let is_one = kind.starts_with(['"', '{']) && !kind.contains(", ");
+            is_one.then(|| Some((kind, text(part.schema, "description")?))).flatten()
+        };
+        let all: Vec<_> = parts.iter().filter_map(of).collect();
+        if all.len() > 1 { all } else { Vec::new() }
     }
 
     /// What values are, in a word or two.
@@ -305,6 +361,11 @@ impl Keys {
             _ => String::new(),
         }
     }
+}
+
+/// A value of JSON as TOML has it in a line.
+fn inline(value: &Value) -> String {
+    super::inline(value).unwrap_or_else(|_| value.to_string())
 }
 
 fn types(schema: &Map<String, Value>) -> impl Iterator<Item = &str> {
@@ -368,7 +429,7 @@ mod tests {
     enum Law {
         /// Rigid.
         Rigid,
-        PowerLaw {
+        Power {
             /// Where the rate is.
             #[schemars(range(max = 5.0))]
             radius: f64,
@@ -386,10 +447,10 @@ mod tests {
         for (text, says) in [
             ("radii = [2.0, 0.5]", "radii.1 = 0.5: 1 to 9"),
             ("nodes = 9", "nodes = 9: 2 to 8 (nodes)"),
-            ("law = { power-law = { radius = 6.0 } }", "law.power-law.radius = 6: at most 5 (M)"),
+            ("law = { power = { radius = 6.0 } }", "law.power.radius = 6: at most 5 (M)"),
             (
-                "law = { perturbed = { power-law = { radius = nan } } }",
-                "law.perturbed.power-law.radius = NaN: at most 5 (M)",
+                "law = { perturbed = { power = { radius = nan } } }",
+                "law.perturbed.power.radius = NaN: at most 5 (M)",
             ),
             ("angles = { from = 181.0 }", "angles.from = 181: 0 to 180 (degrees)"),
             ("angles = { step = 1e-300 }", "angles.step = 1e-300: 0.001 to 180 (degrees)"),
@@ -408,8 +469,8 @@ mod tests {
         let keys = Keys::of::<File>();
         let law = keys.at("law").unwrap();
         assert_eq!((&*law.meaning, law.is_required), ("The law of motion.", false));
-        assert_eq!(law.kind, "\"rigid\", { power-law = … }, { perturbed = … }");
-        assert_eq!(keys.at("law.power-law.radius").unwrap().meaning, "Where the rate is.");
+        assert_eq!(law.kind, "\"rigid\", { power = … }, { perturbed = … }");
+        assert_eq!(keys.at("law.power.radius").unwrap().meaning, "Where the rate is.");
         let nodes = keys.at("nodes").unwrap();
         assert_eq!((nodes.default.as_deref(), nodes.is_required), (Some("4"), false));
         assert_eq!(keys.at("radii").unwrap().range.unwrap().most, Some(9.0));

@@ -14,62 +14,61 @@ use std::sync::Arc;
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Velocity {
-    /// 1/(r^{3/2} + drag).
+    /// Ω = 1/(r^{3/2} + drag).
     Keplerian {
-        /// M; for circular geodesics about the hole's axis its spin. Without it, a ξ_z of the hole and the axis.
+        /// Spin of the flow; for circular geodesics that of the hole. Without it, a ξ_z.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = -1.0, max = 1.0), extend("unit" = "a/M, as Ω = 1/(r^{3/2} + drag)"))]
         drag: Option<f64>,
     },
-    /// rate (radius/r)^exponent.
+    /// Ω = rate (radius/r)^exponent.
     PowerLaw {
-        /// Where the rate is reached, M.
+        /// Radius at which Ω is `rate`, M.
         #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
         radius: f64,
-        /// Radians per M.
+        /// Ω there, radians per M.
         #[schemars(range(min = -1e3, max = 1e3), extend("unit" = "radians per M"))]
         rate: f64,
-        /// 1.5: Keplerian without spin, 0: like a rigid body.
+        /// 1.5: Keplerian without spin; 0: a rigid body.
         #[schemars(range(min = -20.0, max = 20.0), extend("unit" = "an exponent"))]
         exponent: f64,
     },
-    /// Linear between these, held beyond the first and the last.
+    /// Ω linear between the entries, constant beyond.
     Table {
-        /// Growing, M.
+        /// Growing radii, M.
         #[schemars(inner(range(min = 1e-3, max = 1e6)), extend("unit" = "M"))]
         radii: Vec<f64>,
-        /// Radians per M.
+        /// Ω at each, radians per M.
         #[schemars(inner(range(min = -1e3, max = 1e3)), extend("unit" = "radians per M"))]
         rates: Vec<f64>,
     },
-    /// Another law, and a Gaussian process over the radius.
+    /// Another law plus a Gaussian process in radius.
     Perturbed(Perturbed),
-    /// The family between circular orbits and free fall
-    /// ([`kerrlight_geodesic::infall`]; Cárdenas-Avendaño, Lupsasca & Zhu 2023).
+    /// Between circular orbits and free fall (Cárdenas-Avendaño, Lupsasca & Zhu 2023).
     Infall {
-        /// ξ: specific angular momentum over that of circular geodesics, 0 to 1.
+        /// ξ: specific angular momentum over that of circular geodesics.
         #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "an angular momentum over that of circular orbits"))]
         xi: f64,
-        /// β_r: 1, the radial velocity of circular orbits and their plunge; 0, that of free fall.
+        /// β_r: 1, radial velocity of circular orbits and their plunge; 0, of free fall.
         #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "0: free fall, 1: circular"))]
         beta_r: f64,
         /// β_φ: the same of the angular velocity.
         #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "0: free fall, 1: circular"))]
         beta_phi: f64,
-        /// The spin as the flow sees it, M; without it, a ξ_z of the hole and the axis.
+        /// Spin of the flow. Without it, a ξ_z.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = -1.0, max = 1.0), extend("unit" = "a/M"))]
         drag: Option<f64>,
     },
-    /// Monotone cubics between these, held beyond the first and the last.
+    /// Monotone cubics through Ω and dr/dt, constant beyond.
     Profile {
-        /// Growing, M.
+        /// Growing radii, M.
         #[schemars(inner(range(min = 1e-3, max = 1e6)), extend("unit" = "M"))]
         radii: Vec<f64>,
-        /// Ω, radians per M.
+        /// Ω at each, radians per M.
         #[schemars(inner(range(min = -1e3, max = 1e3)), extend("unit" = "radians per M"))]
         angular: Vec<f64>,
-        /// dr/dt, dimensionless: all below 0, all above 0, or all 0.
+        /// dr/dt at each: all below 0, all above 0, or all 0.
         #[schemars(inner(range(min = -1.0, max = 1.0)), extend("unit" = "dr/dt"))]
         radial: Vec<f64>,
     },
@@ -79,15 +78,15 @@ pub enum Velocity {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Perturbed {
-    /// The law without it.
+    /// The law that is perturbed.
     pub of: Box<Velocity>,
-    /// Its standard deviation, radians per M.
+    /// Standard deviation of the process, rad/M.
     pub deviation: f64,
     /// Its correlation length, M.
     pub correlation_length: f64,
-    /// The first and the last radius of its table of 100 rows, M.
+    /// First and last radius of its table of 100 rows, M.
     pub radii: [f64; 2],
-    /// What it is drawn from; in fits, their own seed by default.
+    /// Its seed; the fit's without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
 }

@@ -20,7 +20,7 @@ pub enum Components {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FieldFrame {
-    /// What the gas measures, as in [`MagneticField`](super::MagneticField).
+    /// What the gas measures; orthonormal only.
     Gas,
     /// Bⁱ of ideal magnetohydrodynamics: bᵗ = Bⁱ u_i, bⁱ = (Bⁱ + bᵗ uⁱ)/uᵗ.
     Ideal,
@@ -61,27 +61,27 @@ pub struct MixedField {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PolarizationLaw {
-    /// The field.
+    /// B^r = radial sinⁿθ + vertical cos θ, B^θ = −vertical sin θ, B^φ = toroidal, with n = radial_sine_power.
     pub field: MixedField,
-    /// What its components are along.
+    /// What the components are along.
     pub components: Components,
-    /// Whose they are.
+    /// Whose components they are.
     pub frame: FieldFrame,
-    /// a, of the redshift factor along the affine parameter: 2 + spectral index in the textbook.
+    /// Exponent of g: 2 + spectral index in the textbook.
     #[schemars(range(min = -20.0, max = 20.0), extend("unit" = "an exponent"))]
     pub redshift_power: f64,
-    /// c, of the field's strength: 1 + spectral index in the textbook.
+    /// Exponent of |b|: 1 + spectral index in the textbook.
     #[schemars(range(min = 0.0, max = 20.0), extend("unit" = "an exponent"))]
     pub field_power: f64,
-    /// s, of the sine of the angle between field and light: 1 + spectral index in the textbook.
+    /// Exponent of sin θ_B: 1 + spectral index in the textbook.
     #[schemars(range(min = 0.0, max = 20.0), extend("unit" = "an exponent"))]
     pub sine_power: f64,
-    /// Π, the linearly polarised part of the light, 0 to 1.
+    /// Linearly polarized part of the light.
     #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "a part of the light"))]
     pub fraction: f64,
     /// What |b| is measured in.
     pub normalisation: Normalisation,
-    /// What is added to position angles on the sky, degrees east of north.
+    /// Added to all position angles on the sky, degrees east of north.
     #[schemars(range(min = -360.0, max = 360.0), extend("unit" = "degrees east of north"))]
     pub turn_deg: f64,
 }

@@ -15,11 +15,11 @@ use serde::{Deserialize, Serialize};
 /// Where emission is looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Region {
-    /// Least radius, M.
+    /// Least radius.
     pub r_min: f64,
-    /// Largest radius, M.
+    /// Largest radius.
     pub r_max: f64,
-    /// Largest |z|, M.
+    /// Largest |z|; unlimited without it.
     pub z_width: f64,
 }
 
@@ -69,18 +69,16 @@ impl Region {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Sampling {
-    /// Gauss–Legendre panels in Mino time inside the sphere r_max, weights Σ dτ: the integral over
-    /// the affine parameter.
+    /// Gauss–Legendre panels in Mino time: the integral over the affine parameter.
     Gauss {
-        /// Nodes of a panel, at most 16.
+        /// Nodes of a panel.
         #[schemars(range(min = 1, max = 16), extend("unit" = "nodes of a panel"))]
         order: usize,
-        /// Into how many panels each of the coarsest ones is cut.
+        /// Panels into which each of the coarsest is cut.
         #[schemars(range(min = 1, max = 1_000_000_000), extend("unit" = "cuts of the coarsest panels"))]
         split: u32,
     },
-    /// Equidistant in Mino time over the whole ray, weights |x_i − x_{i−1}|: the sums of BH-NeRF
-    /// (Levis et al. 2022). Needs an observer at a finite radius.
+    /// Equidistant in Mino time with chords as weights: the sums of BH-NeRF. Needs an observer at a finite radius.
     EqualMinoTime {
         /// Nodes of a ray.
         #[schemars(range(min = 2, max = 100_000), extend("unit" = "nodes of a ray"))]

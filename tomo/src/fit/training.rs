@@ -45,16 +45,15 @@ pub struct Training {
     /// Quasi-Newton steps instead of Adam's, for small problems: they have no rates, need [`BatchSize::All`], and their
     /// draws are those of step 0, so that the loss is the same function at every step.
     pub lbfgs: Option<Lbfgs>,
-    /// Rates of the parameters.
+    /// First learning rate of Adam and Muon.
     pub rate: Polynomial,
     /// Rates of the axis; without them it is held.
     pub axis_rate: Option<Polynomial>,
-    /// Steps over which rates grow to what they are: the first steps of Adam, whose memory is empty, are
-    /// as long as the rate allows, and would undo a good start.
+    /// Steps over which the rate grows from 0.
     pub ramp: u64,
-    /// Part of the data of a step.
+    /// Data of a step.
     pub batch: BatchSize,
-    /// Mask of what shines, if any.
+    /// A mask that skips dark cells.
     pub occupancy: Option<OccupancyPlan>,
     /// Penalties beside the data, if any.
     pub penalties: Option<Penalties>,

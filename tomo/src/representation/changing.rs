@@ -15,11 +15,9 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Allowed {
-    /// Emission appears and fades: a field at each knot, linear in time in between, at the places that matter has at
-    /// the reference time.
+    /// Emission appears and fades, linear in time between the knots.
     Any,
-    /// Emission only appears: a field at the first knot, and what is born between each knot and the next, at the places
-    /// that matter has at the later one.
+    /// Emission only appears, between each knot and the next (linear-grid).
     Births,
 }
 

@@ -15,16 +15,15 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GainErrors {
-    /// Standard deviation of ln|g|, dimensionless, one number a station for the whole observation.
+    /// Standard deviation of ln |g|, one draw a station.
     #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a standard deviation of ln |g|"))]
     pub constant_amplitude: f64,
-    /// Standard deviation of ln|g|, dimensionless, another number a station and scan.
+    /// Standard deviation of ln |g|, one draw a station and scan.
     #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a standard deviation of ln |g|"))]
     pub scan_amplitude: f64,
-    /// Whether arg g is random, uniform on the circle, for every station and scan, as the
-    /// atmosphere makes it at millimetre wavelengths.
+    /// Whether phases are uniform, drawn again for every scan.
     pub random_phases: bool,
-    /// Stations with a standard deviation of their own in place of `scan_amplitude`, by name.
+    /// Stations whose `scan_amplitude` differs, such as `{ LMT = 0.6 }`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     #[schemars(extend("additionalProperties" = {"minimum": 0.0, "maximum": 10.0}, "unit" = "a standard deviation of ln |g|"))]
     pub stations: BTreeMap<String, f64>,

@@ -1,6 +1,7 @@
 //! Comments for settings: what each key means, and what is left to the user.
 
-use super::keys::{KEYS, Key, TABLES};
+use kerrlight_common::toml_file::{Key, Keys};
+use kerrlight_tomo::fit::settings::{FitFile, StaticImageFile};
 
 /// Column at which comments start, unless the value is longer.
 const COLUMN: usize = 34;
@@ -11,21 +12,21 @@ pub fn annotate(plain: &str) -> String {
     let mut out = String::new();
     let mut table = "";
     let mut there: Vec<&str> = Vec::new();
+    let is_image = plain.lines().any(|line| line == "[image]");
+    let keys = if is_image { StaticImageFile::keys() } else { FitFile::keys() };
     for line in plain.lines() {
         if let Some(heading) = heading(line) {
-            out += &left_out(table, &there);
+            out += &left_out(keys, table, &there);
             (table, there) = (heading, Vec::new());
-            let about = TABLES.iter().find(|(name, _)| *name == table);
-            out += &about.map_or(String::new(), |(_, text)| format!("\n# {text}"));
-            out += &format!("\n{line}\n");
+            out += &format!("\n# {}\n{line}\n", keys.about(table));
         } else if let Some(name) = name_of(line) {
             there.push(name);
-            out += &key_line(line, find(table, name));
+            out += &key_line(line, find(keys, table, name));
         } else if !line.trim().is_empty() && table.is_empty() {
             out += &format!("{line}\n");
         }
     }
-    out + &left_out(table, &there)
+    out + &left_out(keys, table, &there)
 }
 
 fn heading(line: &str) -> Option<&str> {
@@ -38,12 +39,12 @@ fn name_of(line: &str) -> Option<&str> {
     (!line.starts_with('#')).then(|| line.split_once(" = ")).flatten().map(|(name, _)| name)
 }
 
-fn find(table: &str, name: &str) -> Option<&'static Key> {
-    KEYS.iter().find(|key| key.table == table && key.name == name)
+fn find(keys: &Keys, table: &str, name: &str) -> Option<Key> {
+    keys.table(table).into_iter().find(|key| key.name == name)
 }
 
-fn key_line(line: &str, key: Option<&Key>) -> String {
-    let note = key.map_or("", |key| key.note);
+fn key_line(line: &str, key: Option<Key>) -> String {
+    let note = &*key.map_or(String::new(), |key| key.note());
     if let Some((value, why)) = line.split_once(" #! ") {
         return format!("# ASSUMED: {why}\n{}", beside(value, note));
     }
@@ -58,19 +59,14 @@ fn beside(value: &str, note: &str) -> String {
 }
 
 /// Keys of a table that may be added.
-fn left_out(table: &str, there: &[&str]) -> String {
-    // One of two that exclude each other is there.
-    let rival = |name: &str| {
-        matches!((name, there), ("utc", all) if all.contains(&"gmst"))
-            || (name == "gmst" && there.contains(&"utc"))
+fn left_out(keys: &Keys, table: &str, there: &[&str]) -> String {
+    let more =
+        keys.table(table).into_iter().filter(|key| !there.contains(&&*key.name) && !key.is_table());
+    let line = |key: Key| {
+        let value = key.example.as_ref().or(key.default.as_ref())?;
+        Some(beside(&format!("# {} = {value}", key.name), &key.note()))
     };
-    let more = KEYS.iter().filter(|key| {
-        key.table == table
-            && !key.example.is_empty()
-            && !there.contains(&key.name)
-            && !rival(key.name)
-    });
-    more.map(|key| beside(&format!("# {} = {}", key.name, key.example), key.note)).collect()
+    more.filter_map(line).collect()
 }
 
 #[cfg(test)]
@@ -92,13 +88,23 @@ mod tests {
     #[test]
     fn exact_examples_are_settings() {
         let all: toml::Table = include_str!("../built_in.toml").parse().unwrap();
-        let optional = KEYS.iter().filter(|key| !key.example.is_empty());
-        for key in optional.filter(|key| !matches!(key.name, "utc" | "gmst")) {
-            let path = match key.table {
-                "truth.spot" => "truth.spot.0".to_owned(),
-                other => other.to_owned(),
-            };
-            let assignment = format!("{path}.{}={}", key.name, key.example);
+        for (table, key) in [
+            "hole",
+            "screen",
+            "region",
+            "effects",
+            "motion",
+            "truth.spot",
+            "observation",
+            "training",
+            "linear",
+        ]
+        .iter()
+        .flat_map(|table| FitFile::keys().table(table).into_iter().map(move |key| (table, key)))
+        {
+            let Some(example) = &key.example else { continue };
+            let path = table.replace("spot", "spot.0");
+            let assignment = format!("{path}.{}={example}", key.name);
             let text = crate::fit::assigned(&all.to_string(), &assignment).unwrap();
             crate::fit::parse(&text).unwrap_or_else(|error| panic!("{assignment}: {error:#}"));
         }

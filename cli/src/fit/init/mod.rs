@@ -2,7 +2,6 @@
 
 mod annotate;
 mod guess;
-mod keys;
 mod light_curve;
 mod polarized;
 mod quick_look;
@@ -18,7 +17,7 @@ use crate::plain;
 use annotate::annotate;
 use anyhow::{Context, bail};
 pub use guess::{Guess, guess};
-use kerrlight_common::toml_file::ReadError;
+use kerrlight_common::toml_file::{Keys, ReadError};
 use kerrlight_common::units::{MICROARCSECOND, gravitational_angle};
 use kerrlight_tomo::fit::setup::{self, VisibilitySettings};
 use kerrlight_vlbi::data_terms::ClosureTerm;
@@ -27,49 +26,35 @@ use kerrlight_vlbi::gains::prior_table;
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::products::ClosureKind;
 use kerrlight_vlbi::simulate::{Movie, StokesMovie};
-use keys::{KEYS, TABLES};
 use quick_look::QuickLook;
 use sources::{SOURCES, Source};
 use std::path::{Path, PathBuf};
 
 /// An error in settings; of what is missing, with what to write.
-pub fn explained(error: &ReadError) -> anyhow::Error {
+pub fn explained(error: &ReadError, keys: &Keys) -> anyhow::Error {
     let text = error.to_string();
     let missing = text.split_once("missing field `").and_then(|(_, rest)| rest.split('`').next());
-    let advice = missing.map_or(String::new(), |missing| advice(missing, &error.key()));
+    let advice = missing.map_or(String::new(), |missing| advice(missing, &error.key(), keys));
     anyhow::anyhow!("{text}{advice}")
 }
 
 /// What to write for a key that is missing in a table; `loss.0` is one of the tables `loss`.
-fn advice(missing: &str, table: &str) -> String {
-    let place: Vec<&str> = table.split('.').filter(|part| part.parse::<u32>().is_err()).collect();
-    let place = place.join(".");
-    let is_below = |name: &str| {
-        name.strip_prefix(missing).is_some_and(|rest| rest.starts_with('.')) && place.is_empty()
-    };
-    let one = |(name, text): &(&str, &str)| {
-        format!("\nadd a table [{name}]: {text} `kerrlight fit --init` writes an example")
-    };
-    let tables = |is: &dyn Fn(&str) -> bool| -> String {
-        TABLES.iter().filter(|(name, _)| is(name)).map(one).collect()
-    };
-    let found = tables(&|name| name == missing);
-    // Of `axis` there is a table for each of its kinds.
-    let found = if found.is_empty() { tables(&is_below) } else { found };
-    let key = |key: &&keys::Key| key.name == missing && key.example.is_empty();
-    let of = |key: &keys::Key| match key.table {
-        "" => format!("\ngive `{missing} = …`: {}", key.note),
-        table => format!("\ngive `{missing} = …` in [{table}]: {}", key.note),
-    };
-    let (here, elsewhere): (Vec<_>, Vec<_>) =
-        KEYS.iter().filter(key).partition(|key| key.table == place);
-    // A key of another table of that name is another key, unless one of the tables is in the other.
-    let is_near = |key: &&keys::Key| {
-        !place.is_empty() && (key.table.starts_with(&place) || place.starts_with(key.table))
-    };
-    let near = elsewhere.into_iter().filter(is_near).collect();
-    let keys = if here.is_empty() { near } else { here };
-    found + &keys.into_iter().map(of).collect::<String>()
+fn advice(missing: &str, table: &str, keys: &Keys) -> String {
+    let is_name = |part: &&str| !part.is_empty() && part.parse::<u32>().is_err();
+    let place: Vec<&str> = table.split('.').filter(is_name).collect();
+    let path: Vec<&str> = place.iter().copied().chain([missing]).collect();
+    let (place, path) = (place.join("."), path.join("."));
+    match keys.at(&path) {
+        Some(key) if key.is_table() => {
+            format!(
+                "\nadd a table [{path}]: {} `kerrlight fit --init` writes an example",
+                key.meaning
+            )
+        }
+        Some(key) if place.is_empty() => format!("\ngive `{missing} = …`: {}", key.note()),
+        Some(key) => format!("\ngive `{missing} = …` in [{place}]: {}", key.note()),
+        None => String::new(),
+    }
 }
 
 /// What is fitted to visibilities.

@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Steps {
-    /// The first.
+    /// First value.
     pub from: f64,
-    /// The last.
+    /// Last value.
     pub to: f64,
-    /// From one to the next, above 0.
+    /// Distance between values.
     #[schemars(range(min = 1e-3))]
     pub step: f64,
 }
@@ -30,13 +30,14 @@ impl Steps {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BandSettings {
-    /// Inclinations, degrees.
+    /// Inclinations that are compared, degrees.
     #[schemars(extend("minimum" = 0.0, "maximum" = 180.0, "unit" = "degrees"))]
     pub inclinations_deg: Steps,
-    /// Angular velocities over that of `motion.velocity`; below 0 matter turns the other way.
+    /// Angular velocities over `motion.velocity`; negative: the other way.
     #[schemars(inner(range(min = -10.0, max = 10.0)), extend("unit" = "a factor"))]
     pub rotation_factors: Vec<f64>,
-    /// Position angles of the spin, degrees east of north.
+    /// Position angles of the spin, degrees east of north; others than 0 need `stokes = ["Q", "U"]` with equal
+    /// errors.
     #[schemars(inner(range(min = -360.0, max = 360.0)), extend("unit" = "degrees east of north"))]
     pub position_angles_deg: Vec<f64>,
     /// Radii of the band, M.
@@ -45,16 +46,16 @@ pub struct BandSettings {
     /// Standard deviations of the band across its circle, M.
     #[schemars(inner(range(min = 1e-3, max = 1e6)), extend("unit" = "M"))]
     pub widths: Vec<f64>,
-    /// Its standard deviation in z, M.
+    /// Standard deviation in z, M.
     #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub height: f64,
     /// Correlation lengths of the emission, M.
     #[schemars(inner(range(min = 1e-3, max = 1e6)), extend("unit" = "M"))]
     pub lengths: Vec<f64>,
-    /// Rings between the axis and the largest radius of the region.
+    /// Rings of the grid between the axis and `region.r_max`, closer than the narrowest width.
     #[schemars(range(min = 4, max = 128), extend("unit" = "rings between the axis and region.r_max"))]
     pub nodes: usize,
-    /// What shines beside the flare; nothing, without.
+    /// Emission beside the flare, in Q and in U independent of each other: a constant and what varies about it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub background: Option<BackgroundSettings>,
 }
@@ -63,11 +64,14 @@ pub struct BandSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BackgroundSettings {
-    /// Standard deviation of what is constant, Jy.
+    /// Standard deviation of the constant, Jy.
+    #[schemars(range(min = 0.0, max = 1000.0), extend("unit" = "Jy"))]
     pub constant_jy: f64,
-    /// Standard deviations of what varies about it, Jy.
+    /// Standard deviations of what varies, Jy.
+    #[schemars(inner(range(min = 0.0, max = 1000.0)), extend("unit" = "Jy"))]
     pub variation_jy: Vec<f64>,
     /// Its correlation times, minutes.
+    #[schemars(inner(range(min = 1e-3, max = 1e6)), extend("unit" = "minutes"))]
     pub correlation_min: Vec<f64>,
     /// ν of its Matérn covariance.
     pub matern: Vec<Roughness>,

@@ -10,13 +10,14 @@ use serde::{Deserialize, Serialize};
 pub struct ChangeSettings {
     /// Which changes are allowed.
     pub allowed: Allowed,
-    /// Factor on ∫∫ |∂e/∂t| dV dt along the flow.
+    /// Factor on ∫∫ |∂e/∂t| dV dt along the flow, M³ of emission.
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a factor"))]
     pub weight: f64,
-    /// Times between which emission is linear in time are not farther apart than this, M.
+    /// Longest time between the knots at which the emission is free, M.
     #[schemars(range(min = 1e-6, max = 1e9), extend("unit" = "M"))]
     pub spacing: f64,
-    /// Births that were found cost less in the rounds that follow, by s/(s + e) where e is emitted.
+    /// An emission s: births found in a round cost s/(s + e) of `weight` in the next. Needs births and
+    /// `linear.rounds` of 2 or more.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "an emission"))]
     pub sharpen: Option<f64>,

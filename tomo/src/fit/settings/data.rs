@@ -12,25 +12,27 @@ use std::path::PathBuf;
 pub enum DataFiles {
     /// Visibilities: UVFITS, eht-imaging's text, the EHT's tables or CSV.
     Visibilities {
-        /// The file, relative to the fit's.
+        /// UVFITS, eht-imaging's text, EHT tables or CSV, relative to this file.
         path: PathBuf,
-        /// Rows this close in time are averaged and make a frame, s.
+        /// Rows within this time are averaged and form a frame, s, 0 or above; 0: each time is a frame, times
+        /// within half a second as long as no baseline is there twice.
         #[schemars(range(min = 0.0), extend("unit" = "seconds"))]
         average_s: f64,
-        /// Part of each amplitude that is added to its error in quadrature: for what calibration has left.
+        /// Fraction of each amplitude, added to its error in quadrature.
         #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "part of the amplitude"))]
         systematic: f64,
         /// Time of the first frame, M.
         #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
         first_time: f64,
-        /// Baselines shorter than this many wavelengths are left out: those within a site see extended emission too.
+        /// Drops baselines shorter than this, wavelengths.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 0.0), extend("unit" = "wavelengths"))]
         uv_min: Option<f64>,
-        /// The interstellar medium that the light has passed.
+        /// Interstellar scattering that is part of the model.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         scattering: Option<Scattering>,
-        /// Errors for what the source varies and the model does not.
+        /// Adds jy/(1 + (|u|/uv)²)^(power/2) to all errors, for what the source varies and the model does not; not
+        /// with polarized products.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         variability: Option<Variability>,
     },
@@ -38,7 +40,8 @@ pub enum DataFiles {
     LightCurve(Box<MeasuredCurve>),
     /// A movie in Jy/pixel: .npz, .npy, .csv, .fits or .exr.
     Movie {
-        /// The file, relative to the fit's.
+        /// NPZ, NPY, CSV, FITS or EXR in Jy/pixel, a Zarr store, or a sequence: `frames/*.exr`, `f_%04d.exr`, a
+        /// folder of EXR files.
         path: PathBuf,
     },
 }
@@ -47,19 +50,20 @@ pub enum DataFiles {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Loss {
-    /// Which.
+    /// Which data.
     pub data: LossKind,
-    /// Factor on χ² per datum.
+    /// Weight of the term.
     #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "a factor"))]
     pub weight: f64,
-    /// Standard deviation of a pixel (image) or of the flux (light curve), Jy.
+    /// Standard deviation of a pixel (image) or of a movie's flux (light-curve), Jy; needed for these two, but not
+    /// for light curves of their own.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-15, max = 1e15), extend("unit" = "Jy"))]
     pub sigma: Option<f64>,
-    /// Which of the Stokes parameters of a light curve; I, without it.
+    /// Stokes parameters of a light curve of its own; `["I"]` without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stokes: Option<Vec<StokesParameter>>,
-    /// Least signal-to-noise ratio of baselines of closure quantities.
+    /// Least signal-to-noise ratio of baselines in closures, ratios and traces; 0 without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "a signal-to-noise ratio"))]
     pub least_snr: Option<f64>,

@@ -22,16 +22,16 @@ pub enum FieldKind {
 pub struct PriorOfVoxels {
     /// What is Gaussian.
     pub kind: FieldKind,
-    /// Its mean, emission or the logarithm of that.
+    /// Its mean; of a logarithm, −50 to 50: the median of the emission is exp(mean).
     #[schemars(range(min = -1e12, max = 1e12), extend("unit" = "emission, or its logarithm"))]
     pub mean: f64,
-    /// Its standard deviation at a point.
+    /// Its standard deviation at a point; of a logarithm, at a node, at most 20.
     #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "a standard deviation"))]
     pub amplitude: f64,
-    /// Of Matérn's covariance, M.
+    /// ℓ of the Matérn covariance, M.
     #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub correlation_length: f64,
-    /// Its ν.
+    /// ν of the Matérn covariance.
     pub matern: Roughness,
 }
 
@@ -41,24 +41,24 @@ pub struct PriorOfVoxels {
 pub struct FieldSettings {
     /// What is Gaussian.
     pub kind: FieldKind,
-    /// Its mean, emission or the logarithm of that.
+    /// Its mean; of a logarithm, −50 to 50.
     #[schemars(range(min = -1e12, max = 1e12), extend("unit" = "emission, or its logarithm"))]
     pub mean: f64,
-    /// Its standard deviation at a point.
+    /// Its standard deviation at a point; of a logarithm, at most 20.
     #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "a standard deviation"))]
     pub amplitude: f64,
-    /// Of Matérn's covariance, M.
+    /// ℓ of the Matérn covariance, M.
     #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub correlation_length: f64,
-    /// Its ν.
+    /// ν of the Matérn covariance.
     pub matern: Roughness,
-    /// What becomes of what is negative; nothing is, where the logarithm is Gaussian.
+    /// What becomes of negative parts of a Gaussian field, for which it is needed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub negative: Option<Negative>,
     /// Nodes along each axis of the cube about the region.
     #[schemars(range(min = 4, max = 256), extend("unit" = "nodes along each axis"))]
     pub nodes: usize,
-    /// What is between them.
+    /// B-splines between the nodes.
     #[serde(default = "cubic")]
     pub degree: Degree,
 }

@@ -9,15 +9,15 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HeldOutSettings {
-    /// The setting.
+    /// The number that is chosen.
     pub setting: Weight,
-    /// Its values, from which one is chosen.
+    /// Values to choose from, two or more; those of a prior above 0.
     #[schemars(inner(range(min = 0.0, max = 1e12)), extend("unit" = "a factor"))]
     pub values: Vec<f64>,
-    /// Parts of the data, each of which is held out once: frame, or baseline, k belongs to part k modulo their number.
+    /// Parts of the frames or baselines, at most half of their number.
     #[schemars(range(min = 2, max = 1000), extend("unit" = "parts of the data"))]
     pub folds: usize,
-    /// What the data are divided by.
+    /// What the data are divided by; baselines need losses of visibilities or what is made of them alone.
     #[serde(default)]
     pub by: HeldOutBy,
 }

@@ -10,10 +10,12 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InstrumentSettings {
-    /// Complex gains of the stations, new ones in every frame.
+    /// Complex gains, one a station and frame. Needs one loss of visibilities, polarized visibilities or
+    /// amplitudes. Every station needs a prior.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gains: Option<GainSettings>,
-    /// Leakage between the feeds of the stations, the same in all frames.
+    /// Leakage between the feeds, the same in all frames. Needs polarized visibilities, circular feeds, and a
+    /// linear-grid or a linear start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub leakage: Option<LeakageSettings>,
 }
@@ -22,7 +24,7 @@ pub struct InstrumentSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LeakageSettings {
-    /// Root mean square of |d| that is expected of d_R and d_L of all stations.
+    /// Root mean square of |d| that is expected: its prior.
     #[schemars(range(min = 1e-6, max = 1.0), extend("unit" = "a root mean square of |d|"))]
     pub amplitude: f64,
     /// Times that emission and leakage are solved for in turn, at most.
@@ -34,16 +36,16 @@ pub struct LeakageSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GainSettings {
-    /// Whether phases are free.
+    /// What is known of the phases.
     pub phases: GainPhases,
-    /// Standard deviation of ln|g| of stations by name; 0: the amplitude is right.
+    /// Standard deviation of ln |g| by station; 0: the amplitude is right.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     #[schemars(extend("additionalProperties" = {"minimum": 0.0, "maximum": 10.0}, "unit" = "a standard deviation of ln |g|"))]
     pub stations: BTreeMap<String, f64>,
-    /// A table that comes with the program, for stations that are not listed: EHT2017 or ngEHT.
+    /// Priors of stations that are not listed: `EHT2017` or `ngEHT`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<String>,
-    /// Standard deviation of ln|g| of all stations that neither has.
+    /// Standard deviation of ln |g| of stations that neither has.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a standard deviation of ln |g|"))]
     pub amplitude: Option<f64>,

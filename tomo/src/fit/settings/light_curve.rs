@@ -12,16 +12,16 @@ use std::path::PathBuf;
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case)]
 pub struct PerStokes {
-    /// Of I.
+    /// Stokes I, Jy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub I: Option<f64>,
-    /// Of Q.
+    /// Stokes Q, Jy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub Q: Option<f64>,
-    /// Of U.
+    /// Stokes U, Jy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub U: Option<f64>,
-    /// Of V.
+    /// Stokes V, Jy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub V: Option<f64>,
 }
@@ -42,27 +42,27 @@ impl PerStokes {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SimulatedCurve {
-    /// Hours of UTC of the samples.
+    /// Hours of UTC of the samples, hours; this or `times`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = -1e4, max = 1e4)), extend("unit" = "hours of UTC"))]
     pub times_h: Option<Vec<f64>>,
-    /// The same from a column of a file, relative to the fit's.
+    /// A CSV with such a column, relative to this file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub times: Option<PathBuf>,
     /// Time of the first sample, M.
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub first_time: f64,
-    /// Standard deviations, Jy.
+    /// Standard deviations, above 0 Jy, of the parameters of the loss.
     pub sigma: PerStokes,
     /// Noise that is added.
     pub noise: Noise,
-    /// What shines beside the truth in Q and U; nothing, without.
+    /// A background that is drawn and added to Q and U.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub background: Option<SimulatedBackground>,
-    /// What the truth is scaled to; as bright as its amplitudes say, without it.
+    /// Scales the truth to this mean of I; as bright as its amplitudes without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_flux: Option<MeanFlux>,
-    /// Samples later than this many minutes after the first are not fitted: they judge the fit.
+    /// Samples later than this after the first are not fitted, minutes; their χ² judges the fit.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "minutes"))]
     pub validate_after_min: Option<f64>,
@@ -72,11 +72,14 @@ pub struct SimulatedCurve {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SimulatedBackground {
-    /// Standard deviation of a constant, Jy.
+    /// Standard deviation of the constant, Jy.
+    #[schemars(range(min = 0.0, max = 1000.0), extend("unit" = "Jy"))]
     pub constant_jy: f64,
-    /// Standard deviation of what varies about it, Jy.
+    /// Standard deviation of what varies, Jy.
+    #[schemars(range(min = 0.0, max = 1000.0), extend("unit" = "Jy"))]
     pub variation_jy: f64,
     /// Its correlation time, minutes.
+    #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "minutes"))]
     pub correlation_min: f64,
     /// ν of its Matérn covariance.
     pub matern: Roughness,
@@ -86,10 +89,10 @@ pub struct SimulatedBackground {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeanFlux {
-    /// Jy.
+    /// The mean, Jy.
     #[schemars(range(min = 1e-15, max = 1e15), extend("unit" = "Jy"))]
     pub jy: f64,
-    /// Over so many minutes from the first sample on.
+    /// It is over this time from the first sample on, minutes.
     #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "minutes"))]
     pub minutes: f64,
 }
@@ -98,34 +101,34 @@ pub struct MeanFlux {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeasuredCurve {
-    /// The file, relative to the fit's.
+    /// CSV of an unresolved source, or UVFITS, of which the baselines within a site are read (ALMA–APEX, JCMT–SMA),
+    /// relative to this file.
     pub path: PathBuf,
     /// Time of the first sample that is left, M.
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub first_time: f64,
-    /// First and last hour of UTC; all, without.
+    /// First and last hour of UTC, hours; all without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = -1e4, max = 1e4)), extend("unit" = "hours of UTC"))]
     pub utc_h: Option<[f64; 2]>,
-    /// Samples that are averaged; none, without.
+    /// Samples that are averaged.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 1_000_000_000), extend("unit" = "samples"))]
     pub average: Option<usize>,
-    /// Seconds over which samples are averaged; not at all, without.
+    /// Time over which samples are averaged, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub average_s: Option<f64>,
-    /// Averages later than this many seconds after the one before are left out: they bridge gaps.
+    /// Averages later than this after the one before are dropped, s: they bridge gaps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "seconds"))]
     pub most_gap_s: Option<f64>,
-    /// Standard deviations in Jy that take the place of the file's.
+    /// Standard deviations, Jy, in place of the file's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma: Option<PerStokes>,
-    /// What does not move, and is subtracted, Jy.
+    /// Constant flux that is subtracted, Jy.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steady: Option<PerStokes>,
-    /// What is added to position angles so that they are those of the source, degrees east of north: Faraday rotation
-    /// that is taken back.
+    /// Added to position angles, degrees east of north: takes Faraday rotation back.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -360.0, max = 360.0), extend("unit" = "degrees east of north"))]
     pub derotation_deg: Option<f64>,
@@ -133,7 +136,7 @@ pub struct MeasuredCurve {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -1e15, max = 1e15), extend("unit" = "Jy"))]
     pub intensity: Option<f64>,
-    /// Samples later than this many minutes after the first are not fitted: they judge the fit.
+    /// Samples later than this after the first are not fitted, minutes; their χ² judges the fit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "minutes"))]
     pub validate_after_min: Option<f64>,

@@ -15,10 +15,10 @@ pub enum Scattering {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Variability {
-    /// On short baselines, Jy, per real and imaginary part.
+    /// On short baselines, per real and imaginary part, Jy.
     #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "Jy"))]
     pub jy: f64,
-    /// The length of baselines from which on it falls, wavelengths.
+    /// Baseline length from which it falls, wavelengths.
     #[schemars(range(min = 1.0), extend("unit" = "wavelengths"))]
     pub uv: f64,
     /// How steeply it falls.

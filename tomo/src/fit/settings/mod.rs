@@ -64,80 +64,80 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FitFile {
-    /// One line that says what is fitted.
+    /// Title of the report, one line.
     pub title: String,
-    /// Seed of noise, of the first parameters and of all draws.
+    /// Seed of noise, initial parameters and all random draws.
     pub seed: u64,
-    /// The hole.
+    /// The black hole.
     pub hole: Hole,
-    /// From where it is seen.
+    /// Where the observer is.
     pub observer: Observer,
-    /// Pixels of the model.
+    /// Square pixels of the model.
     pub screen: Screen,
-    /// Where emission is looked for, and how rays are sampled there.
+    /// Where emission may be, and how rays are sampled there.
     pub region: Region,
-    /// What happens to light, each off unless asked.
+    /// Effects on light, each off unless given.
     #[serde(default)]
     pub effects: Effects,
-    /// How matter turns.
+    /// Motion of the emitting matter: circles about an axis, or with a radial velocity.
     pub motion: Motion,
-    /// The field of the gas and its polarised light; total intensity alone, without it.
+    /// Magnetic field of the gas and its polarized light; total intensity alone without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polarization: Option<PolarizationLaw>,
-    /// A rotation of all position angles that is looked for; none, without it.
+    /// A rotation of all position angles between source and data that is fitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub faraday: Option<FaradaySettings>,
-    /// A weight that is chosen by data that are held out.
+    /// Chooses a number of the linear problem by cross-validation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<HeldOutSettings>,
-    /// How emission may change while matter carries it; not at all, without it.
+    /// Emission that changes while matter carries it; without this table it does not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub change: Option<ChangeSettings>,
-    /// What does not move, recovered beside the emission; nothing, without it.
+    /// Emission that does not move, recovered beside the rest: an image on the screen, or a constant flux of each
+    /// Stokes parameter of a light curve.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quiescent: Option<QuiescentSettings>,
-    /// Frames of a simulated movie, or of an observation.
+    /// Frame times of a movie of images.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub movie: Option<Movie>,
-    /// What is simulated.
+    /// The simulated emission.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truth: Option<Truth>,
-    /// What data are simulated with where that differs from what the fit assumes: any part of `hole`,
-    /// `observer`, `region`, `effects` and `motion`; and what of the world the fit does not know
-    /// ([`UnknownWorld`]).
+    /// Parameters that are fitted, each with its prior; and what a simulation assumes where it differs from the
+    /// fit.
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
     #[schemars(with = "unknown_world::WorldKeys")]
     pub world: toml::Table,
-    /// The array that sees the simulated movie.
+    /// The array that observes the simulation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub observation: Option<Observation>,
-    /// The light curve of the simulation, of a source that is not resolved.
+    /// The simulated light curve of an unresolved source.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub light_curve: Option<SimulatedCurve>,
-    /// Files, instead of a simulation.
+    /// Measured data, in place of a simulation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub data: Option<DataFiles>,
-    /// What of the instrument is solved for; nothing, without it.
+    /// Instrumental parameters that are fitted with the emission.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instrument: Option<InstrumentSettings>,
-    /// What is compared with the data.
+    /// Terms of the loss, the sum of weight · χ² per datum.
     pub loss: Vec<Loss>,
-    /// Penalties on the emission beside the data; none unless asked.
+    /// Penalties on the emission, integrals over its volume.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub regulariser: Vec<PenaltySettings>,
-    /// Where regularisers look at a network; a grid has nodes of its own.
+    /// Grid on which penalties of a network are evaluated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub probe: Option<ProbeSettings>,
-    /// What is recovered.
+    /// How the recovered emission is represented.
     pub representation: Representation,
-    /// How.
+    /// How the representation is optimized.
     pub training: Training,
-    /// The linear problem of voxels: needed for `linear-grid`, a start from it and a scan of axes.
+    /// The linear problem of voxels, for linear-grid, a linear start, a scan of axes and searches.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub linear: Option<Linear>,
-    /// What is known of the axis.
+    /// The rotation axis: known, fitted from a start, or searched.
     pub axis: AxisSearch,
-    /// Worlds that are compared first by the light curve of a flare in an orbital band.
+    /// Geometries that are compared first, by a flare in an orbital band.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub band: Option<BandSettings>,
     /// The recovered volume.
@@ -175,7 +175,7 @@ impl FitFile {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
-    /// Nodes of the volume along each axis.
+    /// Nodes along each axis.
     #[schemars(range(min = 2, max = 512), extend("unit" = "nodes along each axis"))]
     pub nodes: usize,
 }

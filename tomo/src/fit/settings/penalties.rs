@@ -11,18 +11,18 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PenaltySettings {
-    /// Which: the other numbers are those of its kind.
+    /// Which penalty, each at most once.
     pub kind: PenaltyKind,
-    /// Factor on its integral over the region.
+    /// Factor on its integral over the region, above 0.
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a factor"))]
     pub weight: f64,
-    /// Total variation: slope below which it is smoothed, emission per M.
+    /// Total variation: slope below which it is smoothed, emission per M, above 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub epsilon: Option<f64>,
-    /// Entropy: the emission where it is 0.
+    /// Entropy: the emission m at which it vanishes, above 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub level: Option<f64>,
-    /// Entropy: part of `level` below which it goes on as a parabola.
+    /// Entropy: fraction of m below which it continues as a parabola, above 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub floor: Option<f64>,
 }
@@ -46,7 +46,7 @@ pub enum PenaltyKind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeSettings {
-    /// Nodes along each axis of the cube that holds the region.
+    /// Nodes along each axis.
     #[schemars(range(min = 4, max = 256), extend("unit" = "nodes along each axis"))]
     pub nodes: usize,
 }

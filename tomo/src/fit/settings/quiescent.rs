@@ -8,15 +8,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct QuiescentSettings {
-    /// Largest brightness: emission integrated along the line of sight, M, so that times `screen.jy_per_pixel` it is Jy
-    /// in a pixel; of a light curve, Jy.
+    /// Largest brightness, M of emission 1 along a line of sight; of a light curve, the largest |flux|, Jy.
     #[schemars(range(min = 1e-15, max = 1e15), extend("unit" = "M of emission; Jy, of a light curve"))]
     pub upper: f64,
-    /// Factor on ∫ |∇b|² dA over the screen, b the brightness in M and A in M²; not of a light curve.
+    /// Factor on ∫ |∇b|² dA over the screen, b in M and A in M²; needed, but not for light curves.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a factor"))]
     pub smoothness: Option<f64>,
-    /// Factor on ∫ b dA, M³ of emission; not of a light curve.
+    /// Factor on ∫ b dA; needed, but not for light curves.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a factor"))]
     pub sparsity: Option<f64>,

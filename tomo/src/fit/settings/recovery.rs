@@ -11,38 +11,45 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Representation {
-    /// Which: the other numbers are those of its kind.
+    /// Kind of representation: one of kerrlight's, or the name of your own. Keys of another kind are passed over,
+    /// with a note.
     pub kind: Kind,
-    /// Nodes of a grid along each axis; [`grid_nodes`](Self::grid_nodes) has the usual number.
+    /// Nodes of a grid along each axis, 2^30 in all at most; 64 without it, 36 for linear-grid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 2, max = 2048), extend("unit" = "nodes along each axis"))]
     pub nodes: Option<usize>,
-    /// Cells of the coarsest grid of features along each axis; each further one has twice as many.
+    /// Feature grid: cells of the coarsest grid along each axis, at most 512 in the finest.
     #[serde(default = "coarsest")]
+    #[schemars(range(min = 1), extend("unit" = "cells along each axis"))]
     pub coarsest: usize,
-    /// Grids of features.
+    /// Feature grid: number of grids, each twice as fine as the previous.
     #[serde(default = "levels")]
+    #[schemars(range(min = 1, max = 6), extend("unit" = "grids"))]
     pub levels: usize,
-    /// Last function of a grid, or of a network's output − 10.
+    /// Last function of a grid or network.
     #[serde(default = "sigmoid")]
     pub activation: Activation,
-    /// Units of a hidden layer.
+    /// Network: units per hidden layer.
     #[serde(default = "width")]
+    #[schemars(range(min = 1, max = 4096), extend("unit" = "units"))]
     pub width: usize,
-    /// Hidden layers.
+    /// Network: hidden layers.
     #[serde(default = "hidden_layers")]
+    #[schemars(range(min = 1, max = 64), extend("unit" = "layers"))]
     pub hidden_layers: usize,
-    /// Positional encoding degree.
+    /// Network: degree of the positional encoding.
     #[serde(default = "degree")]
+    #[schemars(range(max = 16), extend("unit" = "a degree"))]
     pub degree: usize,
-    /// Unit of length of a network, M.
+    /// Network: unit of length, M.
     #[serde(default = "one")]
     #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub length_scale: f64,
-    /// Unit of time of a network, M.
+    /// Network: unit of time, M.
     #[serde(default = "one")]
     #[schemars(range(min = 1e-3, max = 1e9), extend("unit" = "M"))]
     pub time_scale: f64,
-    /// Numbers of a representation that a program of one's own adds.
+    /// Settings of a representation of your own.
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
     #[schemars(with = "std::collections::BTreeMap<String, schemars::Schema>")]
     pub own: toml::Table,
@@ -125,12 +132,12 @@ pub struct Training {
     /// Rule of the steps.
     #[serde(default)]
     pub optimiser: Optimiser,
-    /// Steps.
+    /// Number of steps.
     pub steps: u64,
-    /// First learning rate, in units of the parameters.
+    /// First learning rate of Adam and Muon.
     #[schemars(range(min = 1e-12, max = 10.0), extend("unit" = "a learning rate"))]
     pub rate: f64,
-    /// Last learning rate, in the same unit, reached linearly.
+    /// Last learning rate, reached linearly.
     #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a learning rate"))]
     pub last_rate: f64,
     /// First learning rate of a grid, whose parameters are of another size than a network's; `rate`, without it.
@@ -149,21 +156,21 @@ pub struct Training {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a learning rate"))]
     pub feature_last_rate: Option<f64>,
-    /// Steps over which rates grow to that.
+    /// Steps over which the rate grows from 0.
     #[serde(default)]
     pub ramp: u64,
-    /// What a step looks at.
+    /// Data of a step.
     pub batch: BatchSize,
-    /// From where parameters start.
+    /// Initial parameters.
     #[serde(default)]
     pub start: Start,
-    /// Mask of what shines.
+    /// A mask that skips dark cells.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub occupancy: Option<Occupancy>,
-    /// Steps from one line of the log to the next.
+    /// Steps between lines of the log.
     #[schemars(range(min = 1), extend("unit" = "steps"))]
     pub log_every: u64,
-    /// Most seconds from one checkpoint to the next.
+    /// Longest time between checkpoints, s.
     #[serde(default = "checkpoint_seconds")]
     #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "seconds"))]
     pub checkpoint_seconds: f64,
@@ -173,10 +180,10 @@ pub struct Training {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Linear {
-    /// Largest emission that is allowed.
+    /// Largest allowed emission.
     #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "the largest emission"))]
     pub upper: f64,
-    /// Mean flux of a frame, Jy: what closure quantities alone do not know, and need.
+    /// Mean flux of a frame, Jy; needed with closure quantities alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-15, max = 1e15), extend("unit" = "Jy"))]
     pub flux_jy: Option<f64>,
@@ -188,15 +195,16 @@ pub struct Linear {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a factor"))]
     pub sparsity: f64,
-    /// A prior of the voxels; none, without it.
+    /// Gaussian or log-normal prior of the voxels: every loss then has the weight 1. Not with `[change]` or
+    /// `[quiescent]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior: Option<PriorOfVoxels>,
-    /// What is between the nodes.
+    /// B-splines between the nodes; a scan of axes and a `[band]` use trilinear voxels.
     #[serde(default = "cubic")]
     pub degree: Degree,
-    /// Times that nodes may be admitted again.
+    /// Rounds in which nodes may be admitted again.
     pub rounds: usize,
-    /// Iterations of each round.
+    /// Iterations per round, at most.
     pub iterations: usize,
 }
 
@@ -217,13 +225,13 @@ pub enum Start {
     Drawn,
     /// Fitted to the solution of the linear problem on a coarse grid.
     Linear {
-        /// Nodes of that grid along each axis.
+        /// Nodes of the linear problem along each axis.
         nodes: usize,
-        /// Every how many-eth frame it looks at.
+        /// Every so many-eth frame is used.
         stride: usize,
-        /// Steps of the fit to its solution.
+        /// Steps of each round of the fit to its solution, which ends within 5 % of it or after four rounds.
         steps: u64,
-        /// Iterations of each round in place of those of the table `linear`: a start may be rough.
+        /// Iterations in place of `linear.iterations`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         iterations: Option<usize>,
     },
@@ -236,13 +244,13 @@ pub struct Occupancy {
     /// Cells along each axis.
     #[schemars(range(min = 2, max = 256), extend("unit" = "cells along each axis"))]
     pub cells: usize,
-    /// Part of the peak below which a cell is empty.
+    /// Cells below this fraction of the peak are empty, 0 to 1, 1 excluded; neighbours of lit cells are kept.
     pub threshold: f64,
-    /// The share of the brightness that is remembered from one refresh to the next.
+    /// Fraction of the old brightness kept at each update, 0 to 1, 1 excluded.
     pub memory: f64,
-    /// Steps without it.
+    /// Steps before the mask is used.
     pub warm_up: u64,
-    /// Steps from one look to the next.
+    /// Steps between updates, each at a random point of every cell.
     pub every: u64,
 }
 
@@ -256,12 +264,12 @@ pub enum AxisSearch {
     Scan(AxisScan),
     /// It is learnt from this start.
     From {
-        /// Where it starts.
+        /// Initial axis, a vector of any length.
         start: [f64; 3],
-        /// First learning rate, in units of the parameters.
+        /// First learning rate of the axis, radians a step.
         #[schemars(range(min = 1e-12, max = 10.0), extend("unit" = "a learning rate"))]
         rate: f64,
-        /// Last learning rate, in the same unit, reached linearly.
+        /// Last learning rate, reached linearly.
         #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a learning rate"))]
         last_rate: f64,
     },
@@ -274,21 +282,21 @@ pub struct AxisScan {
     /// Directions that are tried.
     #[schemars(range(min = 12, max = 100_000), extend("unit" = "directions"))]
     pub directions: usize,
-    /// Number of frames in use, spread over all.
+    /// Frames of the data that are used.
     #[schemars(range(min = 2), extend("unit" = "frames"))]
     pub frames: usize,
-    /// Pixels along a side of the model that is fitted to them; all that there are if it is more than half of them.
+    /// Pixels along each side; all of them if more than half.
     #[schemars(range(min = 8), extend("unit" = "pixels along a side"))]
     pub pixels: usize,
-    /// Nodes along each axis of a grid with which all pixels are then fitted, for axes near the best one; without
-    /// it that is the scan's.
+    /// Nodes along each axis of a second search near the best axis, with all pixels; 32 is a good value for
+    /// visibilities.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 8, max = 128), extend("unit" = "nodes along each axis"))]
     pub refine: Option<usize>,
-    /// First learning rate (radians a step) of the refinement that follows; 0: the axis stays where the scan found it.
+    /// First learning rate of the axis, radians a step; 0 keeps the axis found.
     #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a learning rate"))]
     pub rate: f64,
-    /// Last learning rate, in the same unit, reached linearly.
+    /// Last learning rate, reached linearly.
     #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a learning rate"))]
     pub last_rate: f64,
 }

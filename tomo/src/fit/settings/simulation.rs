@@ -9,13 +9,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Movie {
-    /// How many.
+    /// Number of frames.
     #[schemars(range(min = 1, max = 100_000), extend("unit" = "frames"))]
     pub frames: usize,
-    /// Time of the first, M.
+    /// Time of the first frame, M.
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub from: f64,
-    /// Time of the last, M.
+    /// Time of the last frame, M.
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub to: f64,
 }
@@ -24,19 +24,19 @@ pub struct Movie {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Truth {
-    /// Gaussian spots at the reference time.
+    /// Gaussian spots.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spot: Vec<Spot>,
-    /// Arcs about the z axis with a Gaussian cross-section at the reference time.
+    /// Arcs about the z axis with a Gaussian cross-section.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tube: Vec<Tube>,
-    /// Letters and digits at the reference time, flat in the plane across the axis.
+    /// Letters and digits, extruded along the axis, their tops away from the hole.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub glyph: Vec<GlyphShape>,
-    /// A random field at the reference time.
+    /// A field drawn from a prior of voxels with the fit's seed, in the cube about the region.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub field: Option<FieldSettings>,
-    /// Rings on the screen that do not move.
+    /// Rings on the screen about the hole, the same in every frame.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ring: Vec<Ring>,
 }
@@ -45,20 +45,20 @@ pub struct Truth {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Spot {
-    /// Where it was when it was round, M.
+    /// Centre when the spot was round, M: x, y, z.
     #[schemars(inner(range(min = -1e6, max = 1e6)), extend("unit" = "M"))]
     pub center: [f64; 3],
     /// Standard deviation, M.
     #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub sigma: f64,
-    /// Emission at its centre.
+    /// Emission at the centre.
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "emission at the centre"))]
     pub amplitude: f64,
-    /// For how long differential rotation has wound it up until the reference time, in units of time.
+    /// Time for which differential rotation has sheared it by the reference time, M.
     #[serde(default)]
     #[schemars(range(min = -1e6, max = 1e6), extend("unit" = "M"))]
     pub wound_for: f64,
-    /// When it shines; always, without it.
+    /// When it shines; always without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shines: Option<Shines>,
 }
@@ -67,7 +67,7 @@ pub struct Spot {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tube {
-    /// Its radius, M.
+    /// Radius of the arc, M.
     #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub radius: f64,
     /// Standard deviation across it, M.
@@ -85,20 +85,20 @@ pub struct Tube {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Ring {
-    /// Its radius, M; 0 is a round spot.
+    /// Radius, M; 0 is a round spot.
     #[schemars(range(min = 0.0, max = 1e6), extend("unit" = "M"))]
     pub radius: f64,
     /// Standard deviation across it, M.
     #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub sigma: f64,
-    /// Its flux, Jy.
+    /// Stokes I, Jy.
     #[schemars(range(min = 0.0, max = 1e15), extend("unit" = "Jy"))]
     pub flux_jy: f64,
-    /// Its Q, Jy, with the same shape.
+    /// Stokes Q, of the same shape, Jy.
     #[serde(default)]
     #[schemars(range(min = -1e15, max = 1e15), extend("unit" = "Jy"))]
     pub q_jy: f64,
-    /// Its U, Jy.
+    /// Stokes U, of the same shape, Jy.
     #[serde(default)]
     #[schemars(range(min = -1e15, max = 1e15), extend("unit" = "Jy"))]
     pub u_jy: f64,
@@ -106,7 +106,7 @@ pub struct Ring {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "a part of the mean brightness"))]
     pub asymmetry: f64,
-    /// Where it is brightest, degrees east of north.
+    /// Position angle of the brightest side, degrees east of north.
     #[serde(default)]
     #[schemars(range(min = -360.0, max = 360.0), extend("unit" = "degrees east of north"))]
     pub brightest_deg: f64,
@@ -141,15 +141,15 @@ impl Tube {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Shines {
-    /// Time at which it has reached half of its brightness, M; it has been there for ever, without one.
+    /// Time at which it has reached half of its brightness, M; ever since without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub from: Option<f64>,
-    /// Time at which it has faded to half, M; it never fades, without one.
+    /// Time at which it has faded to half, M; for ever without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub until: Option<f64>,
-    /// Time constant of both, logistic functions 1/(1 + exp(−t/rise)), M.
+    /// Time constant of the logistic rise and decay, M.
     #[schemars(range(min = 1e-6, max = 1e9), extend("unit" = "M"))]
     pub rise: f64,
 }
@@ -167,17 +167,17 @@ impl Shines {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GlyphShape {
-    /// Which letter.
+    /// The letter or digit.
     pub letter: char,
-    /// Its middle, M.
+    /// Its middle: x, y, z in M.
     pub center: [f64; 3],
-    /// From its lower to its upper edge, M.
+    /// Height, above 0 M.
     pub height: f64,
-    /// Along the axis, M.
+    /// Extent along the axis, above 0 M.
     pub thickness: f64,
-    /// Standard deviation of its blurred edges, M.
+    /// Standard deviation of the blurred edges, above 0 M and at most the height.
     pub softness: f64,
-    /// Emission in the middle of broad strokes.
+    /// Emission in broad strokes.
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "emission in the strokes"))]
     pub amplitude: f64,
 }
@@ -186,41 +186,42 @@ pub struct GlyphShape {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Observation {
-    /// EHT2017, ngEHT, or a file in eht-imaging's format.
+    /// `EHT2017`, `ngEHT`, or an array file in eht-imaging's format.
     pub array: String,
-    /// sgra, m87, or RA,DEC.
+    /// `sgra`, `m87`, or `RA,DEC` in hours and degrees.
     pub source: String,
     /// Modified Julian date.
     pub mjd: i32,
-    /// Hours of UTC from the first scan to one after the last.
+    /// Hours of UTC of the first scan and of one after the last; this or `gmst`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub utc: Option<[f64; 2]>,
-    /// The same in hours of Greenwich mean sidereal time.
+    /// The same in hours of Greenwich mean sidereal time, beginning on the day `mjd`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gmst: Option<[f64; 2]>,
-    /// Scans.
+    /// Number of scans, a frame each.
+    #[schemars(range(min = 1, max = 1_000_000), extend("unit" = "scans"))]
     pub scans: u32,
-    /// Integration time of a scan, s.
+    /// Integration time of a scan, above 0 s.
     pub integration_s: f64,
-    /// Frequency in GHz.
+    /// Frequency, above 0 GHz.
     pub frequency_ghz: f64,
-    /// Bandwidth in GHz.
+    /// Bandwidth, above 0 GHz.
     pub bandwidth_ghz: f64,
-    /// Least and greatest elevation at which stations observe, degrees.
+    /// Least and greatest elevation, degrees.
     pub elevation_deg: [f64; 2],
-    /// Noise that is added to the data.
+    /// Noise that is added; errors are thermal in both cases.
     pub noise: Noise,
-    /// Errors of station gains, none by default.
+    /// Gain errors of the stations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gains: Option<GainErrors>,
-    /// Root mean square of |d| of the leakage of the stations' feeds, drawn once for each; none by default.
+    /// Root mean square of |d| of the leakage, drawn once for each feed; needs a loss of polarized visibilities.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "a root mean square of |d|"))]
     pub leakage: Option<f64>,
-    /// Part of each amplitude that the fit adds to its error in quadrature, none by default: for errors of gains,
-    /// or where errors are so small that a loss has minima everywhere.
+    /// Fraction of each amplitude that the fit adds to its error in quadrature.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "part of the amplitude"))]
+    #[schemars(example = 0.02)]
     pub systematic: Option<f64>,
     /// Time of the first scan, M.
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]

@@ -19,32 +19,32 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StaticImageFile {
-    /// One line that says what is fitted.
+    /// Title of the report, one line.
     pub title: String,
-    /// Seed of the draws of noise.
+    /// Seed of all random draws.
     pub seed: u64,
-    /// Pixels, flux and how the image is looked for.
+    /// The static image: nothing is assumed of a hole, and nothing moves.
     pub image: ImageSettings,
-    /// What was measured.
+    /// Measured data.
     pub data: StaticData,
-    /// What of the instrument is solved for; nothing, without it.
+    /// Instrumental parameters that are fitted with the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instrument: Option<InstrumentSettings>,
-    /// What is compared with the data.
+    /// Terms of the loss: visibilities, amplitudes and closure quantities.
     pub loss: Vec<Loss>,
-    /// Penalties on the brightness.
+    /// Penalties on the brightness over its mean; lengths are parts of the field.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub regulariser: Vec<PenaltySettings>,
-    /// Where light is expected; anywhere in the field, without it.
+    /// A Gaussian in the middle of the field that light is expected in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub envelope: Option<EnvelopeSettings>,
-    /// A factor on all penalties that frames which are held out choose; 1, without it.
+    /// A factor on all penalties, chosen by cross-validation; 1 without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub strength: Option<StrengthSettings>,
-    /// Measures a ring in the image; nothing is measured without it.
+    /// Measures a ring in the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ring: Option<RingSettings>,
-    /// Finds the linear polarisation of the image; total intensity alone, without it.
+    /// Fits linear polarization as well.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub polarization: Option<StaticPolarization>,
 }
@@ -53,24 +53,25 @@ pub struct StaticImageFile {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImageSettings {
-    /// Pixels along a side.
+    /// Pixels along each side.
     #[schemars(range(min = 8, max = 512), extend("unit" = "pixels along a side"))]
     pub pixels: usize,
     /// Width of the square field, µas.
     #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
     pub field_uas: f64,
-    /// Flux that is expected of the field, Jy ...
+    /// Mean of the Gaussian prior of the flux, Jy.
     #[schemars(range(min = 1e-12, max = 1e9), extend("unit" = "Jy"))]
     pub flux_jy: f64,
-    /// ... and its standard deviation: a Gaussian prior.
+    /// Its standard deviation, Jy.
     #[schemars(range(min = 1e-12, max = 1e9), extend("unit" = "Jy"))]
     pub flux_sigma_jy: f64,
-    /// Images to start from; the fit ends with the one that comes to the least loss.
+    /// Images to start from; the fit ends with the one of the least loss.
     pub starts: Vec<StartImage>,
-    /// Iterations of the optimiser from one start, at most.
+    /// Iterations from one start, at most.
     #[schemars(range(min = 1, max = 1_000_000), extend("unit" = "iterations"))]
     pub iterations: usize,
-    /// Fits of the image measured once more with other noise, which give errors; none without it.
+    /// Fits of the image measured once more with other noise, which give errors; needs a loss of amplitudes or
+    /// visibilities.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 2, max = 1000), extend("unit" = "draws"))]
     pub draws: Option<usize>,
@@ -82,16 +83,16 @@ pub struct ImageSettings {
 pub enum StartImage {
     /// A circle with a Gaussian cross-section.
     Ring {
-        /// Its diameter, µas.
+        /// Diameter, µas.
         #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
         diameter_uas: f64,
-        /// Its full width at half maximum, µas.
+        /// Full width at half maximum of its cross-section, µas.
         #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
         width_uas: f64,
     },
     /// A round Gaussian.
     Gaussian {
-        /// Its full width at half maximum, µas.
+        /// Full width at half maximum, µas.
         #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
         fwhm_uas: f64,
     },
@@ -101,10 +102,10 @@ pub enum StartImage {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EnvelopeSettings {
-    /// Its full width at half maximum, µas.
+    /// Full width at half maximum, µas.
     #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
     pub fwhm_uas: f64,
-    /// Factor on Σ s ln(s/m), with shares s of the flux in the image and m in the Gaussian.
+    /// Factor on the entropy relative to it.
     #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "a factor"))]
     pub weight: f64,
 }
@@ -113,7 +114,7 @@ pub struct EnvelopeSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StaticData {
-    /// Visibilities.
+    /// Visibilities of a source that does not change.
     pub visibilities: StaticVisibilities,
 }
 
@@ -121,23 +122,24 @@ pub struct StaticData {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StaticVisibilities {
-    /// UVFITS, eht-imaging's text, the EHT's tables or CSV; relative to the fit's file.
+    /// UVFITS, eht-imaging's text, EHT tables or CSV, relative to this file; `$KERRLIGHT_EHT_DATA/NAME` is in the
+    /// folder that this variable names.
     pub path: PathBuf,
-    /// Rows this close in time are averaged and share the gains of their stations, s.
+    /// Rows within this time are averaged and share the gains of their stations, s, 0 or above.
     pub average_s: f64,
-    /// Part of each amplitude that is added to its error in quadrature: for what calibration has left.
+    /// Fraction of each amplitude, added to its error in quadrature.
     pub systematic: f64,
-    /// Baselines shorter than this many wavelengths are left out.
+    /// Drops baselines shorter than this.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uv_min: Option<f64>,
-    /// The first and the last hour of UTC that count; all, without it.
+    /// First and last hour of UTC, hours; all without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = 0.0, max = 1000.0)), extend("unit" = "hours"))]
     pub utc_h: Option<[f64; 2]>,
-    /// The interstellar medium that the light has passed.
+    /// Interstellar scattering that is part of the model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scattering: Option<Scattering>,
-    /// Errors for what the source does vary.
+    /// Adds jy/(1 + (|u|/uv)²)^(power/2) to all errors, for what the source varies.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variability: Option<Variability>,
 }
@@ -146,10 +148,10 @@ pub struct StaticVisibilities {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StrengthSettings {
-    /// The factors.
+    /// Factors to choose from, two or more.
     #[schemars(inner(range(min = 1e-12, max = 1e12)), extend("unit" = "a factor"))]
     pub values: Vec<f64>,
-    /// Parts of the frames, each of which is held out once: frame k belongs to part k modulo their number.
+    /// Parts of the frames, at most half of their number, each held out once.
     #[schemars(range(min = 2, max = 1000), extend("unit" = "parts of the frames"))]
     pub folds: usize,
 }
@@ -158,10 +160,10 @@ pub struct StrengthSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RingSettings {
-    /// Least distance from the centre at which the brightest point of a direction may lie, µas.
+    /// Least distance of the brightest points from the centre, µas.
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "microarcseconds"))]
     pub least_radius_uas: f64,
-    /// The largest one, µas.
+    /// Largest distance, at most half of the field, µas.
     #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
     pub most_radius_uas: f64,
 }

@@ -9,29 +9,29 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StaticPolarization {
-    /// What is compared: polarimetric ratios, which gains leave as they are, or polarised visibilities.
+    /// `polarimetric-ratios` or `polarized-visibilities`.
     pub data: LossKind,
-    /// Least signal-to-noise ratio in Stokes I of baselines whose ratios are compared.
+    /// Ratios: least signal-to-noise ratio in Stokes I of baselines; 0 without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a signal-to-noise ratio"))]
     pub least_snr: Option<f64>,
-    /// Leakage that calibration has left: this part of Stokes I, in quadrature for both stations, is added to the errors of RL
-    /// and LR.
+    /// Part of Stokes I of each station that is added to errors of RL and LR, for leakage that calibration has
+    /// left.
     #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "a part of the light"))]
     pub leakage_left: f64,
-    /// Errors of RL and LR for what polarised light varies; none, without it.
+    /// Adds jy/(1 + (|u|/uv)²)^(power/2) to errors of RL and LR.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variability: Option<Variability>,
-    /// Factor on the penalty of slopes of the fraction of polarisation.
+    /// Factor on ∫ e |∇m|², e the brightness over its mean and m the fraction of polarization.
     #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "a factor"))]
     pub smoothness: f64,
-    /// Iterations of the optimiser, at most.
+    /// Iterations, at most.
     #[schemars(range(min = 1, max = 1_000_000), extend("unit" = "iterations"))]
     pub iterations: usize,
-    /// Full width at half maximum of the beam with which the image is convolved before fractions are measured, µas.
+    /// Full width at half maximum of the beam with which fractions are measured, µas.
     #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
     pub beam_uas: f64,
-    /// Factors on the penalty, from which frames that are held out choose; 1, without it.
+    /// A factor on `smoothness`, chosen by cross-validation with frames held out in blocks; 1 without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub strength: Option<StrengthSettings>,
 }

@@ -19,39 +19,41 @@ use toml::Table;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UnknownWorld {
-    /// a, M.
+    /// Prior of the spin, −0.999 to 0.999.
     pub spin: Option<PriorSettings>,
-    /// Angle from the spin to the observer, degrees.
+    /// Prior of the inclination, 0 to 180 degrees.
     pub inclination_deg: Option<PriorSettings>,
-    /// Of the spin on the sky, degrees east of north.
+    /// Prior of the position angle of the spin, degrees east of north, −360 to 360.
     pub position_angle_deg: Option<PriorSettings>,
-    /// Where the hole is on the screen, M to the right (west).
+    /// Prior of the position of the hole on the screen, to the right (west), −1000 to 1000 M.
     pub offset_x: Option<PriorSettings>,
-    /// Where the hole is on the screen, M upwards (north).
+    /// The same upwards (north).
     pub offset_y: Option<PriorSettings>,
-    /// Mass over `hole.mass_msun`, dimensionless.
+    /// Prior of the mass over `hole.mass_msun`, 0.001 to 1000: unit of time, and angular size.
     pub mass_factor: Option<PriorSettings>,
-    /// Angular velocity over `motion.velocity`, dimensionless.
+    /// Prior of the angular velocity over `motion.velocity`, −10 to 10.
     pub rotation_factor: Option<PriorSettings>,
-    /// Power of g that emission goes with, dimensionless.
+    /// Prior of the power of g, −10 to 10; needs `effects.redshift_power`.
     pub redshift_power: Option<PriorSettings>,
-    /// ξ of `motion.velocity.infall`, dimensionless.
+    /// Prior of ξ of `motion.velocity = { infall = … }`, 0 to 1.
     pub xi: Option<PriorSettings>,
-    /// β_r of the same.
+    /// Prior of its β_r, 0 to 1.
     pub beta_r: Option<PriorSettings>,
-    /// β_φ of the same.
+    /// Prior of its β_φ, 0 to 1.
     pub beta_phi: Option<PriorSettings>,
-    /// Ω at each knot of `motion.velocity.profile` over that of the file, dimensionless.
+    /// Prior of Ω at each of the radii (6 at most) of `motion.velocity = { profile = … }` over that of the file,
+    /// 0.001 to 1000.
     pub angular_factors: Option<PriorSettings>,
-    /// dr/dt at each of them over that of the file.
+    /// The same of dr/dt.
     pub radial_factors: Option<PriorSettings>,
     /// How many knots there are.
     #[serde(skip)]
     pub knots: usize,
-    /// Whether what is simulated has values drawn from the priors, another draw for each seed: for calibration.
+    /// Simulates a geometry drawn from the priors by the seed, for calibration: not mass and rotation factor. With
+    /// `screen.ring_rays`, along 16 times as many rays near the critical curve.
     #[serde(default)]
     pub drawn: bool,
-    /// How they are looked for.
+    /// How the parameters are searched for.
     pub search: WorldSearch,
 }
 
@@ -77,9 +79,9 @@ pub enum PriorSettings {
     Uniform([f64; 2]),
     /// A bell curve.
     Normal {
-        /// Its middle.
+        /// The mean.
         mean: f64,
-        /// Its standard deviation, above 0.
+        /// Standard deviation, above 0. A small one holds a parameter that is known.
         sigma: f64,
     },
     /// A bell curve of the logarithm.
@@ -93,11 +95,11 @@ pub enum PriorSettings {
     Isotropic([f64; 2]),
     /// The same everywhere from the first to the last value, and looked at on a grid.
     Scanned {
-        /// The first value.
+        /// First value.
         from: f64,
-        /// The last value.
+        /// Last value.
         to: f64,
-        /// Values of the grid, both ends included.
+        /// Values of the grid, 2 to 1000.
         points: usize,
     },
 }

@@ -10,16 +10,18 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hole {
-    /// a, M.
+    /// Spin a along +z.
     #[schemars(range(min = -1.0, max = 1.0), extend("unit" = "a/M"))]
     pub spin: f64,
-    /// Mass in solar masses; needed for hours and microarcseconds.
+    /// Mass, solar masses; needed for hours and microarcseconds.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-20, max = 1e15), extend("unit" = "solar masses"))]
+    #[schemars(example = 4.154e6)]
     pub mass_msun: Option<f64>,
-    /// Distance; needed for microarcseconds.
+    /// Distance, kpc; needed for microarcseconds.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-9, max = 1e12), extend("unit" = "kpc"))]
+    #[schemars(example = 8.178)]
     pub distance_kpc: Option<f64>,
 }
 
@@ -27,11 +29,12 @@ pub struct Hole {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Observer {
-    /// Angle to the spin axis, degrees.
+    /// Angle between +z and the line of sight, degrees.
     #[schemars(range(min = 0.0, max = 180.0), extend("unit" = "degrees"))]
     pub inclination_deg: f64,
-    /// M; infinity without it.
+    /// Boyer–Lindquist radius of the observer, above 2 M; infinity without it.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 1000.0)]
     pub radius: Option<f64>,
 }
 
@@ -39,27 +42,30 @@ pub struct Observer {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Screen {
-    /// Along each side.
+    /// Pixels along each side.
     #[schemars(range(min = 2, max = 4096), extend("unit" = "pixels along a side"))]
     pub pixels: usize,
-    /// Width in M: of the outer edges, or from the first to the last pixel's centre.
+    /// Width of the screen, M.
     #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub width: f64,
-    /// What the width is of.
+    /// What `width` spans.
     pub width_of: WidthOf,
-    /// Field of view on the sky, if it is not `width` in units of the hole's angular size.
+    /// Width on the sky, µas; that of `width` at the hole's mass and distance without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
+    #[schemars(example = 120.0)]
     pub field_uas: Option<f64>,
-    /// Jy in a pixel of a sight line with 1 M of emission 1.
+    /// Jy in the pixel of a sight line with 1 M of emission 1: the unit of emission.
     #[schemars(range(min = 1e-15, max = 1e15), extend("unit" = "Jy per M of emission 1"))]
     pub jy_per_pixel: f64,
-    /// Rays of each pixel near the critical curve, whose mean is its light; one in the middle, without it.
+    /// Rays of each pixel near the critical curve, whose mean is its light; one without it.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 8)]
+    #[schemars(range(min = 1, max = 1024), extend("unit" = "rays"))]
     pub ring_rays: Option<usize>,
-    /// What a pixel is to visibilities; without it, [`PixelShape::Triangle`] to those that are simulated and
-    /// [`PixelShape::Delta`] to those that are read.
+    /// Pixel shape seen by visibilities; triangle for simulated data and delta for measured data without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(example = PixelShape::Delta)]
     pub pulse: Option<PixelShape>,
 }
 
@@ -106,11 +112,12 @@ pub struct Region {
     /// Largest radius, M.
     #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub r_max: f64,
-    /// Largest |z|, M.
+    /// Largest |z|, M; unlimited without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-3), extend("unit" = "M"))]
+    #[schemars(example = 4.0)]
     pub z_width: Option<f64>,
-    /// Nodes on rays.
+    /// Quadrature along rays. Images without noise need order 12; `quadrature_error` in `results.json` tells.
     pub nodes: Sampling,
 }
 
@@ -126,15 +133,18 @@ impl Region {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Effects {
-    /// Whether light takes its time.
+    /// Whether emission is evaluated at the time when the light passed.
     #[serde(default)]
     pub slow_light: bool,
-    /// Emission goes like g to this power; without it there is no redshift.
+    /// Emission scales as g to this power, 2 + spectral index; no redshift without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -20.0, max = 20.0), extend("unit" = "an exponent"))]
+    #[schemars(example = 2.0)]
     pub redshift_power: Option<f64>,
-    /// A grey medium at rest that dims what lies behind it; what shines does not absorb.
+    /// A grey medium at rest inside the region, κ = coefficient · exp(−½[(r/radius)² + (z/height)²]), which dims
+    /// what lies behind it.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = Absorption { coefficient: 0.1, radius: 6.0, height: 2.0 })]
     pub absorption: Option<Absorption>,
 }
 
@@ -142,13 +152,13 @@ pub struct Effects {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Absorption {
-    /// Per M.
+    /// κ at the centre, per M.
     #[schemars(range(min = 0.0, max = 1e6), extend("unit" = "per M"))]
     pub coefficient: f64,
-    /// M.
+    /// Scale of r, M.
     #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub radius: f64,
-    /// M.
+    /// Scale of z, M.
     #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub height: f64,
 }
@@ -157,16 +167,17 @@ pub struct Absorption {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Motion {
-    /// Angular velocity about the axis.
+    /// Law of motion; positive Ω is right-handed about the axis.
     pub velocity: Velocity,
-    /// The axis of the truth, or the known one: a vector of any length.
+    /// Rotation axis, a vector of any length; needed with `[axis.known]` and for simulations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<[f64; 3]>,
     /// Time at which the volume is the recovered one, M.
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub reference_time: f64,
-    /// Time at which it begins to shine, M.
+    /// Emission is dark before this time, M; always lit without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
+    #[schemars(example = 0.0)]
     pub injection_time: Option<f64>,
 }

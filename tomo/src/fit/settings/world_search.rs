@@ -7,17 +7,19 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WorldSearch {
-    /// Places to begin, all over the priors.
+    /// Searches that start from places all over the priors.
     #[schemars(range(min = 1, max = 1000), extend("unit" = "searches"))]
     pub starts: usize,
-    /// The search from each of them.
+    /// The searches from all starts.
     pub coarse: WorldView,
-    /// The search about the best of their ends.
+    /// The last search, around the best of their ends.
     pub fine: WorldView,
-    /// What the last steps look at, from the world that the fine search has found; none if there are no finer ones.
+    /// The steps from the best geometry of `fine`; as `fine` without it. Needs `screen.ring_rays` or images, and
+    /// data in which the volume is a convex problem.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub finest: Option<WorldSteps>,
-    /// Whether the drag of a Keplerian velocity and of `infall` is the spin of each world along the axis.
+    /// Whether the drag of a Keplerian velocity and of `infall` is the spin of each trial along the axis; a drag in
+    /// the file must then be that of `hole.spin`.
     pub drag_is_spin: bool,
 }
 
@@ -25,19 +27,20 @@ pub struct WorldSearch {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WorldView {
-    /// Worlds, at most.
+    /// Trials per search, at most.
     #[schemars(range(min = 1, max = 1_000_000), extend("unit" = "worlds"))]
     pub worlds: usize,
-    /// Voxels along each axis of the volume that is solved for.
+    /// Voxels along each axis.
     #[schemars(range(min = 2, max = 128), extend("unit" = "voxels along each axis"))]
     pub nodes: usize,
-    /// Iterations of each solution over all voxels; the fine search adds up to six times as many over those that shine.
+    /// Iterations for the volume of each trial.
     #[schemars(range(min = 1, max = 10_000), extend("unit" = "iterations"))]
     pub iterations: usize,
-    /// Pixels along each side, about.
+    /// Pixels along each side; all of them if more than half. For visibilities `fine` takes any number above half,
+    /// `finest` any number.
     #[schemars(range(min = 2, max = 4096), extend("unit" = "pixels along a side"))]
     pub pixels: usize,
-    /// Frames, about.
+    /// Approximate number of frames used.
     #[schemars(range(min = 2, max = 1_000_000), extend("unit" = "frames"))]
     pub frames: usize,
 }
@@ -46,16 +49,16 @@ pub struct WorldView {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WorldSteps {
-    /// Voxels along each axis of the volume that is solved for.
+    /// Voxels along each axis.
     #[schemars(range(min = 2, max = 128), extend("unit" = "voxels along each axis"))]
     pub nodes: usize,
-    /// Iterations of each solution over all voxels; up to six times as many follow over those that shine.
+    /// Iterations for each volume.
     #[schemars(range(min = 1, max = 10_000), extend("unit" = "iterations"))]
     pub iterations: usize,
-    /// Pixels along each side, about.
+    /// Pixels along each side.
     #[schemars(range(min = 2, max = 4096), extend("unit" = "pixels along a side"))]
     pub pixels: usize,
-    /// Frames, about.
+    /// Approximate number of frames used.
     #[schemars(range(min = 2, max = 1_000_000), extend("unit" = "frames"))]
     pub frames: usize,
 }
