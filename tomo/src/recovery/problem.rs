@@ -80,6 +80,7 @@ impl Problem {
         registry: Registry,
         measure: impl FnOnce(&FitFile, &Instrument) -> Result<Measured, E>,
     ) -> Result<Self, E> {
+        settings.check_ranges().map_err(Error::from)?;
         setup::afford_all(&settings, &registry)?;
         setup::check(&settings, &registry)?;
         let instrument = Instrument::new(&settings)?;

@@ -1,7 +1,7 @@
 //! Keys of a fit's file: their ranges are checked, their documentation is handed on.
 
 use super::{FitError, FitFile, StaticImageFile};
-use kerrlight_common::toml_file::{self, Keys, shown};
+use kerrlight_common::toml_file::{self, Keys, OutOfRange, shown};
 use std::sync::LazyLock;
 
 static FIT: LazyLock<Keys> = LazyLock::new(Keys::of::<FitFile>);
@@ -11,6 +11,15 @@ impl FitFile {
     /// All keys of such a file, with their documentation.
     pub fn keys() -> &'static Keys {
         &FIT
+    }
+
+    /// Refuses the first number that is out of the range of its key.
+    ///
+    /// # Errors
+    /// With the key, its value and what is allowed.
+    pub fn check_ranges(&self) -> Result<(), FitError> {
+        let table = toml_file::table_of(self)?;
+        FIT.check(&table).map_err(|wrong| range_error(&wrong))
     }
 }
 
@@ -24,9 +33,11 @@ impl StaticImageFile {
 /// Refuses the first number of a text that is out of its range, or not a number at all.
 pub(super) fn check(text: &str, keys: &Keys) -> Result<(), FitError> {
     let table: toml::Table = toml_file::read(text)?;
-    keys.check(&table).map_err(|wrong| {
-        FitError::range(&*wrong.key, shown(wrong.value), &wrong.allowed()).located(text)
-    })
+    keys.check(&table).map_err(|wrong| range_error(&wrong).located(text))
+}
+
+fn range_error(wrong: &OutOfRange) -> FitError {
+    FitError::range(&*wrong.key, shown(wrong.value), &wrong.allowed())
 }
 
 #[cfg(test)]

@@ -207,19 +207,6 @@ pub fn check_band<'a>(
         }
     }
     prior(settings).checked()?;
-    let range = |key: &str, value: f64, allowed| {
-        Err(FitError::range(format!("band.{key}"), value, allowed).into())
-    };
-    let inclinations = settings.inclinations_deg.values();
-    if let Some(bad) = inclinations.iter().find(|i| !(0.0..=180.0).contains(*i)) {
-        return range("inclinations_deg", *bad, "0 to 180 degrees");
-    }
-    if let Some(bad) = settings.rotation_factors.iter().find(|x| !(-10.0..=10.0).contains(*x)) {
-        return range("rotation_factors", *bad, "-10 to 10");
-    }
-    if !(4..=128).contains(&settings.nodes) {
-        return range("nodes", settings.nodes as f64, "4 to 128");
-    }
     check_rings(file, settings)?;
     if settings.rotation_factors.is_empty() || settings.position_angles_deg.is_empty() {
         refuse!("band: rotation_factors and position_angles_deg need one value or more");

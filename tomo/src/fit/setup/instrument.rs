@@ -41,6 +41,7 @@ impl Instrument {
     /// # Errors
     /// If a number is out of range, no ray meets the region, or there is no memory for the nodes.
     pub fn new(file: &FitFile) -> Result<Self> {
+        file.check_ranges()?;
         let n = file.screen.pixels;
         Self::afford(file, n.saturating_mul(n))?;
         Self::of(file, &(0..n * n).collect::<Vec<_>>())
@@ -103,11 +104,8 @@ impl Instrument {
             );
         }
         let jy = file.screen.jy_per_pixel;
-        if !(jy > 0.0 && jy.is_finite()) {
-            return Err(FitError::range("screen.jy_per_pixel", jy, "above 0").into());
-        }
         if let Some(medium) = file.effects.absorption {
-            lines.absorb(opacity(medium)?);
+            lines.absorb(opacity(medium));
         }
         lines.weight.iter_mut().for_each(|weight| *weight *= jy);
         let redshift = file.effects.redshift_power.map(|power| Redshift { power });
@@ -207,9 +205,6 @@ fn polarized(file: &FitFile, screen: &[Vec<f64>; 2]) -> Result<Option<PolarizedV
 /// If their number is out of range, or rays have no mean.
 pub(super) fn ring(file: &FitFile) -> Result<Option<RingRays>> {
     let Some(count) = file.screen.ring_rays else { return Ok(None) };
-    if !(1..=1024).contains(&count) {
-        return Err(FitError::range("screen.ring_rays", count, "1 to 1024").into());
-    }
     if file.effects.absorption.is_some() {
         refuse!("screen.ring_rays and effects.absorption exclude each other");
     }
@@ -220,24 +215,12 @@ pub(super) fn ring(file: &FitFile) -> Result<Option<RingRays>> {
 }
 
 /// κ(x) of the medium.
-fn opacity(medium: Absorption) -> Result<impl Fn([f64; 3]) -> f64> {
+fn opacity(medium: Absorption) -> impl Fn([f64; 3]) -> f64 {
     let Absorption { coefficient, radius, height } = medium;
-    if !(coefficient >= 0.0 && coefficient.is_finite()) {
-        return Err(
-            FitError::range("effects.absorption.coefficient", coefficient, "0 or above").into()
-        );
-    }
-    for (name, value) in [("radius", radius), ("height", height)] {
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(
-                FitError::range(format!("effects.absorption.{name}"), value, "above 0").into()
-            );
-        }
-    }
-    Ok(move |[x, y, z]: [f64; 3]| {
+    move |[x, y, z]: [f64; 3]| {
         let square = (x * x + y * y + z * z) / (radius * radius) + z * z / (height * height);
         coefficient * (-0.5 * square).exp()
-    })
+    }
 }
 
 /// (α, β) of pixels, rows from the top, each from the left.

@@ -51,20 +51,6 @@ impl Truth {
         }
         let mut spots = truth.spot.clone();
         spots.extend(truth.tube.iter().flat_map(Tube::spots));
-        for (k, spot) in spots.iter().enumerate() {
-            let numbers = [spot.sigma, spot.amplitude, spot.wound_for];
-            let shines = spot.shines.unwrap_or(ALWAYS);
-            if !(shines.rise > 0.0 && shines.rise.is_finite()) {
-                let key = format!("truth.spot.{k}.shines.rise");
-                return Err(FitError::range(key, shines.rise, "M above 0").into());
-            }
-            let finite = numbers.iter().chain(&spot.center).all(|x| x.is_finite());
-            if !finite || spot.sigma <= 0.0 || spot.amplitude < 0.0 {
-                refuse!(
-                    "truth.spot {k}: finite numbers with sigma above 0 and amplitude 0 or above"
-                );
-            }
-        }
         let missing = || FitError::missing("motion.axis", format!("a simulation needs it; {AXIS}"));
         let axis = known_axis(file)?.ok_or_else(missing)?;
         let glyph =

@@ -223,7 +223,15 @@ fn exact_a_flare_before_a_background() {
 #[test]
 fn regress_backgrounds_that_mean_nothing_are_refused() {
     let says = |set: &str| {
-        let file = file(PUBLISHED, &["screen.pixels=8", "band.nodes=8", set]);
+        let text = ["screen.pixels=8", "band.nodes=8", set]
+            .iter()
+            .fold(PUBLISHED.to_owned(), |text, assignment| {
+                apply_override(&text, assignment).unwrap()
+            });
+        let file = match FitFile::parse(&text) {
+            Ok(file) => file,
+            Err(error) => return error.to_string(),
+        };
         let instrument = Instrument::new(&file).unwrap();
         let measured = match Measured::simulated(&file, &instrument, None) {
             Ok(measured) => measured,
