@@ -22,6 +22,7 @@ pub enum DataFiles {
         #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "part of the amplitude"))]
         systematic: f64,
         /// Time of the first frame, M.
+        #[serde(default)]
         #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
         first_time: f64,
         /// Drops baselines shorter than this, wavelengths.
@@ -53,6 +54,7 @@ pub struct Loss {
     /// Which data.
     pub data: LossKind,
     /// Weight of the term.
+    #[serde(default = "one")]
     #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "a factor"))]
     pub weight: f64,
     /// Standard deviation of a pixel (image) or of a movie's flux (light-curve), Jy; needed for these two, but not
@@ -67,6 +69,10 @@ pub struct Loss {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "a signal-to-noise ratio"))]
     pub least_snr: Option<f64>,
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 /// Kinds of data.

@@ -50,6 +50,7 @@ pub struct SimulatedCurve {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub times: Option<PathBuf>,
     /// Time of the first sample, M.
+    #[serde(default)]
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub first_time: f64,
     /// Standard deviations, above 0 Jy, of the parameters of the loss.
@@ -105,6 +106,7 @@ pub struct MeasuredCurve {
     /// relative to this file.
     pub path: PathBuf,
     /// Time of the first sample that is left, M.
+    #[serde(default)]
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub first_time: f64,
     /// First and last hour of UTC, hours; all without it.

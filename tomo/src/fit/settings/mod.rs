@@ -65,8 +65,10 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct FitFile {
     /// Title of the report, one line.
+    #[serde(default)]
     pub title: String,
     /// Seed of noise, initial parameters and all random draws.
+    #[serde(default = "seed")]
     pub seed: u64,
     /// The black hole.
     pub hole: Hole,
@@ -131,16 +133,19 @@ pub struct FitFile {
     /// How the recovered emission is represented.
     pub representation: Representation,
     /// How the representation is optimized.
+    #[serde(default)]
     pub training: Training,
     /// The linear problem of voxels, for linear-grid, a linear start, a scan of axes and searches.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub linear: Option<Linear>,
     /// The rotation axis: known, fitted from a start, or searched.
+    #[serde(default)]
     pub axis: AxisSearch,
     /// Geometries that are compared first, by a flare in an orbital band.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub band: Option<BandSettings>,
     /// The recovered volume.
+    #[serde(default)]
     pub output: Output,
 }
 
@@ -168,6 +173,16 @@ impl FitFile {
         let simulated = self.observation.is_some() && self.light_curve.is_none();
         matches!(self.data, Some(DataFiles::Visibilities { .. }))
             || (self.data.is_none() && simulated)
+    }
+}
+
+fn seed() -> u64 {
+    1
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self { nodes: 64 }
     }
 }
 

@@ -2,8 +2,7 @@
 
 use super::{
     AxisSearch, DataFiles, Effects, FitFile, Hole, Kind, Linear, Loss, LossKind, Motion, Movie,
-    Observer, Occupancy, Optimiser, Output, Region, Representation, Screen, Start, Training, Truth,
-    WidthOf,
+    Observer, Occupancy, Output, Region, Representation, Screen, Start, Training, Truth, WidthOf,
 };
 use crate::fit::{BatchSize, Sampling};
 use crate::representation::{Activation, Degree};
@@ -90,9 +89,9 @@ impl FitFile {
             representation: Representation::of(kind),
             training: Training::starting(start),
             linear: Some(Linear::below(3.0)),
-            axis: AxisSearch::Known {},
+            axis: AxisSearch::default(),
             band: None,
-            output: Output { nodes: 64 },
+            output: Output::default(),
         }
     }
 
@@ -169,26 +168,10 @@ impl Representation {
 }
 
 impl Training {
-    /// The usual steps from a start.
+    /// The usual steps from a start, with a mask of what shines where that shows what does.
     pub fn starting(start: Start) -> Self {
-        let occupancy =
-            Occupancy { cells: 24, threshold: 0.003, memory: 0.8, warm_up: 0, every: 20 };
-        Self {
-            optimiser: Optimiser::Adam,
-            steps: 400,
-            rate: 5e-4,
-            last_rate: 5e-6,
-            grid_rate: Some(5e-2),
-            grid_last_rate: Some(5e-4),
-            feature_rate: Some(1e-2),
-            feature_last_rate: Some(1e-4),
-            ramp: 30,
-            batch: BatchSize::All,
-            start,
-            occupancy: (start != Start::Drawn).then_some(occupancy),
-            log_every: 25,
-            checkpoint_seconds: 60.0,
-        }
+        let occupancy = (start != Start::Drawn).then(Occupancy::default);
+        Self { batch: BatchSize::All, start, occupancy, ..Self::default() }
     }
 }
 

@@ -127,42 +127,35 @@ impl Kind {
 
 /// How it is recovered.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct Training {
     /// Rule of the steps.
-    #[serde(default)]
     pub optimiser: Optimiser,
     /// Number of steps.
     pub steps: u64,
-    /// First learning rate of Adam and Muon.
+    /// First learning rate of a network, of Adam or Muon.
     #[schemars(range(min = 1e-12, max = 10.0), extend("unit" = "a learning rate"))]
     pub rate: f64,
-    /// Last learning rate, reached linearly.
+    /// Its last learning rate, reached linearly.
     #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a learning rate"))]
     pub last_rate: f64,
-    /// First learning rate of a grid, whose parameters are of another size than a network's; `rate`, without it.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// First learning rate of a grid.
     #[schemars(range(min = 1e-12, max = 10.0), extend("unit" = "a learning rate"))]
-    pub grid_rate: Option<f64>,
-    /// Last learning rate of a grid.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grid_rate: f64,
+    /// Its last learning rate.
     #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a learning rate"))]
-    pub grid_last_rate: Option<f64>,
-    /// First learning rate of a feature grid; `rate`, without it.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grid_last_rate: f64,
+    /// First learning rate of a feature grid.
     #[schemars(range(min = 1e-12, max = 10.0), extend("unit" = "a learning rate"))]
-    pub feature_rate: Option<f64>,
-    /// Last learning rate of a feature grid.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    pub feature_rate: f64,
+    /// Its last learning rate.
     #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a learning rate"))]
-    pub feature_last_rate: Option<f64>,
+    pub feature_last_rate: f64,
     /// Steps over which the rate grows from 0.
-    #[serde(default)]
     pub ramp: u64,
     /// Data of a step.
     pub batch: BatchSize,
     /// Initial parameters.
-    #[serde(default)]
     pub start: Start,
     /// A mask that skips dark cells.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -171,7 +164,6 @@ pub struct Training {
     #[schemars(range(min = 1), extend("unit" = "steps"))]
     pub log_every: u64,
     /// Longest time between checkpoints, s.
-    #[serde(default = "checkpoint_seconds")]
     #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "seconds"))]
     pub checkpoint_seconds: f64,
 }
@@ -203,8 +195,10 @@ pub struct Linear {
     #[serde(default = "cubic")]
     pub degree: Degree,
     /// Rounds in which nodes may be admitted again.
+    #[serde(default = "rounds")]
     pub rounds: usize,
     /// Iterations per round, at most.
+    #[serde(default = "iterations")]
     pub iterations: usize,
 }
 
@@ -239,7 +233,7 @@ pub enum Start {
 
 /// Mask of what shines.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct Occupancy {
     /// Cells along each axis.
     #[schemars(range(min = 2, max = 256), extend("unit" = "cells along each axis"))]
@@ -277,7 +271,7 @@ pub enum AxisSearch {
 
 /// A search of the whole sphere of axes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct AxisScan {
     /// Directions that are tried.
     #[schemars(range(min = 12, max = 100_000), extend("unit" = "directions"))]
@@ -328,8 +322,51 @@ fn one() -> f64 {
     1.0
 }
 
-fn checkpoint_seconds() -> f64 {
-    60.0
+fn rounds() -> usize {
+    4
+}
+
+fn iterations() -> usize {
+    200
+}
+
+impl Default for Training {
+    fn default() -> Self {
+        Self {
+            optimiser: Optimiser::Adam,
+            steps: 400,
+            rate: 5e-4,
+            last_rate: 5e-6,
+            grid_rate: 5e-2,
+            grid_last_rate: 5e-4,
+            feature_rate: 1e-2,
+            feature_last_rate: 1e-4,
+            ramp: 30,
+            batch: BatchSize::Frames(8),
+            start: Start::Drawn,
+            occupancy: None,
+            log_every: 25,
+            checkpoint_seconds: 60.0,
+        }
+    }
+}
+
+impl Default for Occupancy {
+    fn default() -> Self {
+        Self { cells: 24, threshold: 0.003, memory: 0.8, warm_up: 0, every: 20 }
+    }
+}
+
+impl Default for AxisSearch {
+    fn default() -> Self {
+        Self::Known {}
+    }
+}
+
+impl Default for AxisScan {
+    fn default() -> Self {
+        Self { directions: 200, frames: 16, pixels: 22, refine: None, rate: 1e-3, last_rate: 1e-5 }
+    }
 }
 
 /// Rules of steps.

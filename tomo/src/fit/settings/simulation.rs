@@ -224,6 +224,7 @@ pub struct Observation {
     #[schemars(example = 0.02)]
     pub systematic: Option<f64>,
     /// Time of the first scan, M.
+    #[serde(default)]
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub first_time: f64,
 }

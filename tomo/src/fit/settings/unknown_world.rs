@@ -54,6 +54,7 @@ pub struct UnknownWorld {
     #[serde(default)]
     pub drawn: bool,
     /// How the parameters are searched for.
+    #[serde(default)]
     pub search: WorldSearch,
 }
 

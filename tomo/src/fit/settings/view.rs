@@ -49,6 +49,7 @@ pub struct Screen {
     #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub width: f64,
     /// What `width` spans.
+    #[serde(default)]
     pub width_of: WidthOf,
     /// Width on the sky, µas; that of `width` at the hole's mass and distance without it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -93,10 +94,11 @@ impl PixelShape {
 }
 
 /// What a width is of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum WidthOf {
     /// The pixels' outer edges.
+    #[default]
     Edges,
     /// The centres of the first and the last pixel.
     Centers,
@@ -173,6 +175,7 @@ pub struct Motion {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<[f64; 3]>,
     /// Time at which the volume is the recovered one, M.
+    #[serde(default)]
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub reference_time: f64,
     /// Emission is dark before this time, M; always lit without it.

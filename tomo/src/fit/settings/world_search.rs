@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// How the world is looked for.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct WorldSearch {
     /// Searches that start from places all over the priors.
     #[schemars(range(min = 1, max = 1000), extend("unit" = "searches"))]
@@ -21,6 +21,14 @@ pub struct WorldSearch {
     /// Whether the drag of a Keplerian velocity and of `infall` is the spin of each trial along the axis; a drag in
     /// the file must then be that of `hole.spin`.
     pub drag_is_spin: bool,
+}
+
+impl Default for WorldSearch {
+    fn default() -> Self {
+        let coarse = WorldView { worlds: 400, nodes: 16, iterations: 30, pixels: 20, frames: 16 };
+        let fine = WorldView { worlds: 60, nodes: 36, iterations: 80, pixels: 40, frames: 20 };
+        Self { starts: 8, coarse, fine, finest: None, drag_is_spin: true }
+    }
 }
 
 /// How worlds are evaluated.

@@ -218,18 +218,14 @@ pub fn caution(file: &FitFile) -> Option<&'static str> {
     )
 }
 
-/// Rates, and what they are called: voxels may have their own, as their parameters are of another size.
+/// Rates, and what they are called: parameters of voxels and features are of another size than a network's.
 fn rates(file: &FitFile) -> (&'static str, Polynomial) {
     let chosen = &file.training;
-    let (from, to, name) = match (&file.representation.kind, chosen.grid_rate) {
-        (Kind::Grid, Some(from)) => {
-            (from, chosen.grid_last_rate.unwrap_or(chosen.last_rate), "training.grid_rate")
+    let (from, to, name) = match file.representation.kind {
+        Kind::Grid => (chosen.grid_rate, chosen.grid_last_rate, "training.grid_rate"),
+        Kind::FeatureGrid => {
+            (chosen.feature_rate, chosen.feature_last_rate, "training.feature_rate")
         }
-        (Kind::FeatureGrid, _) if chosen.feature_rate.is_some() => (
-            chosen.feature_rate.unwrap_or(chosen.rate),
-            chosen.feature_last_rate.unwrap_or(chosen.last_rate),
-            "training.feature_rate",
-        ),
         _ => (chosen.rate, chosen.last_rate, "training.rate"),
     };
     (name, Polynomial { from, to, steps: chosen.steps, power: 1.0 })

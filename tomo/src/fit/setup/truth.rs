@@ -4,7 +4,7 @@ use super::glyph::Glyph;
 use super::random_field::RandomField;
 use super::ring::Rings;
 use super::{AXIS, Instrument, Result, known_axis, motion};
-use crate::fit::settings::{FitError, FitFile, Shines, Spot, Tube, Within, refuse};
+use crate::fit::settings::{FitError, FitFile, Spot, Tube, Within, refuse};
 use crate::fit::{Batch, ForwardModel};
 use kerrlight_common::frames::{Frames, Sink};
 use kerrlight_common::simd::Float;
@@ -32,9 +32,6 @@ pub struct Truth {
 
 /// Where a Gaussian is 5e-32 of its peak, in its standard deviations: nothing beside any rounding.
 const DARK: f64 = 12.0;
-
-/// Of what does not change.
-const ALWAYS: Shines = Shines { from: None, until: None, rise: 1.0 };
 
 impl Truth {
     /// The truth of settings that have one and an axis.
