@@ -115,8 +115,9 @@ fn results(rows: &[Outcome]) -> String {
 }
 
 fn settings(rows: &[Setting]) -> String {
-    let cells = |row: &Setting| [&row.key, &row.value, &row.unit].map(|cell| escape(cell)).to_vec();
-    table(&["Setting", "Value", "Unit"].map(str::to_owned), rows.iter().map(cells))
+    let cells =
+        |row: &Setting| [&row.key, &row.value, &row.meaning].map(|cell| escape(cell)).to_vec();
+    table(&["Setting", "Value", "What it says"].map(str::to_owned), rows.iter().map(cells))
 }
 
 /// A table of cells that are safe already; nothing without rows.

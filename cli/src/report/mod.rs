@@ -121,8 +121,8 @@ pub struct Setting {
     pub key: String,
     /// Its value.
     pub value: String,
-    /// Its unit, or nothing.
-    pub unit: String,
+    /// What it says, with its unit.
+    pub meaning: String,
 }
 
 /// A line of the table of results.

@@ -84,8 +84,8 @@ fn outcome(name: &str, value: &str, unit: &str, meaning: &str) -> Outcome {
     Outcome { name: text(name), value: text(value), unit: text(unit), meaning: text(meaning) }
 }
 
-fn setting(key: &str, value: &str, unit: &str) -> Setting {
-    Setting { key: text(key), value: text(value), unit: text(unit) }
+fn setting(key: &str, value: &str, meaning: &str) -> Setting {
+    Setting { key: text(key), value: text(value), meaning: text(meaning) }
 }
 
 /// A page as a fit would fill it. What is called recovered is the truth, wider and fainter.

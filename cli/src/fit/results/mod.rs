@@ -14,7 +14,6 @@ mod quiescent;
 pub mod residuals;
 mod scene;
 pub mod stores;
-mod units;
 pub mod verdict;
 
 pub use kerrlight_tomo::recovery::{recovered, true_volume};

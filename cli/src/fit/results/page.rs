@@ -8,7 +8,9 @@ use super::over_time::Changes;
 use super::quiescent::Quiescent;
 use super::verdict;
 use super::{Estimate, Found, bounds, quadrature};
+use crate::fit::SETTINGS;
 use crate::fit::curves::{loss_plot, psnr_plot};
+use crate::fit::folder::Folder;
 use crate::fit::{
     band_plots, band_search, band_words, held_out, labels, rotation_search, world_results,
     world_scan,
@@ -16,11 +18,11 @@ use crate::fit::{
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
 use anyhow::Context;
-use kerrlight_common::toml_file;
+use kerrlight_common::toml_file::{self, Keys};
 use kerrlight_render::volume::Shown;
 use kerrlight_render::volume::projection::Surroundings;
 use kerrlight_render::volume::slices::Through;
-use kerrlight_tomo::fit::settings::{AxisSearch, DataFiles};
+use kerrlight_tomo::fit::settings::{AxisSearch, DataFiles, FitFile};
 use kerrlight_tomo::fit::setup::Still;
 use serde_json::Value;
 
@@ -66,7 +68,7 @@ impl Estimate<'_> {
             figures: self.figures(found)?,
             drawings: world_scan::drawing(self.folder)?.into_iter().collect(),
             plots,
-            settings: settings(self.file)?,
+            settings: settings(self.file, FitFile::keys(), self.folder)?,
             ..Report::default()
         };
         let names = ["views.png", "lensed.png", "slices.png", "movie.png"];
@@ -232,12 +234,24 @@ impl Estimate<'_> {
     }
 }
 
-/// Every setting with its unit.
-pub fn settings(file: &impl serde::Serialize) -> anyhow::Result<Vec<report::Setting>> {
+/// Every setting with its meaning; those that the run's file leaves out are called assumed.
+pub fn settings(
+    file: &impl serde::Serialize,
+    keys: &Keys,
+    folder: &Folder,
+) -> anyhow::Result<Vec<report::Setting>> {
     let table = toml_file::table_of(file).context("settings")?;
-    let mut all = Vec::new();
+    let given: toml::Table = output::read_text(&folder.path().join(SETTINGS))?.parse()?;
+    let (mut all, mut written) = (Vec::new(), Vec::new());
     flatten("", &toml::Value::Table(table), &mut all);
-    Ok(all)
+    flatten("", &toml::Value::Table(given), &mut written);
+    let is_written = |key: &str| written.iter().any(|(other, _)| other == key);
+    let row = |(key, value): (String, String)| {
+        let about = keys.at(&key).map_or(String::new(), |about| about.meaning);
+        let meaning = if is_written(&key) { about } else { format!("Assumed. {about}") };
+        report::Setting { key, value, meaning: meaning.trim_end().to_owned() }
+    };
+    Ok(all.into_iter().map(row).collect())
 }
 
 /// With four digits behind the point, as far as there are any.
@@ -246,7 +260,7 @@ fn rounded(x: f64) -> f64 {
 }
 
 /// `a.b = value` of every leaf.
-fn flatten(prefix: &str, value: &toml::Value, all: &mut Vec<report::Setting>) {
+fn flatten(prefix: &str, value: &toml::Value, all: &mut Vec<(String, String)>) {
     match value {
         toml::Value::Table(table) => {
             for (key, value) in table {
@@ -259,10 +273,6 @@ fn flatten(prefix: &str, value: &toml::Value, all: &mut Vec<report::Setting>) {
                 flatten(&format!("{prefix}.{k}"), value, all);
             }
         }
-        leaf => all.push(report::Setting {
-            key: prefix.to_owned(),
-            value: leaf.to_string(),
-            unit: super::units::unit(prefix).to_owned(),
-        }),
+        leaf => all.push((prefix.to_owned(), leaf.to_string())),
     }
 }

@@ -10,6 +10,7 @@ use crate::fit::results::page::settings;
 use crate::fit::results::verdict::{self, Evidence};
 use crate::fit::results::{plots, residuals};
 use crate::report::{Axis, LinePlot, Marks, Outcome, Report, Series, Table};
+use kerrlight_tomo::fit::settings::StaticImageFile;
 use kerrlight_tomo::fit::static_image::{Candidate, ShapeFit};
 use serde_json::Value;
 
@@ -86,7 +87,7 @@ impl Found<'_> {
             details: (details.into_iter().flatten())
                 .chain([self.shapes_table(), self.images_table()])
                 .collect(),
-            settings: settings(self.file)?,
+            settings: settings(self.file, StaticImageFile::keys(), self.folder)?,
             ..Report::default()
         };
         report.write(&self.folder.file("report.html")?)
