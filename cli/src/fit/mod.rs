@@ -82,6 +82,9 @@ pub struct Fit {
     /// Write the settings that would be used and stop
     #[arg(long)]
     print: bool,
+    /// Print the JSON Schema of fit files, for editors; of static images with --model image
+    #[arg(long, conflicts_with_all = ["file", "set", "resume", "print", "data", "init"])]
+    schema: bool,
     /// Stop, keeping what there is, when standard input ends: for programs that start fits
     #[arg(long, hide = true)]
     stop_with_input: bool,
@@ -97,6 +100,14 @@ pub struct Fit {
 impl Fit {
     /// Fits.
     pub fn run(&self, registry: &Registry) -> anyhow::Result<Answer> {
+        if self.schema {
+            let keys = match self.model {
+                Some(init::Model::Image) => StaticImageFile::keys(),
+                _ => FitFile::keys(),
+            };
+            let text = serde_json::to_string_pretty(keys.schema())?;
+            return Ok(Answer::text(format!("{text}\n")).with("schema", keys.schema().clone()));
+        }
         if self.stop_with_input {
             interrupt::follow_parent()?;
         }
