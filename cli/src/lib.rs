@@ -40,6 +40,7 @@ macro_rules! eprintln {
 mod accuracy;
 mod answer;
 mod assets;
+mod changed;
 mod checksum;
 mod columns;
 mod compare;

@@ -97,6 +97,59 @@ fn skies_that_are_no_pictures() {
     assert!(message.contains("graticule.png") && message.contains("picture"), "{message}");
 }
 
+/// An error of the file is the file's, with its line; one of an assignment has no line, as nobody has seen the text that
+/// it makes.
+#[test]
+fn exact_lines_are_those_of_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let fit = std::fs::read_to_string(root().join("scenes/fits/scene_1.toml")).unwrap();
+    let scene = "[hole]\nspin = 0.5\n\n[disc]\nouter_edge = 9\n";
+    let line = |text: &str, what: &str| {
+        1 + text.lines().position(|line| line.starts_with(what)).expect("a line")
+    };
+    let write = |name: &str, text: &str| std::fs::write(path.join(name), text).unwrap();
+    write("f.toml", &fit);
+    write("s.toml", scene);
+    let (wrong_fit, wrong_scene) =
+        (fit.replace("steps = 400", "steps = -400"), scene.replace("outer_edge", "colour"));
+    write("wrong_f.toml", &wrong_fit);
+    write("wrong_s.toml", &wrong_scene);
+    for (fit, name) in [("f.toml", "e.toml"), ("wrong_f.toml", "wrong_e.toml")] {
+        let text = format!(
+            "title = \"A\"\nquestion = \"B\"\nseeds = 1\nfit = {fit:?}\n[set]\nhole.spin = 0.1\n"
+        );
+        write(name, &text);
+    }
+    let [steps, colour] = [line(&wrong_fit, "steps"), line(&wrong_scene, "colour")];
+    let (steps, colour) = (
+        format!("wrong_f.toml: line {steps}: training.steps"),
+        format!("wrong_s.toml: line {colour}: "),
+    );
+    let new = "with --set hole.mass=1: hole: unknown field `mass`";
+    for (words, said) in [
+        ("fit wrong_f.toml", steps.as_str()),
+        ("fit wrong_f.toml --set observer.azimuth_deg=1 --set hole.spin=0.1", &steps),
+        ("fit f.toml --set hole.mass=1", &format!("f.toml {new}")),
+        ("fit f.toml --set hole.spin=7", "f.toml with --set hole.spin=7: hole.spin = 7 is not"),
+        ("render wrong_s.toml", &colour),
+        ("render wrong_s.toml --set observer.azimuth_deg=1", &colour),
+        ("render s.toml --set hole.mass=1", &format!("s.toml {new}")),
+        ("compare wrong_e.toml --list", &steps),
+        (
+            "compare e.toml --list --set hole.mass=1",
+            "f.toml with the settings of the case: hole: unknown",
+        ),
+    ] {
+        let mut words: Vec<&str> = words.split(' ').collect();
+        words.extend(["-o", if words[0] == "render" { "x.exr" } else { "x" }]);
+        let error = fail(path, &words);
+        assert!(error.contains(said), "{words:?}: {error}");
+        assert!(said.contains("line ") || !error.contains("line "), "{words:?}: {error}");
+    }
+    assert!(!path.join("x").exists() && !path.join("x.exr").exists());
+}
+
 #[test]
 fn overrides_and_arguments_that_make_no_sense() {
     let folder = tempfile::tempdir().unwrap();

@@ -64,16 +64,15 @@ fn counts(folder: &Path, name: &str) -> [u64; 4] {
 }
 
 /// The commands of --list, four at a time, find what one process finds; once more they run nothing.
-#[test]
-fn exact_xargs_runs_each_case_once() {
+fn runs_each_case_once(engine: &str) {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     experiment(at, 6, 20);
     succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
-    let script = "kerrlight compare seeds.toml -o out --list --threads 1 | cut -f 3 \
-                  | xargs -d '\\n' -P 4 -n 1 sh -c";
+    let script =
+        format!("kerrlight compare seeds.toml -o out --list --threads 1 | cut -f 3 | {engine}");
     let written = [(); 2].map(|()| {
-        let output = shell(at, script).output().unwrap();
+        let output = shell(at, &script).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let entries = std::fs::read_dir(at.join("out/cases")).unwrap().flatten();
         let time = |entry: std::fs::DirEntry| {
@@ -88,6 +87,21 @@ fn exact_xargs_runs_each_case_once() {
     succeed(at, &["compare", "out", "--collect"]);
     let table = |name: &str| std::fs::read_to_string(at.join(name).join("results.csv")).unwrap();
     assert_eq!(table("out").lines().count(), table("alone").lines().count());
+}
+
+#[test]
+fn exact_xargs_runs_each_case_once() {
+    runs_each_case_once("xargs -d '\\n' -P 4 -n 1 sh -c");
+}
+
+#[test]
+fn exact_gnu_parallel_runs_each_case_once() {
+    let version = Command::new("parallel").arg("--version").output();
+    if !version.is_ok_and(|output| output.stdout.starts_with(b"GNU parallel")) {
+        eprintln!("GNU PARALLEL IS NOT TESTED: there is none; apt-get install parallel");
+        return;
+    }
+    runs_each_case_once("parallel -j 4");
 }
 
 /// Ten thousand cases of which one was run, and two thousand have its results.

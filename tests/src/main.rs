@@ -18,6 +18,7 @@ mod data_files;
 mod documents;
 mod eht_data;
 mod eht_polarized;
+mod file_fields;
 mod film;
 mod film_stars;
 mod fit;

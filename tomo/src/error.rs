@@ -119,6 +119,7 @@ impl Error {
     pub fn without_line(self) -> Self {
         match self {
             Self::Render(error) => Self::Render(error.without_line()),
+            Self::Fit(error) => Self::Fit(without_line(error)),
             other => other,
         }
     }
@@ -131,5 +132,15 @@ impl Error {
             Self::In { error, .. } => error.parts(),
             _ => (None, None, None, None),
         }
+    }
+}
+
+fn without_line(error: FitError) -> FitError {
+    match error {
+        FitError::Syntax(error) => FitError::Syntax(error.without_line()),
+        FitError::Range { key, value, allowed, .. } => {
+            FitError::Range { line: None, key, value, allowed }
+        }
+        other => other,
     }
 }

@@ -3,6 +3,7 @@
 
 use super::experiment::{Experiment, Factor, Level};
 use super::source::Source;
+use crate::changed::Changed;
 use crate::fit;
 use crate::paths;
 use anyhow::{Context, anyhow, bail};
@@ -169,9 +170,17 @@ impl Recipe {
 
     /// What is wrong with the settings of a combination.
     pub fn error(&self, variant: usize) -> Option<&str> {
-        let check = || fit::check(&self.text(variant, 1)?, &self.choice.registry);
         let error = &self.variants[variant].error;
-        error.get_or_init(|| check().err().map(|error| crate::plain::reasons(&error))).as_deref()
+        let check = || self.check(variant).err().map(|error| crate::plain::reasons(&error));
+        error.get_or_init(check).as_deref()
+    }
+
+    fn check(&self, variant: usize) -> anyhow::Result<()> {
+        let (path, text) = (self.path(variant)?, self.text(variant, 1)?);
+        let name = path.display().to_string();
+        let (own, by) = (self.source.fit_text(path)?, "the settings of the case");
+        let changed = Changed { name: &name, own: &own, text: &text, by };
+        fit::check(&changed, &self.choice.registry)
     }
 
     /// The same, as far as it is looked for before cases are run: each check takes a third of a millisecond.
@@ -223,14 +232,9 @@ impl Recipe {
     /// Settings without those of the command line.
     fn merged(&self, variant: usize, seed: u64) -> anyhow::Result<Table> {
         let experiment = &self.experiment;
-        let levels = || picked(&self.levels, self.chosen(variant));
-        let last = levels().filter_map(|level| level.fit.as_ref()).last();
-        let path = last
-            .or(experiment.fit.as_ref())
-            .ok_or_else(|| anyhow!("neither the experiment nor a level names a fit"))?;
-        let mut table = self.fit(path)?;
+        let mut table = self.fit(self.path(variant)?)?;
         merge(&mut table, &experiment.set);
-        for level in levels() {
+        for level in picked(&self.levels, self.chosen(variant)) {
             for key in &level.remove {
                 remove(&mut table, key).with_context(|| format!("level {:?}", level.name))?;
             }
@@ -241,6 +245,14 @@ impl Recipe {
         }
         table.insert("seed".to_owned(), Value::Integer(seed.cast_signed()));
         Ok(table)
+    }
+
+    /// The file of the fit that a combination changes.
+    fn path(&self, variant: usize) -> anyhow::Result<&Path> {
+        let levels = picked(&self.levels, self.chosen(variant));
+        let last = levels.filter_map(|level| level.fit.as_deref()).last();
+        last.or(self.experiment.fit.as_deref())
+            .ok_or_else(|| anyhow!("neither the experiment nor a level names a fit"))
     }
 
     /// The settings of a fit, which is read once.

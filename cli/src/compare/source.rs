@@ -3,6 +3,7 @@
 use crate::output;
 use crate::paths;
 use anyhow::{Context, anyhow, bail};
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use toml::Table;
 
@@ -101,24 +102,26 @@ impl Source {
 
     /// A fit's settings, with paths in them from anywhere.
     pub fn fit(&self, path: &Path) -> anyhow::Result<Table> {
-        let name = || path.display().to_string();
-        match self {
-            Self::BuiltIn => {
-                let wanted = path.to_string_lossy();
-                let wanted = match wanted.strip_prefix("../") {
-                    Some(path) => path.to_owned(),
-                    None => format!("experiments/{wanted}"),
-                };
-                let known = CARRIED.iter().find(|(path, _)| *path == wanted);
-                let (_, text) = known.ok_or_else(|| anyhow!("the program carries no {wanted}"))?;
-                text.parse().with_context(name)
-            }
-            Self::Folder(folder) => {
-                let path = folder.join(path);
-                let mut table: Table = output::read_text(&path)?.parse().with_context(name)?;
-                paths::anchor(&mut table, path.parent().unwrap_or(folder));
-                Ok(table)
-            }
+        let text = self.fit_text(path)?;
+        let mut table: Table = text.parse().with_context(|| path.display().to_string())?;
+        if let Self::Folder(folder) = self {
+            paths::anchor(&mut table, folder.join(path).parent().unwrap_or(folder));
         }
+        Ok(table)
+    }
+
+    /// A fit's settings as they stand in their file.
+    pub fn fit_text(&self, path: &Path) -> anyhow::Result<Cow<'static, str>> {
+        if let Self::Folder(folder) = self {
+            return Ok(output::read_text(&folder.join(path))?.into());
+        }
+        let wanted = path.to_string_lossy();
+        let wanted = match wanted.strip_prefix("../") {
+            Some(path) => path.to_owned(),
+            None => format!("experiments/{wanted}"),
+        };
+        let known = CARRIED.iter().find(|(path, _)| *path == wanted);
+        let (_, text) = known.ok_or_else(|| anyhow!("the program carries no {wanted}"))?;
+        Ok((*text).into())
     }
 }

@@ -3,6 +3,7 @@
 use super::data;
 use super::parse;
 use super::work::Work;
+use crate::changed::Changed;
 use anyhow::Context;
 use kerrlight_render::scene::apply_override;
 use kerrlight_tomo::fit::settings::FitFile;
@@ -22,8 +23,8 @@ pub fn assigned(text: &str, assignment: &str) -> anyhow::Result<String> {
 }
 
 /// Whether settings make sense, as far as can be told without tracing rays.
-pub fn check(text: &str, registry: &Registry) -> anyhow::Result<()> {
-    match Work::read(text)? {
+pub fn check(changed: &Changed<'_>, registry: &Registry) -> anyhow::Result<()> {
+    match Work::read_changed(changed)? {
         Work::Emission(file) => Ok(setup::check(&file, registry)?),
         Work::Image(_) => Ok(()),
     }

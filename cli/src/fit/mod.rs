@@ -29,6 +29,7 @@ mod world_scan;
 mod world_search;
 
 use crate::answer::Answer;
+use crate::changed::{self, Changed};
 use crate::devices::{FitDevice, StepsOption};
 use crate::record::Recorder;
 use crate::{interrupt, output, paths, plain};
@@ -41,8 +42,7 @@ pub use failed::Failed;
 use folder::Folder;
 pub use inputs::{Inputs, SETTINGS};
 use kerrlight_common::toml_file;
-use kerrlight_tomo::Error;
-use kerrlight_tomo::fit::settings::{FitError, FitFile, StaticImageFile};
+use kerrlight_tomo::fit::settings::{FitFile, StaticImageFile};
 use kerrlight_tomo::representation::Registry;
 pub use posterior::Posterior;
 pub use results::LIGHT_CURVE;
@@ -124,7 +124,8 @@ impl Fit {
             return self.run_all(&work, &text, (&folder, true), device);
         }
         let guess = self.data.as_deref().map(|data| init::guess(data, self.model)).transpose()?;
-        let (text, base_dir) = self.settings(guess.as_ref())?;
+        let (own, base_dir) = self.settings(guess.as_ref())?;
+        let text = self.changed(&own, &base_dir)?;
         if self.print {
             let settings = serde_json::to_value(text.parse::<toml::Table>()?)?;
             return Ok(Answer::text(text).with("settings", settings));
@@ -133,7 +134,9 @@ impl Fit {
             guess.check(&text, data)?;
             eprint!("{text}\n{}", guess.sentences(&text));
         }
-        let work = Work::read(&text).with_context(|| self.name())?;
+        let (name, by) = (self.name(), changed::assignments(&self.set));
+        let changed = Changed { name: &name, own: &own, text: &text, by: &by };
+        let work = Work::read_changed(&changed)?;
         if let Some(unused) = work.unused(&text) {
             eprintln!("note: {unused}");
         }
@@ -198,9 +201,9 @@ impl Fit {
         }
     }
 
-    /// The text of the settings and the folder that paths in it start from.
+    /// The text of the settings, without `--set`, and the folder that paths in it start from.
     fn settings(&self, guess: Option<&init::Guess>) -> anyhow::Result<(String, PathBuf)> {
-        let (mut text, base_dir) = match (&self.file, guess) {
+        let (text, base_dir) = match (&self.file, guess) {
             (None, Some(guess)) => (guess.text.clone(), PathBuf::from(".")),
             (None, None) => (BUILT_IN.to_owned(), PathBuf::from(".")),
             (Some(path), _) => {
@@ -214,16 +217,20 @@ impl Fit {
         };
         // It stands in a line of the run's settings.
         plain::check_name(&base_dir.to_string_lossy())?;
+        Ok((text, base_dir))
+    }
+
+    /// The text of the settings with `--set`.
+    fn changed(&self, own: &str, base_dir: &Path) -> anyhow::Result<String> {
         // The built-in experiment has no folder of its own.
-        let folder = self.file.is_some().then_some(base_dir.as_path());
+        let folder = self.file.is_some().then_some(base_dir);
         if !self.set.is_empty() {
             // What is wrong with the file is no fault of --set.
-            toml_file::read::<toml::Table>(&text).with_context(|| self.name())?;
+            toml_file::read::<toml::Table>(own).with_context(|| self.name())?;
         }
-        for assignment in &self.set {
-            text = assigned(&text, &paths::from_here(assignment, folder)?)?;
-        }
-        Ok((text, base_dir))
+        self.set.iter().try_fold(own.to_owned(), |text, assignment| {
+            assigned(&text, &paths::from_here(assignment, folder)?)
+        })
     }
 
     /// Refuses to resume a run with settings other than its own.
@@ -260,8 +267,5 @@ fn parse(text: &str) -> anyhow::Result<FitFile> {
     if StaticImageFile::is_meant(text) {
         bail!("there is a table [image]: a static image has no volume, and this needs one");
     }
-    FitFile::parse(text).map_err(|error| match error {
-        Error::Fit(FitError::Syntax(error)) => init::explained(&error, FitFile::keys()),
-        other => other.into(),
-    })
+    FitFile::parse(text).map_err(work::explained)
 }

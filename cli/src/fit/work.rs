@@ -4,6 +4,7 @@ use super::init;
 use super::posterior;
 use super::run;
 use super::static_image;
+use crate::changed::Changed;
 use crate::devices::FitDevice;
 use anyhow::{Context, bail};
 use kerrlight_tomo::Error;
@@ -11,6 +12,14 @@ use kerrlight_tomo::fit::settings::{FitError, FitFile, StaticImageFile};
 use kerrlight_tomo::recovery::Problem;
 use kerrlight_tomo::representation::Registry;
 use std::path::Path;
+
+/// An error of settings, with what to write where a key is missing.
+pub fn explained(error: Error) -> anyhow::Error {
+    match error {
+        Error::Fit(FitError::Syntax(error)) => init::explained(&error),
+        other => other.into(),
+    }
+}
 
 /// Settings of either.
 #[derive(Debug, PartialEq)]
@@ -45,14 +54,19 @@ impl Prepared {
 impl Work {
     /// The settings in a text: a table `image` makes them those of a static image.
     pub fn read(text: &str) -> anyhow::Result<Self> {
-        if !StaticImageFile::is_meant(text) {
-            return Ok(Work::Emission(Box::new(super::parse(text)?)));
-        }
-        let file = StaticImageFile::parse(text).map_err(|error| match error {
-            Error::Fit(FitError::Syntax(error)) => init::explained(&error, StaticImageFile::keys()),
-            other => other.into(),
-        })?;
-        Ok(Work::Image(Box::new(file)))
+        Self::parse(text).map_err(explained)
+    }
+
+    /// The same with changes.
+    pub fn read_changed(changed: &Changed<'_>) -> anyhow::Result<Self> {
+        changed.read(Self::parse, explained)
+    }
+
+    fn parse(text: &str) -> Result<Self, Error> {
+        Ok(match StaticImageFile::is_meant(text) {
+            true => Work::Image(Box::new(StaticImageFile::parse(text)?)),
+            false => Work::Emission(Box::new(FitFile::parse(text)?)),
+        })
     }
 
     /// Keys of the text that it has no use for, in a sentence.

@@ -1,5 +1,6 @@
 //! Where a scene comes from.
 
+use crate::changed::{self, Changed};
 use crate::output;
 use crate::paths;
 use anyhow::Context;
@@ -68,10 +69,6 @@ impl Source {
     /// The scene with all overrides, and its text.
     pub fn scene(&self, overrides: &[String]) -> anyhow::Result<(String, Scene)> {
         let mut text = self.text.clone();
-        if overrides.is_empty() {
-            let scene = Scene::parse(&text).with_context(|| self.name.clone())?;
-            return Ok((text, scene));
-        }
         for assignment in overrides {
             let assignment = paths::from_here(assignment, Some(&self.folder))?;
             text = apply_override(&text, &assignment).map_err(|error| match error {
@@ -82,10 +79,9 @@ impl Source {
                 _ => anyhow::Error::new(error).context("--set"),
             })?;
         }
-        // Lines of the changed text are nobody's.
-        let scene = Scene::parse(&text)
-            .map_err(Error::without_line)
-            .with_context(|| format!("{} with --set {}", self.name, overrides.join(" --set ")))?;
+        let by = changed::assignments(overrides);
+        let changed = Changed { name: &self.name, own: &self.text, text: &text, by: &by };
+        let scene = changed.read(|text| Ok(Scene::parse(text)?), Into::into)?;
         Ok((text, scene))
     }
 }

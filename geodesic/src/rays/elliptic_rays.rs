@@ -105,7 +105,7 @@ impl RayVisitor for Collector<'_> {
         path: Option<PathOfRay<'_>>,
     ) -> Result<(), Error> {
         if let Some(PathOfRay { ray, path, .. }) = path {
-            self.sampler.take(&MinoPath::new(path, ray), ray.lambda);
+            self.sampler.take(&MinoPath::new(path, ray).timed(), ray.lambda);
             // Steps lose digits of the whole next to the critical curve; on it the closed form has none.
             let total = self.sampler.sink.mino_total.last_mut().filter(|total| !total.is_nan());
             if let (Some(total), Some(whole)) = (total, whole(self.hole, ray)) {

@@ -163,7 +163,7 @@ impl Integrator {
             interrupt::check();
             let ray = view.ray(hole, *x, *y)?;
             tracer.trace(hole, &ray, quantities, &mut path);
-            sampler.take(&MinoPath::seen_by(view, &path, &ray).0, ray.lambda);
+            sampler.take(&MinoPath::seen_by(view, &path, &ray).0.timed(), ray.lambda);
         }
         Ok(sampler.sink)
     }

@@ -1,5 +1,6 @@
 //! A path in Mino time, as samples are taken from it.
 
+use crate::analytic::ClosedForm;
 use crate::integrate::outcome::Outcome;
 use crate::integrate::path::Path;
 use crate::integrate::uncertainty::Uncertainty;
@@ -8,12 +9,15 @@ use crate::rays::sampling::Trajectory;
 use crate::screen::observer::Ray;
 use crate::screen::view::View;
 use crate::spacetime::point::PathPoint;
+use crate::spacetime::radial::Barrier;
 
 /// A path in Mino time; that of a finite observer's ray, ended at its radius.
 pub(crate) struct MinoPath<'a, T> {
     path: &'a Path<T>,
     pub ray: &'a Ray<T>,
     total: T,
+    /// Whether it ends where it is back at the observer's radius.
+    returns: bool,
     /// w = 1/r at the end, where the Mino time does not tell.
     end: Option<T>,
 }
@@ -21,10 +25,13 @@ pub(crate) struct MinoPath<'a, T> {
 /// The relative error of w up to which a ray is back at the observer after twice the time to its turning point.
 const CLOSE: f64 = 1e-6;
 
+/// The relative distance from a photon orbit, in w, from which on steps lose more of the time than the closed form.
+const LOST: f64 = 1e-8;
+
 impl<'a, T: Elementary> MinoPath<'a, T> {
     /// The path of a camera's ray: to infinity, or to the horizon.
     pub fn whole(path: &'a Path<T>, ray: &'a Ray<T>) -> Self {
-        MinoPath { path, ray, total: path.mino_total(), end: None }
+        MinoPath { path, ray, total: path.mino_total(), returns: false, end: None }
     }
 
     /// The path of `ray`, which arrives at a point of `view`, and whether its ends are at infinity if it escapes.
@@ -45,16 +52,39 @@ impl<'a, T: Elementary> MinoPath<'a, T> {
         };
         let twice = turning + turning;
         if (path.inverse_radius_at(twice) / w - 1.0).abs() <= CLOSE {
-            return MinoPath { path, ray, total: twice, end: None };
+            return MinoPath { path, ray, total: twice, returns: true, end: None };
         }
         // Unless that time is lost next to the critical curve, or the way out to a far observer takes less
         // time than the turning point is known to: where the path itself is back.
-        MinoPath { path, ray, total: path.time_back_at(w), end: Some(T::constant(w)) }
+        MinoPath {
+            path,
+            ray,
+            total: path.time_back_at(w),
+            returns: true,
+            end: Some(T::constant(w)),
+        }
     }
 
     /// w, if the ray is at its end and that is not known from the time.
     fn end_at(&self, mino_time: T) -> Option<T> {
         self.end.filter(|_| mino_time.value() >= self.total.value())
+    }
+}
+
+impl MinoPath<'_, f64> {
+    /// The same with the whole time from the closed form where steps lose it: at a distance of few roundings from a photon
+    /// orbit, as next to the horizon of an extremal hole.
+    pub fn timed(mut self) -> Self {
+        let is_lost = |barrier: &Barrier| barrier.width() <= LOST * barrier.w;
+        let barrier = self.ray.potential.barrier.as_ref();
+        if barrier.is_some_and(is_lost) && !self.outcome().is_unresolved() {
+            let form = ClosedForm::new(&self.path.hole, self.ray);
+            let total = if self.returns { form.time_back() } else { form.mino_total() };
+            // Beyond the end of the path there is no position.
+            self.total = if total < self.total { total } else { self.total };
+            self.end = self.end.or(self.returns.then_some(self.ray.inverse_radius));
+        }
+        self
     }
 }
 

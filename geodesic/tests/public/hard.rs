@@ -137,6 +137,22 @@ fn returns(rays: &RayTable, radius: f64, context: &str) {
 const METHODS: [Integrator; 3] =
     [Integrator::TaylorMino, Integrator::Elliptic, Integrator::Dop853Mino];
 
+/// Turns 2e-13 M outside the horizon of an extremal hole. Its time is 2 ∫ dw/√W over the roots of W in 60 digits, and
+/// after it there would be one crossing more within 0.01 M⁻¹.
+#[test]
+fn exact_crossings_are_those_before_the_end() {
+    let (hole, inclination) = (Kerr::new(1.0).unwrap(), 1.8968141346913256);
+    let observer = Observer::at_infinity(Inclination::from_radians(inclination).unwrap());
+    let (alpha, beta) = (-2.111207338568873, -0.977817764618162);
+    for integrator in METHODS {
+        let rays = sampled(integrator, (&hole, &observer), [alpha, beta]);
+        if !rays.outcome[0].is_unresolved() {
+            assert_eq!((rays.outcome[0], rays.crossing_count[0]), (Outcome::Escaped, 32));
+            assert!((rays.mino_total[0] / 47.326475935345184 - 1.0).abs() < 1e-6);
+        }
+    }
+}
+
 /// λ ≈ 2a around extremal holes: every number is one, and fate and radii are those of 28 digits.
 #[test]
 fn exact_rays_on_the_straight_part_of_an_extremal_critical_curve_are_numbers() {

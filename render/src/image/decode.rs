@@ -1,7 +1,7 @@
 //! PNG, JPEG and Radiance HDR pictures as linear colours.
 
 use image::codecs::hdr::HdrDecoder;
-use image::{DynamicImage, ImageError, ImageReader};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageReader};
 use std::io::Cursor;
 
 /// A picture in linear colours, row by row from the top.
@@ -13,13 +13,21 @@ pub(crate) struct Colors {
 
 /// Columns and rows of a picture, as its header states them.
 pub(crate) fn dimensions(bytes: &[u8]) -> Result<(u32, u32), ImageError> {
-    ImageReader::new(Cursor::new(bytes)).with_guessed_format()?.into_dimensions()
+    reader(bytes)?.into_dimensions()
+}
+
+/// A reader of the picture that the bytes begin as.
+pub(super) fn reader(bytes: &[u8]) -> Result<ImageReader<Cursor<&[u8]>>, ImageError> {
+    Ok(ImageReader::new(Cursor::new(bytes)).with_guessed_format()?)
 }
 
 /// Decodes a picture: 8- and 16-bit colours are sRGB (IEC 61966-2-1), floats are linear, those of Radiance HDR divided by
-/// the exposure and colour correction of their header.
+/// the exposure and colour correction of their header. It is turned as its EXIF says.
 pub(crate) fn linear_colors(bytes: &[u8]) -> Result<Colors, ImageError> {
-    let picture = image::load_from_memory(bytes)?;
+    let mut decoder = reader(bytes)?.into_decoder()?;
+    let orientation = decoder.orientation()?;
+    let mut picture = DynamicImage::from_decoder(decoder)?;
+    picture.apply_orientation(orientation);
     let scale = if bytes.starts_with(b"#?") { exposure(bytes)? } else { [1.0; 3] };
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     let pixels = match picture {
@@ -41,38 +49,6 @@ fn exposure(bytes: &[u8]) -> Result<[f32; 3], ImageError> {
     Ok([r, g, b].map(|c| c * header.exposure.unwrap_or(1.0)))
 }
 
-/// What a PNG says of its colours that are not those of sRGB: a gamma, or the name of a profile.
-pub(crate) fn other_than_srgb(bytes: &[u8]) -> Option<String> {
-    let mut rest = bytes.strip_prefix(b"\x89PNG\r\n\x1a\n")?;
-    let mut found = None;
-    while let Some((length, after)) = rest.split_first_chunk() {
-        let length = usize::try_from(u32::from_be_bytes(*length)).ok()?;
-        let (kind, after) = after.split_first_chunk::<4>()?;
-        let content = after.get(..length)?;
-        match kind {
-            // Goes before the others (PNG specification, section 4.3).
-            b"sRGB" => return None,
-            b"IDAT" => break,
-            b"gAMA" => {
-                let gamma = u32::from_be_bytes(*content.first_chunk()?);
-                if !(45_000..46_000).contains(&gamma) {
-                    found.get_or_insert_with(|| format!("gAMA = {}", f64::from(gamma) / 1e5));
-                }
-            }
-            b"iCCP" => {
-                let name = content.split(|byte| *byte == 0).next().unwrap_or_default();
-                let name: String = name.iter().map(|byte| char::from(*byte)).collect();
-                if !name.contains("sRGB") {
-                    found = Some(format!("iCCP = {name:?}"));
-                }
-            }
-            _ => {}
-        }
-        rest = after.get(length + 4..)?;
-    }
-    found
-}
-
 /// Pixels of so many bytes each, the first three of which are sRGB.
 fn of_bytes<const N: usize>(bytes: &[u8]) -> Vec<[f32; 3]> {
     let linear: [f32; 256] = core::array::from_fn(|byte| srgb_to_linear(byte as f32 / 255.0));
@@ -88,7 +64,7 @@ fn srgb_to_linear(c: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::{ImageFormat, RgbImage};
+    use image::{ImageEncoder, ImageFormat, RgbImage};
 
     /// The table of bytes is the same as the conversion of each colour to a float, with and without opacity.
     #[test]
@@ -114,13 +90,21 @@ mod tests {
         };
         assert_eq!(hdr(""), [0.5; 3]);
         assert_eq!(hdr("EXPOSURE=2\nCOLORCORR=4 1 1\n"), [0.0625, 0.25, 0.25]);
-        let png = |chunk: &[u8]| [b"\x89PNG\r\n\x1a\n", chunk, &[0; 4]].concat();
-        let gamma = png(b"\0\0\0\x04gAMA\0\x01\x86\xa0");
-        assert_eq!(other_than_srgb(&gamma).as_deref(), Some("gAMA = 1"));
-        assert_eq!(other_than_srgb(&png(b"\0\0\0\x04gAMA\0\0\xb1\x8f")), None);
-        let profile = png(b"\0\0\0\x08iCCPAdobe\0\0\0");
-        assert_eq!(other_than_srgb(&profile).as_deref(), Some("iCCP = \"Adobe\""));
         // 188 of 255 is half of the light (IEC 61966-2-1).
         assert!((srgb_to_linear(188.0 / 255.0) - 0.503).abs() < 1e-3);
+    }
+    /// A red and a blue pixel side by side that stand on end: tag 274 (orientation) of EXIF 2.3 is 6.
+    #[test]
+    fn exact_orientation_of_exif() {
+        let mut file = Vec::new();
+        let mut encoder = image::codecs::png::PngEncoder::new(&mut file);
+        let entry = b"\x01\x12\0\x03\0\0\0\x01\0\x06\0\0";
+        let exif = [b"MM\0*\0\0\0\x08\0\x01", &entry[..], &[0; 4]].concat();
+        encoder.set_exif_metadata(exif).unwrap();
+        let pixels = [255, 0, 0, 0, 0, 255];
+        encoder.write_image(&pixels, 2, 1, image::ExtendedColorType::Rgb8).unwrap();
+        let turned = linear_colors(&file).unwrap();
+        assert_eq!((turned.width, turned.height), (1, 2));
+        assert_eq!(turned.pixels, [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
     }
 }

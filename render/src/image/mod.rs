@@ -7,6 +7,7 @@ pub(crate) mod decode;
 pub mod exr;
 pub mod overlay;
 pub mod preview;
+pub(crate) mod profile;
 pub mod reduce;
 pub mod sheet;
 pub mod ticks;

@@ -17,8 +17,9 @@ use crate::plain;
 use annotate::annotate;
 use anyhow::{Context, bail};
 pub use guess::{Guess, guess};
-use kerrlight_common::toml_file::{Keys, ReadError};
+use kerrlight_common::toml_file::ReadError;
 use kerrlight_common::units::{MICROARCSECOND, gravitational_angle};
+use kerrlight_tomo::fit::settings::{FitFile, StaticImageFile};
 use kerrlight_tomo::fit::setup::{self, VisibilitySettings};
 use kerrlight_vlbi::data_terms::ClosureTerm;
 use kerrlight_vlbi::files;
@@ -31,20 +32,21 @@ use sources::{SOURCES, Source};
 use std::path::{Path, PathBuf};
 
 /// An error in settings; of what is missing, with what to write.
-pub fn explained(error: &ReadError, keys: &Keys) -> anyhow::Error {
+pub fn explained(error: &ReadError) -> anyhow::Error {
     let text = error.to_string();
     let missing = text.split_once("missing field `").and_then(|(_, rest)| rest.split('`').next());
-    let advice = missing.map_or(String::new(), |missing| advice(missing, &error.key(), keys));
+    let advice = missing.map_or(String::new(), |missing| advice(missing, &error.key()));
     anyhow::anyhow!("{text}{advice}")
 }
 
 /// What to write for a key that is missing in a table; `loss.0` is one of the tables `loss`.
-fn advice(missing: &str, table: &str, keys: &Keys) -> String {
+fn advice(missing: &str, table: &str) -> String {
     let is_name = |part: &&str| !part.is_empty() && part.parse::<u32>().is_err();
     let place: Vec<&str> = table.split('.').filter(is_name).collect();
     let path: Vec<&str> = place.iter().copied().chain([missing]).collect();
     let (place, path) = (place.join("."), path.join("."));
-    match keys.at(&path) {
+    let key = FitFile::keys().at(&path).or_else(|| StaticImageFile::keys().at(&path));
+    match key {
         Some(key) if key.is_table() => {
             format!(
                 "\nadd a table [{path}]: {} `kerrlight fit --init` writes an example",

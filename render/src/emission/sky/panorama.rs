@@ -3,8 +3,9 @@
 use super::beam::Beam;
 use super::exr_sky;
 use crate::Error;
-use crate::image::decode::{Colors, dimensions, linear_colors, other_than_srgb};
+use crate::image::decode::{Colors, dimensions, linear_colors};
 use crate::image::exr;
+use crate::image::profile::other_than_srgb;
 use core::f64::consts::{PI, TAU};
 use kerrlight_common::memory;
 
@@ -70,7 +71,7 @@ impl Panorama {
         let Colors { width, height, pixels } =
             linear_colors(bytes).map_err(PanoramaError::Decode)?;
         let mut sky = Self::new(width, height, pixels)?;
-        let other = other_than_srgb(bytes);
+        let other = other_than_srgb(bytes).map_err(PanoramaError::Decode)?;
         sky.warnings.extend(other.map(|says| format!("taken as sRGB, though it has {says}")));
         Ok(sky)
     }

@@ -67,9 +67,13 @@ impl<'a> Table<'a> {
         Some(String::from_utf8_lossy(cell).replace(char::is_control, " ").trim().to_owned())
     }
 
-    /// Value `index` of a cell as a number.
+    /// Value `index` of a cell as a number; a bit is 0 or 1.
     pub fn number(&self, row: usize, name: &str, index: usize) -> Option<f64> {
         let column = self.column(name).filter(|column| index < column.repeat)?;
+        if column.code == 'X' {
+            let byte = self.data.get(row * self.row_size + column.offset + index / 8)?;
+            return Some((byte >> (7 - index % 8) & 1).into());
+        }
         let size = size_of(column.code)?;
         let start = row * self.row_size + column.offset + index * size;
         let cell = self.data.get(start..start + size)?;

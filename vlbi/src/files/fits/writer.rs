@@ -71,6 +71,9 @@ pub enum ColumnData {
     Text(usize, Vec<String>),
     /// 32-bit integers, so many a row.
     Integers(usize, Vec<i32>),
+    /// Bits, up to eight a row, the first of which is the highest.
+    #[cfg(test)]
+    Bits(usize, Vec<u8>),
     /// Single precision, so many a row.
     Singles(usize, Vec<f32>),
     /// Double precision, so many a row.
@@ -82,6 +85,8 @@ impl ColumnData {
         match self {
             ColumnData::Text(width, _) => format!("{width}A"),
             ColumnData::Integers(repeat, _) => format!("{repeat}J"),
+            #[cfg(test)]
+            ColumnData::Bits(repeat, _) => format!("{repeat}X"),
             ColumnData::Singles(repeat, _) => format!("{repeat}E"),
             ColumnData::Doubles(repeat, _) => format!("{repeat}D"),
         }
@@ -98,6 +103,8 @@ impl ColumnData {
             ColumnData::Integers(n, v) => {
                 v[range(*n)].iter().flat_map(|x| x.to_be_bytes()).collect()
             }
+            #[cfg(test)]
+            ColumnData::Bits(_, v) => vec![v[row]],
             ColumnData::Singles(n, v) => {
                 v[range(*n)].iter().flat_map(|x| x.to_be_bytes()).collect()
             }

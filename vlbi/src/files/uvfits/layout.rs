@@ -59,6 +59,8 @@ pub struct Layout {
     pub weighted: bool,
     /// For each of the four products, where it is; `None` where there is none.
     pub products: [Option<usize>; 4],
+    /// Distance of neighbours on the axis of polarisations.
+    product_stride: usize,
     pub basis: Basis,
     /// Where spectral channels of all IFs are.
     pub channels: Vec<Place>,
@@ -106,7 +108,8 @@ impl Layout {
         if complex.length != 2 && complex.length != 3 {
             return Err(header.error(&format!("NAXIS{}", complex.keyword), "2 or 3 (COMPLEX)"));
         }
-        let (products, basis) = products(header, find(&axes, "STOKES", header)?)?;
+        let stokes = find(&axes, "STOKES", header)?;
+        let (products, basis) = products(header, stokes)?;
         let frequency = find(&axes, "FREQ", header)?;
         let at = |name: &str| header.number(&format!("{name}{}", frequency.keyword));
         let parameter = Parameters::read(header, parameters)?;
@@ -134,6 +137,7 @@ impl Layout {
             complex_stride: complex.stride,
             weighted: complex.length == 3,
             products,
+            product_stride: stokes.stride,
             basis,
             channels: channels(&axes, header)?,
             frequency_hz: at("CRVAL")?.unwrap_or(0.0),
@@ -168,6 +172,17 @@ impl Layout {
             }
         };
         [value(0), value(1), if self.weighted { value(2) } else { 1.0 }]
+    }
+
+    /// Parameter of a group that tells sources, setups and the like apart, if it has it.
+    pub fn selected(&self, group: &[u8], name: &str) -> Option<i64> {
+        let (_, parameter) = self.selectors.iter().find(|(known, _)| *known == name)?;
+        Some(self.parameter(group, *parameter) as i64)
+    }
+
+    /// Place of a datum on the axis of polarisations.
+    pub fn place_of_product(&self, start: usize) -> usize {
+        start / self.product_stride
     }
 
     /// Whether any product of any channel was measured.

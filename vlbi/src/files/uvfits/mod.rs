@@ -3,6 +3,9 @@
 
 mod antenna_table;
 mod antennas;
+#[cfg(test)]
+mod flag_tests;
+mod flags;
 mod frequencies;
 mod layout;
 mod mounts;

@@ -3,6 +3,7 @@
 use super::super::FileError;
 use super::super::fits;
 use super::antennas::AntennaTables;
+use super::flags::{self, Flag};
 use super::frequencies;
 use super::layout::{Antennas, Layout, SELECTORS, is_measured};
 use super::selectors;
@@ -18,11 +19,11 @@ const MJD_ZERO: f64 = 2_400_000.5;
 ///
 /// Several spectral channels or IFs are rows of their own, with (u, v) in wavelengths of their own
 /// frequency, which counts from that of the antenna table (as in eht-imaging). σ = 1/√weight; a weight that is not positive, or a visibility that is no number,
-/// means no datum. Rows without any datum, and correlations of a station with itself, are left
+/// means no datum, as does a flag of the `AIPS FG` table. Rows without any datum, and correlations of a station with itself, are left
 /// out; the history says how many groups have none but such.
 ///
 /// # Errors
-/// If the file is damaged, no UVFITS, or holds no datum; if it holds several sources or frequency setups, flags, or
+/// If the file is damaged, no UVFITS, or holds no datum; if it holds several sources or frequency setups, or
 /// coordinates that would have to be converted; if rows of many channels would take more
 /// memory than `MOST_MEMORY` times the file.
 pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
@@ -31,7 +32,7 @@ pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
     let layout = Layout::new(header)?;
     check_memory(header, &layout, bytes.len())?;
     selectors::check_header(header)?;
-    let uncalibrated = selectors::check_tables(&units)?;
+    let uncalibrated = selectors::calibration(&units);
     let source = selectors::source(&units, &layout)?;
     for (name, _) in SELECTORS {
         selectors::only(&units[0], &layout, name)?;
@@ -50,7 +51,8 @@ pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
         channels => channels.iter().map(|c| c.frequency_hz).collect(),
     };
     let offset = units[0].offset;
-    let reader = Reader { layout: &layout, tables: &tables, wavelengths, offset };
+    let flags = flags::read(&units)?;
+    let reader = Reader { layout: &layout, tables: &tables, flags: &flags, wavelengths, offset };
     let (mjd, mut rows, left_out) = reader.rows(units[0].data)?;
     let ahead_h = selectors::ahead_h(&units, mjd)?;
     if ahead_h != 0.0 {
@@ -78,6 +80,9 @@ pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
     };
     observation.history = remarks(unknown, ahead_h, layout.weighted);
     observation.history.extend(uncalibrated);
+    if !flags.is_empty() {
+        observation.history.push(format!("flags of AIPS FG applied: {}", flags.len()));
+    }
     if left_out > 0 {
         observation.history.push(format!("{left_out} groups without valid data left out"));
     }
@@ -153,6 +158,7 @@ fn position(header: &fits::Header<'_>) -> Result<Option<SourcePosition>, FileErr
 struct Reader<'a> {
     layout: &'a Layout,
     tables: &'a AntennaTables,
+    flags: &'a [Flag],
     /// Frequencies in Hz that (u, v) of each channel count wavelengths of.
     wavelengths: Vec<f64>,
     /// Where the data start in the file.
@@ -202,15 +208,32 @@ impl Reader<'_> {
         [day, rest]
     }
 
-    fn stations(&self, group: &[u8]) -> Result<[u16; 2], String> {
+    /// Subarray, and numbers of the antennas.
+    fn antennas(&self, group: &[u8]) -> (i64, [i64; 2]) {
         let value = |parameter| self.layout.parameter(group, parameter);
-        let (subarray, numbers) = match self.layout.antennas {
+        match self.layout.antennas {
             Antennas::Baseline(parameter) => decode_baseline(value(parameter)),
             Antennas::Pair(first, second, subarray) => {
                 let subarray = subarray.map_or(1.0, value);
                 (subarray as i64, [value(first) as i64, value(second) as i64])
             }
-        };
+        }
+    }
+
+    /// Flags that are about some data of a group.
+    fn flags(&self, group: &[u8]) -> Vec<&Flag> {
+        if self.flags.is_empty() {
+            return Vec::new();
+        }
+        let selected = ["SOURCE", "FREQSEL"].map(|name| self.layout.selected(group, name));
+        let (subarray, antennas) = self.antennas(group);
+        let mjd = self.date(group).iter().sum();
+        let group = flags::Group { selected, subarray, antennas, mjd };
+        self.flags.iter().filter(|flag| flag.is_about(&group)).collect()
+    }
+
+    fn stations(&self, group: &[u8]) -> Result<[u16; 2], String> {
+        let (subarray, numbers) = self.antennas(group);
         let station = |number| {
             self.tables.station(subarray, number).ok_or_else(|| {
                 format!("antenna {number} of subarray {subarray} is not in the AIPS AN table")
@@ -223,12 +246,17 @@ impl Reader<'_> {
     fn group(&self, group: &[u8], day: f64, rows: &mut Vec<Row>) -> Result<(), String> {
         let layout = self.layout;
         let before = rows.len();
+        let flags = self.flags(group);
         for (channel, (place, frequency)) in
             (0..).zip(layout.channels.iter().zip(&self.wavelengths))
         {
+            let is_flagged = |start: usize| {
+                let product = layout.place_of_product(start);
+                flags.iter().any(|flag| flag.covers(place, product))
+            };
             let data = |start: &Option<usize>| match start {
-                Some(start) => self.datum(group, start + place.offset),
-                None => (Complex64::new(0.0, 0.0), f64::NAN),
+                Some(start) if !is_flagged(*start) => self.datum(group, start + place.offset),
+                _ => (Complex64::new(0.0, 0.0), f64::NAN),
             };
             let data = [0, 1, 2, 3].map(|k| data(&layout.products[k]));
             if data.iter().all(|(_, sigma)| sigma.is_nan()) {

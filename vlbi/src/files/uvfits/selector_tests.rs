@@ -176,9 +176,6 @@ fn exact_coordinates_and_units_of_others_are_refused() {
     assert!(refused(&Made { u: "UU---NCP", ..plain() }).contains("PTYPE1 = 'UU---NCP'"));
     // Wavelengths where seconds belong.
     assert!(refused(&Made { seconds: 1e9, ..plain() }).contains("up to 10000 s"));
-    let flags =
-        binary_table("AIPS FG", 1, &[("SOURCE", "", ColumnData::Integers(1, vec![1]))], |_| ());
-    assert!(refused(&Made { tables: vec![flags], ..plain() }).contains("AIPS FG table: 1 flags"));
     let gains =
         binary_table("AIPS SN", 1, &[("SOURCE", "", ColumnData::Integers(1, vec![1]))], |_| ());
     let history = read_made(&Made { tables: vec![gains], ..plain() }).history;

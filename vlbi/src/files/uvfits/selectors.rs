@@ -140,30 +140,14 @@ pub fn check_header(header: &Header<'_>) -> Result<(), FileError> {
     Ok(())
 }
 
-/// Tables that change what data mean and are not applied: those of flags are refused where they hold any, others are named.
-pub fn check_tables(units: &[Unit<'_>]) -> Result<Option<String>, FileError> {
-    let mut others = BTreeSet::new();
-    for unit in units {
-        let name = unit.header.text("EXTNAME").unwrap_or_default();
-        match name.as_str() {
-            "AIPS FG" => {
-                let rows = Table::new(unit)?.rows();
-                if rows > 0 {
-                    let message = format!(
-                        "AIPS FG table: {rows} flags that are not applied: apply them first"
-                    );
-                    return Err(FileError::byte(unit.offset, message));
-                }
-            }
-            "AIPS SN" | "AIPS CL" | "AIPS BP" | "AIPS BL" | "AIPS PD" | "AIPS TY" | "AIPS GC" => {
-                others.insert(name);
-            }
-            _ => {}
-        }
-    }
-    let names: Vec<String> = others.into_iter().collect();
-    Ok((!names.is_empty())
-        .then(|| format!("{}: calibration that is not applied", names.join(", "))))
+/// Names tables of calibration, which are not applied.
+pub fn calibration(units: &[Unit<'_>]) -> Option<String> {
+    const TABLES: [&str; 7] =
+        ["AIPS SN", "AIPS CL", "AIPS BP", "AIPS BL", "AIPS PD", "AIPS TY", "AIPS GC"];
+    let names = units.iter().filter_map(|unit| unit.header.text("EXTNAME"));
+    let found: BTreeSet<String> = names.filter(|name| TABLES.contains(&name.as_str())).collect();
+    let found: Vec<String> = found.into_iter().collect();
+    (!found.is_empty()).then(|| format!("{}: calibration that is not applied", found.join(", ")))
 }
 
 /// Hours that the times of a file are ahead of UTC.
