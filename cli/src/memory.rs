@@ -34,8 +34,17 @@ pub fn parse(text: &str) -> Result<u64, String> {
 const WANTED: &str = "a size such as 4GiB, 500MB or 2G is wanted";
 const LEAST: f64 = 16.0 * 1048576.0;
 
-/// Sets the limit: as it was given, or what the machine has to give.
+/// Sets the limit of this process: as it was given, or what the machine has to give.
 pub fn limit(given: Option<u64>) -> anyhow::Result<()> {
+    if let Some(bytes) = bytes(given)? {
+        memory::set_limit(bytes);
+        LIMIT.store(usize::try_from(bytes).unwrap_or(usize::MAX), Ordering::Relaxed);
+    }
+    Ok(())
+}
+
+/// The limit as it was given, or what the machine has to give, if that is known.
+pub fn bytes(given: Option<u64>) -> anyhow::Result<Option<u64>> {
     let (there, by) = available();
     if let (Some(given), Some(there)) = (given, there)
         && given > there
@@ -46,14 +55,12 @@ pub fn limit(given: Option<u64>) -> anyhow::Result<()> {
             shown(there as f64)
         );
     }
-    let Some(bytes) = given.or(there) else { return Ok(()) };
-    if bytes == 0 {
+    let bytes = given.or(there);
+    if bytes == Some(0) {
         bail!("no memory is left: {by}");
     }
-    memory::set_limit(bytes);
     memory::set_scratch(scratch);
-    LIMIT.store(usize::try_from(bytes).unwrap_or(usize::MAX), Ordering::Relaxed);
-    Ok(())
+    Ok(bytes)
 }
 
 /// A file that nobody else sees and that is gone with the process: where TMPDIR says, else in the current folder, which

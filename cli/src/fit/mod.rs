@@ -31,7 +31,7 @@ mod world_search;
 use crate::answer::Answer;
 use crate::devices::{FitDevice, StepsOption};
 use crate::record::Recorder;
-use crate::{interrupt, output, paths, plain};
+use crate::{interrupt, output, paths, plain, session};
 use anyhow::{Context, bail};
 pub use api::{assigned, check, coverage, sizes, turned, velocities};
 pub use band_plots::{loop_plot, of_runs as plots_of_bands};
@@ -115,8 +115,7 @@ impl Fit {
         let guess = self.data.as_deref().map(|data| init::guess(data, self.model)).transpose()?;
         let (text, base_dir) = self.settings(guess.as_ref())?;
         if self.print {
-            let settings = serde_json::to_value(text.parse::<toml::Table>()?)?;
-            return Ok(Answer::text(text).with("settings", settings));
+            return self.printed(text, guess.as_ref(), registry);
         }
         if let (Some(guess), Some(data)) = (&guess, &self.data) {
             guess.check(&text, data)?;
@@ -139,6 +138,28 @@ impl Fit {
         };
         let folder = Folder::create(&folder, &text, Inputs::new(&text, read))?;
         self.run_all(&prepared, &text, (&folder, false), device)
+    }
+
+    /// The settings as an answer; those of a program that calls this one have to make sense.
+    fn printed(
+        &self,
+        text: String,
+        guess: Option<&init::Guess>,
+        registry: &Registry,
+    ) -> anyhow::Result<Answer> {
+        let is_called = session::is_here();
+        let mut guessed = Vec::new();
+        if let (Some(guess), Some(data)) = (guess, &self.data) {
+            if is_called {
+                guess.check(&text, data)?;
+            }
+            guessed.extend(guess.sentences(&text).lines().map(str::to_owned));
+        }
+        if is_called {
+            check(&text, registry).with_context(|| self.name())?;
+        }
+        let settings = serde_json::to_value(text.parse::<toml::Table>()?)?;
+        Ok(Answer::text(text).with("settings", settings).with("guessed", guessed))
     }
 
     /// The fit, and the draws that are wanted after it.
@@ -183,6 +204,7 @@ impl Fit {
             (Some(file), _) => plain::path(file),
             // Lines that an error names are those of the settings, not of the data.
             (None, Some(data)) => format!("settings guessed from {}", plain::path(data)),
+            (None, None) if session::settings().is_some() => "settings".to_owned(),
             (None, None) => "built-in experiment".to_owned(),
         }
     }
@@ -191,20 +213,22 @@ impl Fit {
     fn settings(&self, guess: Option<&init::Guess>) -> anyhow::Result<(String, PathBuf)> {
         let (mut text, base_dir) = match (&self.file, guess) {
             (None, Some(guess)) => (guess.text.clone(), PathBuf::from(".")),
-            (None, None) => (BUILT_IN.to_owned(), PathBuf::from(".")),
+            (None, None) => {
+                let given = session::settings().map(placed);
+                given.unwrap_or_else(|| (BUILT_IN.to_owned(), PathBuf::from(".")))
+            }
             (Some(path), _) => {
                 let folder = path.parent().filter(|folder| *folder != Path::new(""));
                 let folder = std::path::absolute(folder.unwrap_or(Path::new(".")))
                     .with_context(|| path.display().to_string())?;
-                let text = output::read_text(path)?;
-                let folder = if text.starts_with(BASE_DIR) { base_dir_of(&text) } else { folder };
-                (text, folder)
+                placed((output::read_text(path)?, folder))
             }
         };
         // It stands in a line of the run's settings.
         plain::check_name(&base_dir.to_string_lossy())?;
         // The built-in experiment has no folder of its own.
-        let folder = self.file.is_some().then_some(base_dir.as_path());
+        let has_folder = self.file.is_some() || session::settings().is_some();
+        let folder = has_folder.then_some(base_dir.as_path());
         if !self.set.is_empty() {
             // What is wrong with the file is no fault of --set.
             toml_file::read::<toml::Table>(&text).with_context(|| self.name())?;
@@ -237,6 +261,12 @@ const BASE_DIR: &str = "# Paths start from ";
 /// Settings that say from which folder their paths start.
 pub fn from_folder(settings: &str, folder: &Path) -> String {
     format!("{BASE_DIR}{}\n{settings}", folder.display())
+}
+
+/// Settings, with the folder that they say themselves where they do.
+fn placed((text, folder): (String, PathBuf)) -> (String, PathBuf) {
+    let folder = if text.starts_with(BASE_DIR) { base_dir_of(&text) } else { folder };
+    (text, folder)
 }
 
 /// The folder that paths in a run's settings start from.
