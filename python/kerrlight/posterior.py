@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -85,15 +84,6 @@ class Posterior:
 def draw(folder: Path, samples: int, progress: bool, limits: list[str]) -> Posterior:
     """Draws around the fit in a folder."""
     samples = whole("samples", samples, 2, 100_000)
-    inside = folder / "posterior"
-
-    def done() -> int:
-        return min(samples, len(list(inside.glob("sample_*.json"))))
-
-    command = [*_program.LAUNCHER, "posterior", str(folder), "--samples", str(samples), *limits]
-    counter = _program.Counter(samples, "draw", done, progress)
-    try:
-        _program.follow(command, counter, lambda child: child.send_signal(signal.SIGINT))
-    finally:
-        counter.close()
-    return Posterior(inside)
+    with _program.Listener("draw", progress) as listener:
+        _program.call(["posterior", str(folder), "--samples", str(samples), *limits], listener)
+    return Posterior(folder / "posterior")

@@ -10,7 +10,9 @@ use pyo3::prelude::*;
 use std::panic::resume_unwind;
 
 /// What a method of the class raised. The trait has no errors: it unwinds, and the program catches it.
-pub struct Raised(pub String);
+#[derive(thiserror::Error, Debug)]
+#[error("the representation raised {0}")]
+pub struct Raised(String);
 
 /// An instance of a class.
 struct OfPython {

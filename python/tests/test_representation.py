@@ -77,7 +77,7 @@ def voxels(tmp_path, monkeypatch):
 
 
 def losses(fit):
-    return np.array([line["loss"] for line in fit.log if "loss" in line])
+    return np.array([step.loss for step in fit.log])
 
 
 def test_the_same_fit_as_with_the_grid_of_the_program(voxels):
@@ -97,8 +97,8 @@ def test_stopped_and_resumed(voxels):
     chosen = {**QUICK, "representation": {"kind": f"{pathlib.Path('own_voxels.py')}:Voxels", "own": {"nodes": 8}}}
     whole = Fit(folder="whole", set=chosen).run(progress=False)
 
-    def stop(line):
-        if line.get("step", 0) >= 2:
+    def stop(step):
+        if step.step >= 2:
             raise StopIteration
 
     parts = Fit(folder="parts", set=chosen)
