@@ -20,6 +20,8 @@ pub struct Call {
     session: Arc<Session>,
     requests: &'static Requests,
     threads: ThreadPool,
+    /// Of its limit on memory.
+    note: Option<String>,
 }
 
 impl Call {
@@ -34,7 +36,7 @@ impl Call {
         hear: impl Fn(Said<'_>) + Send + Sync + 'static,
     ) -> Result<Self, Ended> {
         let arguments = Arguments::parsed(words.clone())?;
-        let limit = memory::bytes(arguments.memory)?;
+        let (limit, note) = memory::bytes(arguments.memory)?;
         let cpu_seconds = usage().map_or(0.0, |usage| usage.cpu_seconds);
         let session = Arc::new(Session { hear: Box::new(hear), settings, words, cpu_seconds });
         let (of_threads, requests) = (Arc::clone(&session), Requests::of_call());
@@ -44,7 +46,7 @@ impl Call {
             limit.into_iter().for_each(set_limit_of_thread);
         };
         let threads = threads::pool(arguments.threads, begin)?;
-        Ok(Self { arguments, session, requests, threads })
+        Ok(Self { arguments, session, requests, threads, note })
     }
 
     /// Does the work on threads of its own while `wait` is called on this one, until it hears of the end. Returns the
@@ -60,6 +62,7 @@ impl Call {
         self.threads.in_place_scope(|scope| {
             scope.spawn(|_| {
                 let _end = End(&self.session);
+                self.note.iter().for_each(|note| eprintln!("{note}"));
                 let answer = self.arguments.verb.run(&self.arguments, program);
                 result = Some(answer.and_then(Answer::told).map_err(Ended::from));
             });

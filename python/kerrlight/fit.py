@@ -78,6 +78,8 @@ class Fit:
         """The folder of the run."""
         self._given, changes = _in_memory(data, times)
         """Data in memory: the name of their file in the folder, and its bytes."""
+        if self._given is not None:
+            self.folder = self.folder.absolute()
         changes += overrides_of(set)
         if text is None and data is not None:
             self._guess(data, model, changes)
@@ -350,7 +352,7 @@ def _in_memory(data: Data, times: ArrayLike | None) -> tuple[tuple[str, bytes] |
     if data is None or isinstance(data, (str, PathLike, Observation)):
         if times is not None:
             raise ValueError("times go with images in an array: files and observations have their own")
-        return (("data.csv", data._core.encode("csv")) if isinstance(data, Observation) else None), []
+        return _file_of(data) if isinstance(data, Observation) else None, []
     images = finite("data", data)
     if images.ndim not in (2, 3) or images.size == 0:
         raise ValueError(f"data have the shape {images.shape}: give images over (t, y, x)")
@@ -364,6 +366,16 @@ def _in_memory(data: Data, times: ArrayLike | None) -> tuple[tuple[str, bytes] |
         ends = {"frames": frames, "from": float(moments[0]), "to": float(moments[-1])}
         changes = overrides_of({"movie": ends})
     return ("data.npy", _npy(images)), changes
+
+
+def _file_of(observation: Observation) -> tuple[str, bytes]:
+    """A file that holds all of an observation: UVFITS, or a table where stations have no positions."""
+    try:
+        return "data.uvfits", observation._core.encode("uvfits")
+    except ValueError:
+        if np.any(observation.sigmas[:, 2:] > 0):  # a table has no polarisation
+            raise
+        return "data.csv", observation._core.encode("csv")
 
 
 def _npy(array: NDArray[Any]) -> bytes:

@@ -31,6 +31,7 @@ fn program(py: Python<'_>, arguments: Vec<OsString>, launcher: Vec<OsString>) ->
     let run = AssertUnwindSafe(|| program.run_with(arguments));
     py.detach(|| catch_unwind(run)).unwrap_or_else(|panic| match panic.downcast::<Raised>() {
         Ok(raised) => {
+            raised.0.display(py);
             eprintln!("error: {raised}");
             1
         }
@@ -142,10 +143,10 @@ fn raised(py: Python<'_>, Ended { code, words }: Ended) -> PyErr {
     }
 }
 
-/// The exception of work that panicked.
+/// The exception of work that panicked; that of a representation has what it raised as its cause.
 fn of_panic(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
-    match panic.downcast_ref::<Raised>() {
-        Some(of) => raised(py, Ended { code: 1, words: of.to_string() }),
-        None => unwound(panic),
-    }
+    let Some(of) = panic.downcast_ref::<Raised>() else { return unwound(panic) };
+    let error = raised(py, Ended { code: 1, words: of.to_string() });
+    error.set_cause(py, Some(of.0.clone_ref(py)));
+    error
 }

@@ -270,23 +270,23 @@ def test_exact_an_observation_gives_its_ring(tmp_path, monkeypatch):
 def test_exact_an_observation_alone_is_guessed_as_its_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     observation = measured()
-    observation.write("data.csv")
+    observation.write("data.uvfits")
     fit = Fit(data=observation, folder="run", set={"image.pixels": 8})
-    of_file = Fit(data="data.csv", set={"image.pixels": 8, "data.visibilities.path": "run/data.csv"})
+    of_file = Fit(data="data.uvfits", set={"image.pixels": 8, "data.visibilities.path": "run/data.uvfits"})
     assert fit.settings == of_file.settings
     assert not (tmp_path / "run").exists() and any("M87" in said for said in fit.guessed), fit.guessed
-    assert Fit.init("my_fit.toml", "data.csv").read_text().startswith("# Settings of a fit.")
+    assert Fit.init("my_fit.toml", "data.uvfits").read_text().startswith("# Settings of a fit.")
     with pytest.raises(ValueError, match="my_fit.toml exists"):
-        Fit.init("my_fit.toml", "data.csv")
+        Fit.init("my_fit.toml", "data.uvfits")
     # Nothing is left of a fit that does not begin, and nothing is written over.
     with pytest.raises(ValueError, match="memory"):
         fit.run(progress=False, memory="1MB")
     assert not (tmp_path / "run").exists()
     (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "data.csv").write_text("mine")
+    (tmp_path / "run" / "data.uvfits").write_text("mine")
     with pytest.raises(ValueError, match="not an empty folder"):
         fit.run(progress=False)
-    assert (tmp_path / "run" / "data.csv").read_text() == "mine"
+    assert (tmp_path / "run" / "data.uvfits").read_text() == "mine"
 
 
 def test_exact_images_in_an_array(tmp_path):
@@ -328,3 +328,11 @@ def test_known_holes():
     assert kerrlight.Hole.sgr_a_star(0.5) == kerrlight.Hole(spin=0.5, mass_msun=4.154e6, distance_kpc=8.178)
     assert kerrlight.Hole.m87_star(0.9) == kerrlight.Hole(spin=0.9, mass_msun=6.5e9, distance_kpc=16800.0)
     assert "mass_msun = 6500000000.0" in Fit(set={"hole": kerrlight.Hole.m87_star(0.9)}).settings
+
+
+def test_exact_an_observation_without_positions_is_a_table(tmp_path):
+    names = [["AA", "LM"], ["AA", "PV"], ["LM", "PV"]]
+    uv = [[1e9, 2e9], [3e9, -1e9], [2e9, -3e9]]
+    observation = kerrlight.Observation.of_stokes_i([4.0] * 3, names, uv, [1 + 1j, 0.5, -0.2j], 0.01, source="M87")
+    fit = Fit(folder=tmp_path / "run", data=observation, set={"image.pixels": 8})
+    assert str(tmp_path / "run" / "data.csv") in fit.settings

@@ -134,7 +134,7 @@ def test_takes_part_in_a_comparison(voxels):
     assert "Mine and theirs" in done.report().path.read_text(encoding="utf-8")
 
 
-def test_what_goes_wrong(voxels):
+def test_what_goes_wrong(voxels, capfd):
     def fit(**chosen):
         return Fit(folder="wrong", set={**QUICK, "representation": chosen})
 
@@ -157,7 +157,8 @@ def test_what_goes_wrong(voxels):
                 folder=f"wrong-{how}",
                 set={**QUICK, "representation": {"kind": "own_voxels:Wrong", "own": {"how": how}}},
             ).run(progress=False)
-        assert words in str(failed.value)
+        assert words in str(failed.value) and failed.value.__cause__ is not None
+    assert capfd.readouterr().err == ""
 
 
 JAX = '''
