@@ -15,6 +15,23 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// A command line that another program gives.
+///
+/// ```
+/// use kerrlight_cli::{Call, Program, Said};
+/// use std::sync::mpsc::channel;
+///
+/// let words = ["kerrlight", "fit", "--print"].map(Into::into).to_vec();
+/// let (end, ended) = channel();
+/// let hear = move |said: Said<'_>| {
+///     if let Said::End = said {
+///         let _ = end.send(());
+///     }
+/// };
+/// let call = Call::new(words, None, hear)?;
+/// let (settings, _) = call.run(&Program::new(), || drop(ended.recv()))?;
+/// assert!(settings.contains("[hole]"));
+/// # Ok::<(), kerrlight_cli::Ended>(())
+/// ```
 pub struct Call {
     arguments: Arguments,
     session: Arc<Session>,

@@ -26,10 +26,10 @@ from kerrlight.interferometry import Observation
 from kerrlight.pictures import Settings, overrides_of, text_of
 from kerrlight.posterior import Posterior, draw
 from kerrlight.report import Report
-from kerrlight.results import Number, Polarization, Ring, Step, numbers_of, step_of
+from kerrlight.results import Images, Number, Polarization, Ring, Step, numbers_of, step_of
 from kerrlight.volume import Volume
 
-__all__ = ["Fit", "FitError", "Number", "Polarization", "Posterior", "Report", "Ring", "Step", "Volume"]
+__all__ = ["Fit", "FitError", "Images", "Number", "Polarization", "Posterior", "Report", "Ring", "Step", "Volume"]
 
 Data = Union[None, str, "PathLike[str]", Observation, ArrayLike]
 """A file of visibilities, images or a light curve; an observation; images in Jy/pixel over (t, y, x)."""
@@ -288,20 +288,14 @@ class Fit:
         return Volume(self._written("truth.npz"))
 
     @property
-    def movie(self) -> dict[str, NDArray[Any]]:
-        """Images: ``recovered`` and ``data``, arrays over (t, y, x) in Jy/pixel, with ``time`` in M and, where mass and
-        distance are known, ``hours`` and ``field_uas``."""
-        return self._arrays("movie.npz")
+    def movie(self) -> Images:
+        """The images of the recovered emission."""
+        return Images(self._written("movie.npz"))
 
     @property
-    def image(self) -> dict[str, NDArray[Any]]:
-        """The static image of settings with a table ``[image]``: ``recovered`` over (1, y, x) in Jy/pixel, rows from the
-        north, with ``field_uas``, and ``recovered_q`` and ``recovered_u`` where they were fitted."""
-        return self._arrays("image.npz")
-
-    def _arrays(self, name: str) -> dict[str, NDArray[Any]]:
-        with np.load(self._written(name)) as arrays:
-            return {name: arrays[name] for name in arrays}
+    def image(self) -> Images:
+        """The static image of settings with a table ``[image]``."""
+        return Images(self._written("image.npz"))
 
     def posterior(
         self,

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Mapping, TypeVar
 
-__all__ = ["Number", "Polarization", "Ring", "Step"]
+import numpy as np
+from numpy.typing import NDArray
+
+from kerrlight._arrays import Floats
+
+__all__ = ["Images", "Number", "Polarization", "Ring", "Step"]
 
 Kind = TypeVar("Kind")
 
@@ -71,6 +77,34 @@ class Polarization:
     """Modulus of β₂."""
     beta2_deg: Number
     """Argument of β₂."""
+
+
+class Images:
+    """Images over (t, y, x) in Jy/pixel, rows from the north; a static image is one."""
+
+    def __init__(self, path: Path) -> None:
+        with np.load(path) as arrays:
+            found: dict[str, NDArray[Any]] = {name: arrays[name] for name in arrays}
+        self.recovered: NDArray[np.float32] = found["recovered"]
+        """Of the model."""
+        self.recovered_q: NDArray[np.float32] | None = found.get("recovered_q")
+        """Stokes Q of a static image, where it was fitted."""
+        self.recovered_u: NDArray[np.float32] | None = found.get("recovered_u")
+        self.data: NDArray[np.float32] | None = found.get("data")
+        """What was fitted, or simulated; None where no images are known."""
+        self.time: Floats = found["time"]
+        """M."""
+        self.hours: Floats | None = found.get("hours")
+        """Where the mass is known."""
+        self.field_uas: float | None = float(found["field_uas"][0]) if "field_uas" in found else None
+        """Width, where mass and distance are known."""
+
+    def __len__(self) -> int:
+        return len(self.recovered)
+
+    def __repr__(self) -> str:
+        frames, rows, columns = self.recovered.shape
+        return f"<Images: {frames} of {columns} x {rows} pixels>"
 
 
 def step_of(line: str) -> Step | None:

@@ -49,8 +49,9 @@ def test_the_programs_results(tmp_path):
     assert steps[-1].chi2_per_datum.keys() == fit.chi2_per_datum.keys() == {"visibilities"}
     assert fit.volume.emission.shape == (16, 16, 16) and fit.volume.x[0] == fit.volume.low[0]
     assert fit.truth.emission.max() > 0 and "model" in fit.verdict
-    assert fit.movie["recovered"].shape == fit.movie["data"].shape
+    assert fit.movie.recovered.shape == fit.movie.data.shape
     assert "<iframe" in fit.report()._repr_html_() and fit.report().path.is_file()
+    assert len(fit.movie) == 16 and fit.movie.hours is not None and fit.movie.field_uas > 0
     assert "12 steps" in repr(fit) and "16 x 16" in repr(fit.volume)
 
 
@@ -232,13 +233,13 @@ def test_exact_images_and_relative_paths(tmp_path, monkeypatch):
     (tmp_path / "data" / "image.toml").write_text(IMAGE)
     monkeypatch.chdir(tmp_path)
     fit = Fit("data/image.toml", folder=tmp_path / "run").run(progress=False)
-    assert fit.image["recovered"].shape == (1, 8, 8) and "model" in fit.verdict
+    assert fit.image.recovered.shape == (1, 8, 8) and "model" in fit.verdict
     assert fit.ring is None and fit.polarization is None and fit.beta2 is None and fit.psnr_db is None
     # From another folder, as one that was stopped.
     (fit.folder / "results.json").unlink()
     monkeypatch.chdir(tmp_path / "data")
     again = Fit.open(tmp_path / "run").run(progress=False)
-    np.testing.assert_array_equal(again.image["recovered"], fit.image["recovered"])
+    np.testing.assert_array_equal(again.image.recovered, fit.image.recovered)
     with pytest.raises(ValueError, match="data.uvfits is no text of settings.*--init"):
         Fit("data.uvfits")
     with pytest.raises(ValueError, match="pixels"):
@@ -291,7 +292,7 @@ def test_exact_an_observation_alone_is_guessed_as_its_file(tmp_path, monkeypatch
 
 def test_exact_images_in_an_array(tmp_path):
     simulated = Fit(folder=tmp_path / "truth", set=QUICK).run(progress=False)
-    movie, times = simulated.movie["recovered"], simulated.movie["time"]
+    movie, times = simulated.movie.recovered, simulated.movie.time
     with pytest.raises(ValueError) as refused:
         Fit(data=movie, times=times)
     for words in ('set={"hole.spin": 0.5}', "observer.inclination_deg", "region.r_max"):
@@ -308,8 +309,8 @@ def test_exact_images_in_an_array(tmp_path):
         "output.nodes": 12,
     }
     fit = Fit(folder=tmp_path / "run", data=movie, times=times, set=given).run(progress=False)
-    np.testing.assert_allclose(fit.movie["data"], movie, rtol=1e-6)
-    np.testing.assert_allclose(fit.movie["time"], times, atol=1e-6 * np.ptp(times))
+    np.testing.assert_allclose(fit.movie.data, movie, rtol=1e-6)
+    np.testing.assert_allclose(fit.movie.time, times, atol=1e-6 * np.ptp(times))
     assert Fit.open(fit.folder).run(progress=False).psnr_db is None
     with pytest.raises(ValueError, match="holds a fit with other settings"):
         Fit(folder=tmp_path / "run", data=2 * movie, times=times, set=given).run(progress=False)
