@@ -210,8 +210,12 @@ impl Arguments {
         plain::check_words(&words)?;
         let matches = help::command().try_get_matches_from(words);
         let parsed = matches.and_then(|matches| Arguments::from_arg_matches(&matches));
-        parsed
-            .map_err(|error| anyhow!("{}", error.to_string().trim().trim_start_matches("error: ")))
+        parsed.map_err(|error| {
+            let words = error.to_string();
+            // What follows is how to ask for help on a terminal.
+            let first = words.split("\n\n").next().unwrap_or_default();
+            anyhow!("{}", first.trim().trim_start_matches("error: "))
+        })
     }
 }
 

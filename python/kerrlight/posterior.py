@@ -13,6 +13,7 @@ import numpy as np
 from kerrlight import _program
 from kerrlight._arrays import Floats, whole
 from kerrlight.report import Report
+from kerrlight.results import Feature, feature_of
 from kerrlight.volume import Volume
 
 __all__ = ["Posterior"]
@@ -31,7 +32,7 @@ class Posterior:
         if not path.is_file():
             raise FileNotFoundError(f"{folder} holds no posterior: Fit.posterior(samples) draws one")
         self.summary: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        """All numbers of ``posterior.json``: ``world``, ``features``, ``light_above_3_sigma`` and so on."""
+        """All numbers of ``posterior.json``: ``world``, ``light_above_3_sigma`` and so on."""
 
     def __len__(self) -> int:
         return int(self.summary["samples"])
@@ -42,6 +43,11 @@ class Posterior:
 
     def __iter__(self) -> Iterator[Volume]:
         return (self[k] for k in range(len(self)))
+
+    @property
+    def features(self) -> list[Feature]:
+        """What is bright, the brightest first."""
+        return [feature_of(found) for found in self.summary["features"]]
 
     @cached_property
     def mean(self) -> Volume:

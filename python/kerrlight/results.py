@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kerrlight._arrays import Floats
 
-__all__ = ["Images", "Number", "Polarization", "Ring", "Step"]
+__all__ = ["Feature", "Images", "Number", "Polarization", "Ring", "Step"]
 
 Kind = TypeVar("Kind")
 
@@ -46,6 +46,21 @@ class Number:
 
     def __str__(self) -> str:
         return f"{self.value:.4g}" + (f" ± {self.error:.2g}" if self.error is not None else "")
+
+
+@dataclass(frozen=True)
+class Feature:
+    """Bright emission that draws have in common, by its centroid; errors are standard deviations of the draws."""
+
+    radius: Number
+    """M."""
+    azimuth_deg: Number
+    height: Number
+    """z (M)."""
+    light: Number
+    """M³ times the unit of emission."""
+    peak: float
+    """The largest emission of the mean of the draws."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +128,12 @@ def step_of(line: str) -> Step | None:
     if "step" not in found or "loss" not in found:
         return None
     return Step(**{name: found[name] for name in Step.__dataclass_fields__ if name in found})
+
+
+def feature_of(found: Mapping[str, Any]) -> Feature:
+    """A feature of ``posterior.json``."""
+    given: dict[str, Any] = {name: Number(*of) if isinstance(of, list) else of for name, of in found.items()}
+    return Feature(**given)
 
 
 def numbers_of(kind: type[Kind], results: Mapping[str, Any], before: str) -> Kind | None:

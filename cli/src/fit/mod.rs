@@ -170,16 +170,15 @@ impl Fit {
         (folder, resume): (&Folder, bool),
         device: Option<FitDevice>,
     ) -> anyhow::Result<Answer> {
+        let recorder = recorder(folder);
         let prepared = match work {
             Prepared::Emission(prepared) => prepared,
             Prepared::Image(prepared) => {
-                let recorder = Recorder::of_process();
                 let answer = static_image::run(prepared, folder)?;
                 recorder.write_into(folder.path())?;
                 return Ok(answer);
             }
         };
-        let recorder = Recorder::of_process();
         let answer = run::run(prepared, text, (folder, resume), device)?;
         recorder.write_into(folder.path())?;
         let Some(samples) = self.samples else { return Ok(answer) };
@@ -253,6 +252,16 @@ impl Fit {
         }
         Ok(())
     }
+}
+
+/// The record of a run, whose command names the settings in its folder where a caller has given them as text.
+fn recorder(folder: &Folder) -> Recorder {
+    if session::settings().is_none() {
+        return Recorder::of_process();
+    }
+    let (run, settings) = (folder.path(), folder.path().join(SETTINGS));
+    let words = ["kerrlight".into(), "fit".into(), settings.into(), "-o".into(), run.into()];
+    Recorder::new(words.into())
 }
 
 /// The first line of a run's settings.
