@@ -145,6 +145,21 @@ impl Answer {
         failure.map_or(Ok(()), Err)
     }
 
+    /// The text and the object.
+    ///
+    /// # Errors
+    /// The failure it carries.
+    pub fn told(mut self) -> anyhow::Result<(String, Value)> {
+        if let Some(error) = self.failure.take() {
+            return Err(error);
+        }
+        let text = match &mut self.text {
+            Body::Text(text) => std::mem::take(text),
+            _ => String::new(),
+        };
+        Ok((text, self.into_json()))
+    }
+
     /// Hands out the text, in parts where it is long.
     fn each_text(self, mut out: impl FnMut(&str) -> anyhow::Result<()>) -> anyhow::Result<()> {
         match self.text {

@@ -1,13 +1,15 @@
 //! Ctrl-C, and the system's requests to end. Work that keeps what it has is told to stop; anything else ends at once.
 
 use crate::{output, threads};
+use kerrlight_geodesic::interrupt as geodesic;
+use std::cell::Cell;
 use std::io::Read;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// The signal of Ctrl-C.
-const INTERRUPT: u8 = 2;
+pub const INTERRUPT: u8 = 2;
 /// The signal that asks a program to end.
 const TERMINATE: u8 = 15;
 
@@ -24,26 +26,105 @@ struct Now {
 enum Kept {
     /// In its own time; the words go to the terminal.
     Waits(&'static str),
-    /// Within moments, or the program ends with these words: nothing is lost that is kept at all.
+    /// Within moments, or it is cut off with these words: nothing is lost that is kept at all.
     Ends(String),
 }
 
-static NOW: Mutex<Now> = Mutex::new(Now { keeper: None, signal: None });
-/// Whether there was one: read in inner loops.
-static STOP: AtomicBool = AtomicBool::new(false);
+/// What asks work to stop: signals to the process, or the caller of a [`Call`](crate::Call).
+pub struct Requests {
+    now: Mutex<Now>,
+    /// Whether there was one: read in inner loops.
+    stop: AtomicBool,
+    /// Loops that look at it unwind where work is cut off. Without it the process ends.
+    at_once: Option<&'static AtomicBool>,
+}
+
+static OF_PROCESS: Requests = Requests::new(None);
+
+thread_local! {
+    /// Those that work on this thread obeys, where they are not those of the process.
+    static OF_THREAD: Cell<Option<&'static Requests>> = const { Cell::new(None) };
+}
+
+fn here() -> &'static Requests {
+    OF_THREAD.get().unwrap_or(&OF_PROCESS)
+}
+
+impl Requests {
+    const fn new(at_once: Option<&'static AtomicBool>) -> Self {
+        let now = Mutex::new(Now { keeper: None, signal: None });
+        Self { now, stop: AtomicBool::new(false), at_once }
+    }
+
+    /// Those of a call. They live as long as the process, as threads of a pool outlive their work.
+    pub fn of_call() -> &'static Self {
+        let at_once = Box::leak(Box::new(AtomicBool::new(false)));
+        Box::leak(Box::new(Self::new(Some(at_once))))
+    }
+
+    /// Has work on this thread obey them.
+    pub fn obey(&'static self) {
+        OF_THREAD.set(Some(self));
+        self.at_once.into_iter().for_each(geodesic::obey);
+    }
+
+    fn now(&self) -> MutexGuard<'_, Now> {
+        self.now.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A signal: the first is told to the keeper, if there is one; a second one cuts the work off.
+    pub fn raise(&'static self, signal: u8) {
+        let mut now = self.now();
+        let is_first = now.signal.is_none();
+        now.signal.get_or_insert(signal);
+        self.stop.store(true, Ordering::Relaxed);
+        let keeper = now.keeper.clone();
+        drop(now);
+        match keeper {
+            Some(Kept::Waits(words)) if is_first => self.tell(words),
+            Some(Kept::Ends(words)) if is_first => {
+                let said = words.clone();
+                let late = threads::spawn(move || {
+                    std::thread::sleep(MOMENT);
+                    if self.now().keeper.is_some() {
+                        self.cut_off(signal, &said);
+                    }
+                });
+                if late.is_err() {
+                    self.cut_off(signal, &words);
+                }
+            }
+            _ => self.cut_off(signal, "interrupted"),
+        }
+    }
+
+    fn cut_off(&self, signal: u8, words: &str) {
+        self.tell(words);
+        match self.at_once {
+            Some(flag) => flag.store(true, Ordering::Relaxed),
+            None => {
+                output::remove_unfinished();
+                std::process::exit(i32::from(128 + signal))
+            }
+        }
+    }
+
+    /// A call has no terminal.
+    fn tell(&self, words: &str) {
+        if self.at_once.is_none() {
+            tell(words);
+        }
+    }
+}
 
 /// Work was stopped by a signal; the words say what is kept and how to resume.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Interrupted(pub String);
 
-fn now() -> MutexGuard<'static, Now> {
-    NOW.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Work that looks whether there was a signal, of which there is one at a time. Without it, and at a second signal,
-/// the program ends at once.
-pub struct Keeper(());
+/// Work that looks whether there was a signal, of which there is one at a time. Without it, and at a second signal, the
+/// program ends at once.
+pub struct Keeper(&'static Requests);
 
 /// For how long the end waits for work that keeps nothing more.
 const MOMENT: Duration = Duration::from_millis(800);
@@ -60,57 +141,26 @@ impl Keeper {
     }
 
     fn of(kept: Kept) -> Self {
-        now().keeper = Some(kept);
-        Keeper(())
+        let requests = here();
+        requests.now().keeper = Some(kept);
+        Keeper(requests)
     }
 
     /// Whether there was a signal.
     pub fn stopped(&self) -> bool {
-        STOP.load(Ordering::Relaxed)
+        self.0.stop.load(Ordering::Relaxed)
     }
 }
 
 impl Drop for Keeper {
     fn drop(&mut self) {
-        now().keeper = None;
+        self.0.now().keeper = None;
     }
 }
 
 /// The exit code of a program that a signal has stopped: 128 and its number, as shells have it.
 pub fn code() -> u8 {
-    128 + now().signal.unwrap_or(INTERRUPT)
-}
-
-/// A signal: the first is told to the keeper, if there is one; a second one ends the program.
-fn raise(signal: u8) {
-    let mut now = now();
-    let is_first = now.signal.is_none();
-    now.signal.get_or_insert(signal);
-    STOP.store(true, Ordering::Relaxed);
-    let keeper = now.keeper.clone();
-    drop(now);
-    match keeper {
-        Some(Kept::Waits(words)) if is_first => tell(words),
-        Some(Kept::Ends(words)) if is_first => {
-            let said = words.clone();
-            let late = threads::spawn(move || {
-                std::thread::sleep(MOMENT);
-                if self::now().keeper.is_some() {
-                    end(signal, &said);
-                }
-            });
-            if late.is_err() {
-                end(signal, &words);
-            }
-        }
-        _ => end(signal, "interrupted"),
-    }
-}
-
-fn end(signal: u8, words: &str) -> ! {
-    output::remove_unfinished();
-    tell(words);
-    std::process::exit(i32::from(128 + signal))
+    128 + here().now().signal.unwrap_or(INTERRUPT)
 }
 
 /// Past the lock of standard error, which the interrupted thread may hold.
@@ -141,7 +191,7 @@ pub fn listen() -> anyhow::Result<()> {
     if signals.thread_block().is_ok() {
         threads::spawn(move || {
             while let Ok(signal) = signals.wait() {
-                raise(signal as u8);
+                OF_PROCESS.raise(signal as u8);
             }
         })?;
     }
@@ -171,7 +221,7 @@ fn is_hangup_ignored() -> bool {
 /// None: without a handler Ctrl-C ends the program, as everywhere.
 #[cfg(not(unix))]
 pub fn listen() -> anyhow::Result<()> {
-    let _ = ctrlc::set_handler(|| raise(INTERRUPT));
+    let _ = ctrlc::set_handler(|| OF_PROCESS.raise(INTERRUPT));
     Ok(())
 }
 
@@ -185,8 +235,8 @@ pub fn follow_parent() -> anyhow::Result<()> {
         let mut input = std::io::stdin();
         while input.read(&mut bytes).is_ok_and(|count| count > 0) {}
         // A terminal's Ctrl-C reaches both processes: it is one request.
-        if !STOP.load(Ordering::Relaxed) {
-            raise(TERMINATE);
+        if !OF_PROCESS.stop.load(Ordering::Relaxed) {
+            OF_PROCESS.raise(TERMINATE);
         }
     })?;
     Ok(())

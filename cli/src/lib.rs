@@ -20,13 +20,11 @@
 //! From then on `representation.kind = "small"` with `representation.own.width = 32` works in every fit and every
 //! comparison of that program.
 
-/// As the standard library's, but a message that cannot be written, as into a file on a full disk, is no panic, and
-/// control characters of foreign names are escaped.
+/// As the standard library's, but a message that cannot be written, as into a file on a full disk, is no panic, control
+/// characters of foreign names are escaped, and the caller of a [`Call`] hears of it instead.
 macro_rules! eprint {
     ($($words:tt)*) => {{
-        use std::io::Write as _;
-        let words = std::format!($($words)*);
-        let _ = std::io::stderr().write_all($crate::plain::lines(&words).as_bytes());
+        $crate::session::say(&std::format!($($words)*));
     }};
 }
 
@@ -40,6 +38,7 @@ macro_rules! eprintln {
 mod accuracy;
 mod answer;
 mod assets;
+mod call;
 mod changed;
 mod checksum;
 mod columns;
@@ -72,6 +71,7 @@ mod record;
 mod render;
 mod report;
 mod reproduce;
+mod session;
 pub mod threads;
 mod trace;
 mod usage;
@@ -80,11 +80,13 @@ mod view;
 mod volume_files;
 mod zarr;
 
+pub use call::Call;
 pub use memory::Bounded;
 pub use program::Program;
+pub use session::Said;
 
 use answer::{Answer, Form};
-use anyhow::bail;
+use anyhow::{anyhow, bail};
 use clap::{FromArgMatches, Parser, Subcommand};
 use output::Output;
 use record::Recorder;
@@ -151,7 +153,7 @@ enum Verb {
 }
 
 /// The exit code of a case that another process runs: EX_TEMPFAIL of sysexits.h, to try again.
-const BUSY: u8 = 75;
+pub const BUSY: u8 = 75;
 
 impl Program {
     /// Does what the command line says; 0 is success, 2 an error, 1 a fit that failed while it ran or a comparison of which
@@ -171,22 +173,50 @@ impl Program {
         let matches = help::command().try_get_matches_from(words);
         let arguments = matches.and_then(|matches| Arguments::from_arg_matches(&matches));
         let arguments = arguments.unwrap_or_else(|error| output::exit(&error));
-        match interrupt::listen().and_then(|()| run(&arguments, &self)) {
-            Ok(()) => 0,
-            Err(error) if error.is::<interrupt::Interrupted>() => {
-                eprintln!("{}", plain::reasons(&error));
-                interrupt::code()
-            }
-            Err(error) => {
-                eprintln!("error: {}", plain::reasons(&error));
-                if error.is::<compare::Busy>() {
-                    return BUSY;
-                }
-                let failed = error.downcast_ref::<compare::Failed>().is_some()
-                    || error.downcast_ref::<fit::Failed>().is_some();
-                if failed { 1 } else { 2 }
-            }
-        }
+        let Err(error) = interrupt::listen().and_then(|()| run(&arguments, &self)) else {
+            return 0;
+        };
+        let before = if error.is::<interrupt::Interrupted>() { "" } else { "error: " };
+        let Ended { code, words } = error.into();
+        eprintln!("{before}{words}");
+        code
+    }
+}
+
+/// A program that has not done what it was told.
+#[derive(Debug, thiserror::Error)]
+#[error("{words}")]
+pub struct Ended {
+    /// The exit code, as [`Program::run`] has it.
+    pub code: u8,
+    /// Why.
+    pub words: String,
+}
+
+impl From<anyhow::Error> for Ended {
+    fn from(error: anyhow::Error) -> Self {
+        let code = match &error {
+            error if error.is::<interrupt::Interrupted>() => interrupt::code(),
+            error if error.is::<compare::Busy>() => BUSY,
+            error if error.is::<compare::Failed>() || error.is::<fit::Failed>() => 1,
+            _ => 2,
+        };
+        Ended { code, words: plain::reasons(&error) }
+    }
+}
+
+impl Arguments {
+    /// Those of a command line, which does not end the process whatever it says.
+    fn parsed(words: Vec<OsString>) -> anyhow::Result<Self> {
+        plain::check_words(&words)?;
+        let matches = help::command().try_get_matches_from(words);
+        let parsed = matches.and_then(|matches| Arguments::from_arg_matches(&matches));
+        parsed.map_err(|error| {
+            let words = error.to_string();
+            // What follows is how to ask for help on a terminal.
+            let first = words.split("\n\n").next().unwrap_or_default();
+            anyhow!("{}", first.trim().trim_start_matches("error: "))
+        })
     }
 }
 

@@ -17,12 +17,16 @@ impl Lock {
         Self::by(File::try_lock_shared, folder, busy, patience)
     }
 
-    /// Takes the lock of a folder that is new or empty; it is made if there is none. Of several processes that want the
-    /// same one, a single one gets it.
-    pub fn of_new(folder: &Path, busy: &str) -> anyhow::Result<Self> {
+    /// Takes the lock of a folder that is new or empty but for what `is_own` knows; it is made if there is none. Of
+    /// several processes that want the same one, a single one gets it.
+    pub fn of_new(
+        folder: &Path,
+        busy: &str,
+        is_own: impl Fn(&Path) -> bool,
+    ) -> anyhow::Result<Self> {
         let is_free = || {
             ensure!(
-                is_free(folder),
+                is_free(folder, &is_own),
                 "{} exists and is not an empty folder: resume it with --resume, or give another with -o",
                 folder.display()
             );
@@ -89,8 +93,9 @@ fn in_use(folder: &Path, busy: &str) -> anyhow::Error {
     anyhow!("{} is in use: another kerrlight {busy} it", folder.display())
 }
 
-/// Whether there is nothing in a folder but its lock; so it is if there is no folder.
-fn is_free(folder: &Path) -> bool {
+/// Whether there is nothing else in a folder but its lock; so it is if there is no folder.
+fn is_free(folder: &Path, is_own: impl Fn(&Path) -> bool) -> bool {
     let Ok(mut entries) = std::fs::read_dir(folder) else { return !folder.exists() };
-    entries.all(|entry| entry.is_ok_and(|entry| entry.file_name() == NAME))
+    let is_fine = |entry: std::fs::DirEntry| entry.file_name() == NAME || is_own(&entry.path());
+    entries.all(|entry| entry.is_ok_and(is_fine))
 }

@@ -34,26 +34,31 @@ pub fn parse(text: &str) -> Result<u64, String> {
 const WANTED: &str = "a size such as 4GiB, 500MB or 2G is wanted";
 const LEAST: f64 = 16.0 * 1048576.0;
 
-/// Sets the limit: as it was given, or what the machine has to give.
+/// Sets the limit of this process: as it was given, or what the machine has to give.
 pub fn limit(given: Option<u64>) -> anyhow::Result<()> {
-    let (there, by) = available();
-    if let (Some(given), Some(there)) = (given, there)
-        && given > there
-    {
-        eprintln!(
-            "note: --memory {} is more than the {} that {by} leaves",
-            shown(given as f64),
-            shown(there as f64)
-        );
+    let (bytes, note) = bytes(given)?;
+    note.into_iter().for_each(|note| eprintln!("{note}"));
+    if let Some(bytes) = bytes {
+        memory::set_limit(bytes);
+        LIMIT.store(usize::try_from(bytes).unwrap_or(usize::MAX), Ordering::Relaxed);
     }
-    let Some(bytes) = given.or(there) else { return Ok(()) };
-    if bytes == 0 {
+    Ok(())
+}
+
+/// The limit as it was given, or what the machine has to give, if that is known, and what is to be noted of it.
+pub fn bytes(given: Option<u64>) -> anyhow::Result<(Option<u64>, Option<String>)> {
+    let (there, by) = available();
+    let too_much = given.zip(there).filter(|(given, there)| given > there);
+    let note = too_much.map(|(given, there)| {
+        let [given, there] = [given, there].map(|bytes| shown(bytes as f64));
+        format!("note: --memory {given} is more than the {there} that {by} leaves")
+    });
+    let bytes = given.or(there);
+    if bytes == Some(0) {
         bail!("no memory is left: {by}");
     }
-    memory::set_limit(bytes);
     memory::set_scratch(scratch);
-    LIMIT.store(usize::try_from(bytes).unwrap_or(usize::MAX), Ordering::Relaxed);
-    Ok(())
+    Ok((bytes, note))
 }
 
 /// A file that nobody else sees and that is gone with the process: where TMPDIR says, else in the current folder, which

@@ -1,6 +1,7 @@
 //! Bars with the time left on a terminal; of pictures and films, a line a minute in a pipe.
 
-use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+use crate::session;
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::thread;
 use std::time::Duration;
@@ -29,6 +30,11 @@ fn tell(bar: &ProgressBar, every: Duration, say: impl Fn(&str) + Send + 'static)
     let _ = thread::Builder::new().spawn(lines);
 }
 
+/// Writes a line above a bar, or where there is none.
+pub fn line(bar: &ProgressBar, line: &str) {
+    if bar.is_hidden() { eprintln!("{line}") } else { bar.println(line) }
+}
+
 /// A bar that counts frames.
 pub fn frames(count: u64) -> ProgressBar {
     styled(count, "{bar:40} frame {pos} of {len}  {elapsed} gone, {eta} left")
@@ -36,7 +42,11 @@ pub fn frames(count: u64) -> ProgressBar {
 
 fn styled(length: u64, style: &str) -> ProgressBar {
     let style = ProgressStyle::with_template(style).unwrap_or(ProgressStyle::default_bar());
-    ProgressBar::new(length).with_style(style)
+    let bar = match session::is_here() {
+        true => ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::hidden()),
+        false => ProgressBar::new(length),
+    };
+    bar.with_style(style)
 }
 
 /// A bar that counts steps, with a message.
@@ -78,7 +88,8 @@ pub fn axes(count: u64) -> ProgressBar {
 pub fn waiting(what: &str) -> ProgressBar {
     let style = ProgressStyle::with_template("{prefix}: {msg}  {elapsed} gone");
     let style = style.unwrap_or(ProgressStyle::default_spinner());
-    ProgressBar::new_spinner().with_style(style).with_prefix(what.to_owned())
+    let bar = if session::is_here() { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
+    bar.with_style(style).with_prefix(what.to_owned())
 }
 
 #[cfg(test)]

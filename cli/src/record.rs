@@ -3,6 +3,7 @@
 
 use crate::checksum::{Sum, sealed};
 use crate::output::{self, Output};
+use crate::session;
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
@@ -63,9 +64,9 @@ impl Recorder {
         Self { begun: Instant::now(), started: since.as_secs_f64(), words }
     }
 
-    /// Of this process.
+    /// Of this process, or of the call that it has.
     pub fn of_process() -> Self {
-        Self::new(std::env::args_os().collect())
+        Self::new(session::words())
     }
 
     /// Writes the record into the folder of what was made, which knows its inputs itself.

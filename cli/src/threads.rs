@@ -29,12 +29,16 @@ pub fn start(wanted: Option<u16>) -> anyhow::Result<()> {
     }
 }
 
-/// Threads of their own, one a core or as many as the environment says; `begin` is called on each with its number.
+/// Threads of their own, as many as are wanted: else one a core or as many as the environment says. `begin` is called on
+/// each with its number.
 ///
 /// # Errors
 /// If the system has no more threads.
-pub fn pool(begin: impl Fn(usize) + Send + Sync + 'static) -> anyhow::Result<ThreadPool> {
-    let count = wanted_count(None);
+pub fn pool(
+    wanted: Option<u16>,
+    begin: impl Fn(usize) + Send + Sync + 'static,
+) -> anyhow::Result<ThreadPool> {
+    let count = wanted_count(wanted);
     let built = ThreadPoolBuilder::new().num_threads(count).start_handler(begin).build();
     built.map_err(|error| refused(error.source().unwrap_or(&error), count))
 }

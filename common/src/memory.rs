@@ -2,12 +2,18 @@
 //! allocated: nothing is begun that cannot end.
 
 use crate::Error;
+use std::cell::Cell;
 use std::io::{Read, Seek, Write};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Bytes that may be taken.
 static LIMIT: AtomicU64 = AtomicU64::new(u64::MAX);
+
+std::thread_local! {
+    /// The same for work on this thread, where that is another number.
+    static OF_THREAD: Cell<Option<u64>> = const { Cell::new(None) };
+}
 
 /// Something would take more memory than there is.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -26,9 +32,14 @@ pub fn set_limit(bytes: u64) {
     LIMIT.store(bytes, Ordering::Relaxed);
 }
 
+/// Sets how many bytes may be taken by work on this thread. A pool of threads does this when each of them starts.
+pub fn set_limit_of_thread(bytes: u64) {
+    OF_THREAD.set(Some(bytes));
+}
+
 /// How many bytes may be taken.
 pub fn limit() -> u64 {
-    LIMIT.load(Ordering::Relaxed)
+    OF_THREAD.get().unwrap_or_else(|| LIMIT.load(Ordering::Relaxed))
 }
 
 /// A part of the bytes that may be taken, from 0 to 1.

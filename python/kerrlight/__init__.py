@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from kerrlight.rays import Curve, GaussLegendre, Kerr, MinoTime, Observer, PathLength
     from kerrlight.report import Report
     from kerrlight.representation import Region, Representation
+    from kerrlight.scene import Hole
     from kerrlight.table import Outcome, Points, Rays
     from kerrlight.volume import Volume
 
@@ -50,6 +51,7 @@ _MODULES = {
     "ForwardModel": "model",
     "Fourier": "fourier",
     "GaussLegendre": "rays",
+    "Hole": "scene",
     "Infall": "flow",
     "Keplerian": "flow",
     "Kerr": "rays",
@@ -90,6 +92,7 @@ __all__ = [
     "ForwardModel",
     "Fourier",
     "GaussLegendre",
+    "Hole",
     "Infall",
     "Keplerian",
     "Kerr",

@@ -1,19 +1,72 @@
-"""The program as a process of its own: started, followed, stopped, and what it complains of as an exception."""
+"""The program in this process: what it is told, what it says, and what it complains of as an exception."""
 
 from __future__ import annotations
 
-import subprocess
+import json
+import logging
 import sys
-import tempfile
-import time
-from typing import IO, Any, Callable
+from types import TracebackType
+from typing import Any
+
+from kerrlight import _core
 
 LAUNCHER = [sys.executable, "-m", "kerrlight"]
-"""What starts it."""
+"""What starts it in a process of its own, as a comparison does for each fit."""
+
+_LOG = logging.getLogger("kerrlight")
 
 
 class FitError(RuntimeError):
     """A fit, a posterior or a comparison that failed while it ran; its settings made sense."""
+
+
+class Busy(RuntimeError):
+    """Another process runs the same case."""
+
+
+class Listener:
+    """Hears what the program says while it runs: words go to the logger ``kerrlight``, and a bar, where tqdm is installed,
+    shows how much is done."""
+
+    def __init__(self, unit: str = "", progress: bool = False) -> None:
+        self._unit = unit
+        self._bar: Any = None
+        self._tqdm: Any = None
+        if progress:
+            try:
+                from tqdm.auto import tqdm
+            except ImportError:
+                return
+            self._tqdm = tqdm
+
+    def words(self, text: str) -> None:
+        """Words that the program writes to standard error."""
+        _LOG.info("%s", text.rstrip("\n"))
+
+    def line(self, json: str) -> None:
+        """A line of the log of a run."""
+
+    def done(self, count: int, of: int) -> None:
+        """So much of so much is done."""
+        if self._tqdm is None or of == 0:
+            return
+        if self._bar is None or self._bar.total != of:
+            self.close()
+            self._bar = self._tqdm(total=of, unit=self._unit)
+        self._bar.update(count - self._bar.n)
+
+    def close(self) -> None:
+        """Ends the bar."""
+        if self._bar is not None:
+            self._bar.close()
+
+    def __enter__(self) -> Listener:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
 
 
 def limits(threads: int | None, memory: str | None) -> list[str]:
@@ -22,83 +75,15 @@ def limits(threads: int | None, memory: str | None) -> list[str]:
     return [*words, "--memory", memory] if memory is not None else words
 
 
-def follow(
-    command: list[str], tick: Callable[[], None], stop: Callable[[Any], object], file: Any = None
-) -> None:
-    """Runs it to its end. ``tick`` is called all the time; what it raises, or Ctrl-C, makes ``stop`` end the process.
-    ``file`` are settings whose name nobody knows."""
-    with tempfile.TemporaryFile("w+", encoding="utf-8") as heard:
-        child = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=heard,
-            start_new_session=True,
-        )
-        assert child.stdin is not None
-        try:
-            while child.poll() is None:
-                tick()
-                time.sleep(0.05)
-            tick()
-        except BaseException:
-            stop(child)
-            child.wait()
-            raise
-        finally:
-            child.stdin.close()
-        _check(child.returncode, heard, file)
+def call(
+    words: list[str], listener: Listener | None = None, settings: tuple[str, str] | None = None
+) -> tuple[str, dict[str, Any]]:
+    """Does what a command line says, in this process; the interpreter is free meanwhile. Ctrl-C, and what the listener
+    raises, stop it where it can be resumed, and are raised then.
 
-
-def said(text: str, file: Any = None) -> str:
-    """What the program complains of, without the name of a file that nobody knows."""
-    lines = [line for line in text.splitlines() if line.strip()]
-    at = next((k for k, line in enumerate(lines) if line.startswith("error: ")), 0)
-    words = "\n".join(lines[at:]).removeprefix("error: ")
-    return words.replace(f"{file.name}: ", "") if file is not None else words
-
-
-def _check(code: int, heard: IO[str], file: Any) -> None:
-    if code == 0:
-        return
-    heard.seek(0)
-    words = said(heard.read(), file)
-    if code == 2:
-        raise ValueError(words)
-    if code in (129, 130, 143):
-        raise KeyboardInterrupt(words)
-    raise FitError(words or f"the process ended with the code {code}")
-
-
-def bar(total: int, unit: str) -> Any:
-    """A bar, where tqdm is installed."""
-    try:
-        from tqdm.auto import tqdm
-    except ImportError:
-        return None
-    return tqdm(total=total, unit=unit)
-
-
-class Counter:
-    """Moves a bar on to a count that it asks for, once a second."""
-
-    def __init__(self, total: int, unit: str, count: Callable[[], int], progress: bool) -> None:
-        self._count = count
-        self._bar: Any = bar(total, unit) if progress else None
-        self._asked = time.monotonic()
-
-    def __call__(self) -> None:
-        if self._bar is not None and time.monotonic() - self._asked > 1.0:
-            self._move()
-
-    def _move(self) -> None:
-        self._asked = time.monotonic()
-        more = self._count() - self._bar.n
-        if more > 0:
-            self._bar.update(more)
-
-    def close(self) -> None:
-        """Moves it for the last time."""
-        if self._bar is not None:
-            self._move()
-            self._bar.close()
+    :param words: what follows ``kerrlight``.
+    :param settings: of a fit: their text, and the folder that paths in it start from.
+    :returns: its answer as text and as an object.
+    """
+    text, answer = _core.call(["kerrlight", *words], LAUNCHER, settings, listener or Listener())
+    return text, json.loads(answer)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-import signal
-import subprocess
 import tempfile
 import time
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any, Mapping, Sequence, Union
+from typing import Any, Mapping, Union
 
 from kerrlight import _program
+from kerrlight._program import FitError
 from kerrlight.fit import Fit
 from kerrlight.pictures import Settings, overrides_of, text_of
 from kerrlight.report import Report
@@ -121,15 +120,19 @@ def compare(
         file.flush()
         name = file.name
     place = Path(folder) if folder is not None else _folder(name, file)
-    words += ["-o", str(place), "--resume"]
+    if client is not None:
+        name = str(Path(name).absolute()) if Path(name).suffix == ".toml" else name
+        place = place.absolute()
+    words = [name, *words, "-o", str(place)]
+    options = _program.limits(threads, memory)
     try:
-        if client is not None:
-            name = str(Path(name).absolute()) if Path(name).suffix == ".toml" else name
-            place = place.absolute()
-            words = [*words[:-2], str(place), *_program.limits(threads, memory)]
-            _run_on(client, [name, *words], file)
-            return Comparison(place)
-        _run([*_program.LAUNCHER, "compare", name], words, place, progress, _program.limits(threads, memory), file)
+        if client is None:
+            with _program.Listener("fit", progress) as listener:
+                _program.call(["compare", *words, "--resume", *options], listener)
+        else:
+            _run_on(client, [*words, *options])
+    except (ValueError, FitError) as error:
+        raise type(error)(str(error).replace(f"{name}: ", "") if file is not None else str(error)) from None
     finally:
         if file is not None:
             file.close()
@@ -149,29 +152,6 @@ def _words(
     return [*words, "--quick"] if quick else words
 
 
-def _run(
-    command: list[str], words: Sequence[str], place: Path, progress: bool, limits: list[str], file: Any
-) -> None:
-    total = len(_listed([*command, *(word for word in words if word != "--resume")], file))
-
-    def done() -> int:
-        return min(total, len(list(place.glob("cases/*/report.html"))))
-
-    counter = _program.Counter(total, "fit", done, progress)
-    try:
-        stop = lambda child: child.send_signal(signal.SIGINT)  # noqa: E731
-        _program.follow([*command, *words, *limits], counter, stop, file)
-    finally:
-        counter.close()
-
-
-def _listed(command: list[str], file: Any) -> list[dict[str, Any]]:
-    listed = subprocess.run([*command, "--list", "--json"], capture_output=True, text=True, stdin=subprocess.DEVNULL)
-    if listed.returncode != 0:
-        raise ValueError(_program.said(listed.stderr, file))
-    return json.loads(listed.stdout)["cases"]
-
-
 def run_case(words: list[str]) -> None:
     """Runs one case, on a worker of Dask.
 
@@ -179,30 +159,26 @@ def run_case(words: list[str]) -> None:
     :raises kerrlight.FitError: if it failed.
     """
     while True:
-        command = [*_program.LAUNCHER, "compare", *words]
-        ended = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
-        if ended.returncode != 75:
-            break
-        # A worker that was killed has left its process behind, which finishes the case.
-        time.sleep(1.0)
-    if ended.returncode != 0:
-        raise _program.FitError(_program.said(ended.stderr))
+        try:
+            _program.call(["compare", *words])
+        except _program.Busy:
+            # What a worker that was killed has left behind ends in a moment.
+            time.sleep(1.0)
+        else:
+            return
 
 
-def _run_on(client: Any, words: list[str], file: Any) -> None:
+def _run_on(client: Any, words: list[str]) -> None:
     """Runs all cases on the workers of a client, those that take long first, and writes the report."""
-    cases = _listed([*_program.LAUNCHER, "compare", *words], file)
+    cases = _program.call(["compare", *words, "--list"])[1]["cases"]
     cases.sort(key=lambda case: -case["cost"])
     tasks = client.map(run_case, [[*words, "--case", case["id"]] for case in cases], pure=False, retries=3)
     errors = []
     for task in tasks:
         try:
             task.result()
-        except _program.FitError as error:
+        except FitError as error:
             errors.append(str(error))
-    collect = [*_program.LAUNCHER, "compare", *words, "--collect"]
-    ended = subprocess.run(collect, capture_output=True, text=True, stdin=subprocess.DEVNULL)
-    if ended.returncode != 0:
-        raise ValueError(_program.said(ended.stderr, file))
+    _program.call(["compare", *words, "--collect"])
     if errors:
-        raise _program.FitError("; ".join(errors))
+        raise FitError("; ".join(errors))

@@ -6,6 +6,7 @@ import base64
 import json
 import math
 import os
+from dataclasses import is_dataclass
 from functools import cached_property
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, Iterator, Mapping, Sequence, Union
@@ -40,8 +41,18 @@ INFINITE = "\0inf"
 """What stands for infinity in JSON, which has none."""
 
 
+def _table(value: Any) -> Any:
+    """Objects such as a ``Hole`` as tables."""
+    if is_dataclass(value) and not isinstance(value, type):
+        from kerrlight.scene import plain
+
+        return plain(value)
+    return value
+
+
 def _without_none(value: Any, name: str = "") -> Any:
     """Tables without keys that are None; a key with dots leads through tables, as in TOML."""
+    value = _table(value)
     if isinstance(value, Mapping):
         table: dict[str, Any] = {}
         for key, of in value.items():
@@ -103,7 +114,8 @@ def text_of(settings: Settings, folder: Union[None, str, PathLike[str]]) -> tupl
 
 def _flat(changes: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
     """Dotted keys of all values in dictionaries of dictionaries."""
-    for key, value in changes.items():
+    for key, of in changes.items():
+        value = _table(of)
         if isinstance(value, Mapping) and value:
             yield from _flat(value, f"{before}{key}.")
         else:
@@ -118,11 +130,7 @@ def overrides_of(changes: Mapping[str, Any] | None) -> list[str]:
         raise TypeError(f"set = {changes!r} is not allowed: a dictionary of changes")
 
     def value(key: str, of: Any) -> str:
-        text = _core.toml_of_json(json.dumps({"value": _without_none(of, key)}, default=_plain))
-        name, _, rest = text.partition("=")
-        if name.strip() != "value":
-            raise TypeError(f"{of!r} is no single value: change its keys one by one")
-        return rest.strip()
+        return _core.toml_value_of_json(json.dumps(_without_none(of, key), default=_plain))
 
     flat = _flat(changes or {})
     return [f"{key}=" if of is None else f"{key}={value(key, of)}" for key, of in flat]

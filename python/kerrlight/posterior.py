@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from kerrlight import _program
 from kerrlight._arrays import Floats, whole
 from kerrlight.report import Report
+from kerrlight.results import Feature, feature_of
 from kerrlight.volume import Volume
 
 __all__ = ["Posterior"]
@@ -32,7 +32,7 @@ class Posterior:
         if not path.is_file():
             raise FileNotFoundError(f"{folder} holds no posterior: Fit.posterior(samples) draws one")
         self.summary: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        """All numbers of ``posterior.json``: ``world``, ``features``, ``light_above_3_sigma`` and so on."""
+        """All numbers of ``posterior.json``: ``world``, ``light_above_3_sigma`` and so on."""
 
     def __len__(self) -> int:
         return int(self.summary["samples"])
@@ -43,6 +43,11 @@ class Posterior:
 
     def __iter__(self) -> Iterator[Volume]:
         return (self[k] for k in range(len(self)))
+
+    @property
+    def features(self) -> list[Feature]:
+        """What is bright, the brightest first."""
+        return [feature_of(found) for found in self.summary["features"]]
 
     @cached_property
     def mean(self) -> Volume:
@@ -85,15 +90,6 @@ class Posterior:
 def draw(folder: Path, samples: int, progress: bool, limits: list[str]) -> Posterior:
     """Draws around the fit in a folder."""
     samples = whole("samples", samples, 2, 100_000)
-    inside = folder / "posterior"
-
-    def done() -> int:
-        return min(samples, len(list(inside.glob("sample_*.json"))))
-
-    command = [*_program.LAUNCHER, "posterior", str(folder), "--samples", str(samples), *limits]
-    counter = _program.Counter(samples, "draw", done, progress)
-    try:
-        _program.follow(command, counter, lambda child: child.send_signal(signal.SIGINT))
-    finally:
-        counter.close()
-    return Posterior(inside)
+    with _program.Listener("draw", progress) as listener:
+        _program.call(["posterior", str(folder), "--samples", str(samples), *limits], listener)
+    return Posterior(folder / "posterior")

@@ -23,6 +23,7 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from os import PathLike
 from typing import Any, Literal, Mapping, Sequence, Union
 
+from kerrlight import _core
 from kerrlight.flow import Infall, Keplerian, PowerLaw, Profile, Tabulated, Velocity
 
 __all__ = [
@@ -66,6 +67,22 @@ class Hole:
     """Solar masses; required with µas, Jy, gas, or times in seconds."""
     distance_kpc: float | None = None
     """kpc; required with µas, Jy or gas."""
+
+    @staticmethod
+    def sgr_a_star(spin: float) -> Hole:
+        """Sgr A* (GRAVITY Collaboration 2019, A&A 625, L10), of this spin.
+
+        >>> Hole.sgr_a_star(0.5).mass_msun
+        4154000.0
+        """
+        mass_msun, distance_kpc = _core.known_hole("Sgr A*")
+        return Hole(spin=spin, mass_msun=mass_msun, distance_kpc=distance_kpc)
+
+    @staticmethod
+    def m87_star(spin: float) -> Hole:
+        """M87* (Event Horizon Telescope Collaboration 2019, ApJL 875, L6), of this spin."""
+        mass_msun, distance_kpc = _core.known_hole("M87*")
+        return Hole(spin=spin, mass_msun=mass_msun, distance_kpc=distance_kpc)
 
 
 @dataclass(kw_only=True)

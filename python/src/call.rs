@@ -88,11 +88,15 @@ fn watched<T: Send, E: Display + Send>(
 
 /// What is told of work that has ended.
 fn finished<T, E: Display>(result: Ended<T, E>) -> PyResult<T> {
-    let told = |panic: Box<dyn Any + Send>| match panic.is::<Stopped>() {
+    result.map_err(|panic| unwound(&*panic))?.map_err(refused)
+}
+
+/// The exception of work that was stopped in the middle, or has panicked.
+pub fn unwound(panic: &(dyn Any + Send)) -> PyErr {
+    match panic.is::<Stopped>() {
         true => PyKeyboardInterrupt::new_err(""),
-        false => PyRuntimeError::new_err(format!("internal error: {}", message(&*panic))),
-    };
-    result.map_err(told)?.map_err(refused)
+        false => PyRuntimeError::new_err(format!("internal error: {}", message(panic))),
+    }
 }
 
 /// What a panic said.

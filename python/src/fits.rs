@@ -1,27 +1,33 @@
-//! What is known of a fit's settings before it runs.
+//! What fits know beside their settings.
 
-use crate::call::{detached, refused};
-use crate::representation;
-use kerrlight_tomo::fit::settings::{FitFile, StaticImageFile};
-use kerrlight_tomo::fit::setup;
-use kerrlight_tomo::representation::Registry;
+use crate::call::refused;
+use kerrlight_tomo::fit::settings::Hole;
 use pyo3::prelude::*;
 
 /// Adds the functions of this module.
 pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(check_fit, module)?)
+    module.add_function(wrap_pyfunction!(known_hole, module)?)?;
+    module.add_function(wrap_pyfunction!(data_key, module)?)
 }
 
-/// Steps of training of a fit's settings, or iterations of a static image's, which it refuses if they make no sense, as far as can be told without
-/// tracing rays.
+/// Mass (solar masses) and distance (kpc) of Sgr A* or M87*.
 #[pyfunction]
-fn check_fit(py: Python<'_>, text: &str) -> PyResult<u64> {
-    if StaticImageFile::is_meant(text) {
-        return Ok(StaticImageFile::parse(text).map_err(refused)?.image.iterations as u64);
-    }
-    let file = FitFile::parse(text).map_err(refused)?;
-    let mut registry = Registry::new();
-    registry.find_others(representation::find);
-    detached(py, || setup::check(&file, &registry))?;
-    Ok(file.training.steps)
+fn known_hole(name: &str) -> PyResult<(Option<f64>, Option<f64>)> {
+    let Hole { mass_msun, distance_kpc, .. } = match name {
+        "Sgr A*" => Hole::sgr_a_star(0.0),
+        "M87*" => Hole::m87_star(0.0),
+        _ => return Err(refused(format!("{name:?} is not allowed: \"Sgr A*\" or \"M87*\""))),
+    };
+    Ok((mass_msun, distance_kpc))
+}
+
+/// The dotted key of the file of data that settings name.
+#[pyfunction]
+fn data_key(text: &str) -> PyResult<String> {
+    let table: toml::Table = text.parse().map_err(refused)?;
+    let kinds = table.get("data").and_then(toml::Value::as_table);
+    let kind = kinds.and_then(|kinds| kinds.keys().next());
+    let kind =
+        kind.ok_or_else(|| refused("the settings name no data: there is no table [data]"))?;
+    Ok(format!("data.{kind}.path"))
 }

@@ -13,6 +13,7 @@ use std::path::PathBuf;
 pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Picture>()?;
     module.add_function(wrap_pyfunction!(toml_of_json, module)?)?;
+    module.add_function(wrap_pyfunction!(toml_value_of_json, module)?)?;
     module.add_function(wrap_pyfunction!(same_toml, module)?)?;
     module.add_function(wrap_pyfunction!(scene_of_exr, module)?)?;
     module.add_function(wrap_pyfunction!(render, module)?)?;
@@ -31,6 +32,14 @@ fn toml_of_json(json: &str) -> PyResult<String> {
     let mut table: toml::Table = serde_json::from_str(json).map_err(refused)?;
     table.iter_mut().for_each(|(_, value)| with_infinities(value));
     toml::to_string(&table).map_err(refused)
+}
+
+/// A value as TOML writes it in a line, from the same value as JSON.
+#[pyfunction]
+fn toml_value_of_json(json: &str) -> PyResult<String> {
+    let mut value: toml::Value = serde_json::from_str(json).map_err(refused)?;
+    with_infinities(&mut value);
+    Ok(value.to_string())
 }
 
 /// Infinities, which JSON has not, in place of the words that stand for them.

@@ -10,7 +10,9 @@ use pyo3::prelude::*;
 use std::panic::resume_unwind;
 
 /// What a method of the class raised. The trait has no errors: it unwinds, and the program catches it.
-pub struct Raised(pub String);
+#[derive(thiserror::Error, Debug)]
+#[error("the representation raised {}", said(.0))]
+pub struct Raised(pub PyErr);
 
 /// An instance of a class.
 struct OfPython {
@@ -54,15 +56,10 @@ fn said(error: &PyErr) -> String {
 }
 
 impl OfPython {
-    /// Calls a method; what it raises is printed with its traceback, and unwinds.
+    /// Calls a method; what it raises unwinds.
     fn call<T>(&self, work: impl FnOnce(&Bound<'_, PyAny>) -> PyResult<T>) -> T {
-        let done = Python::attach(|py| {
-            work(self.instance.bind(py)).map_err(|error| {
-                error.display(py);
-                said(&error)
-            })
-        });
-        done.unwrap_or_else(|text| resume_unwind(Box::new(Raised(text))))
+        let done = Python::attach(|py| work(self.instance.bind(py)));
+        done.unwrap_or_else(|error| resume_unwind(Box::new(Raised(error))))
     }
 }
 

@@ -83,7 +83,7 @@ impl Pool {
     fn new() -> PyResult<Self> {
         let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
         let begin = move |_| interrupt::obey(stop);
-        let threads = threads::pool(begin).map_err(refused)?;
+        let threads = threads::pool(None, begin).map_err(refused)?;
         Ok(Pool { process: process::id(), threads, stop })
     }
 

@@ -27,6 +27,7 @@ def test_draws(tmp_path):
     np.testing.assert_allclose(more.mean.emission, draws.mean(0), atol=1e-5 * draws.max())
     np.testing.assert_allclose(more.deviation.emission, draws.std(0, ddof=1), atol=1e-4 * draws.max())
     np.testing.assert_array_equal(few[-1].emission, more[1].emission)
+    assert more.features[0].radius.value > 0 and more.features[0].light.error >= 0
     assert more.worlds == {} and more.summary["samples"] == 3
     assert more.report().path.is_file() and "3 draws" in repr(more)
     with pytest.raises(ValueError, match="the world is known"):

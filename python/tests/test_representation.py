@@ -77,7 +77,7 @@ def voxels(tmp_path, monkeypatch):
 
 
 def losses(fit):
-    return np.array([line["loss"] for line in fit.log if "loss" in line])
+    return np.array([step.loss for step in fit.log])
 
 
 def test_the_same_fit_as_with_the_grid_of_the_program(voxels):
@@ -97,8 +97,8 @@ def test_stopped_and_resumed(voxels):
     chosen = {**QUICK, "representation": {"kind": f"{pathlib.Path('own_voxels.py')}:Voxels", "own": {"nodes": 8}}}
     whole = Fit(folder="whole", set=chosen).run(progress=False)
 
-    def stop(line):
-        if line.get("step", 0) >= 2:
+    def stop(step):
+        if step.step >= 2:
             raise StopIteration
 
     parts = Fit(folder="parts", set=chosen)
@@ -134,7 +134,7 @@ def test_takes_part_in_a_comparison(voxels):
     assert "Mine and theirs" in done.report().path.read_text(encoding="utf-8")
 
 
-def test_what_goes_wrong(voxels):
+def test_what_goes_wrong(voxels, capfd):
     def fit(**chosen):
         return Fit(folder="wrong", set={**QUICK, "representation": chosen})
 
@@ -157,7 +157,8 @@ def test_what_goes_wrong(voxels):
                 folder=f"wrong-{how}",
                 set={**QUICK, "representation": {"kind": "own_voxels:Wrong", "own": {"how": how}}},
             ).run(progress=False)
-        assert words in str(failed.value)
+        assert words in str(failed.value) and failed.value.__cause__ is not None
+    assert capfd.readouterr().err == ""
 
 
 JAX = '''

@@ -28,6 +28,7 @@ use crate::plain;
 use crate::program::Program;
 use crate::progress;
 use crate::record::Recorder;
+use crate::session;
 use anyhow::{Context, bail};
 use cases::{Case, Status};
 use clap::Args;
@@ -261,7 +262,7 @@ impl Compare {
                 .with_context(|| format!("cannot make the folder {}", folder.display()))?;
             Lock::take(folder, plan::BUSY, Duration::ZERO)?
         } else {
-            Lock::of_new(folder, plan::BUSY)?
+            Lock::of_new(folder, plan::BUSY, |_| false)?
         };
         asked.plan.write(folder, &asked.text)?;
         Ok(Some(lock))
@@ -312,6 +313,7 @@ fn run(cases: &[Case], runner: &Runner<'_>) -> HashMap<String, String> {
         bar.tick();
         let status = runner.run(case, &keeper);
         bar.inc(u64::from(status != Status::Open));
+        session::reached(&bar);
         if let Status::Failed(why) = status {
             bar.suspend(|| eprintln!("failed: {}: {why}", case.name()));
             failed.insert(case.slug(), why);

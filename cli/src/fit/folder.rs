@@ -4,6 +4,7 @@ use super::inputs::{self, Inputs, SETTINGS};
 use crate::file_sums::FileSums;
 use crate::lock::Lock;
 use crate::output::{self, Output};
+use crate::session;
 use anyhow::{Context, bail};
 use serde_json::Value;
 use std::fs::OpenOptions;
@@ -26,9 +27,9 @@ pub const CHECKPOINT: &str = "checkpoint.safetensors";
 const BUSY: &str = "fits in";
 
 impl Folder {
-    /// A new folder.
+    /// A new folder, in which the data may lie.
     pub fn create(path: &Path, settings: &str, inputs: Inputs) -> anyhow::Result<Self> {
-        let lock = Lock::of_new(path, BUSY)?;
+        let lock = Lock::of_new(path, BUSY, |file| inputs.holds(file))?;
         let folder = Self { path: path.to_owned(), inputs, _lock: Some(lock) };
         let inputs = serde_json::to_string_pretty(&folder.inputs)?;
         folder.file(inputs::FILE)?.write(format!("{inputs}\n").as_bytes())?;
@@ -114,7 +115,9 @@ impl Folder {
         let name = || format!("cannot write {}", path.display());
         let file = OpenOptions::new().create(true).append(true).open(&path);
         let mut file = file.with_context(name)?;
-        file.write_all(format!("{line}\n").as_bytes()).with_context(name)
+        file.write_all(format!("{line}\n").as_bytes()).with_context(name)?;
+        session::log(line);
+        Ok(())
     }
 
     /// What to do about work that was interrupted and is kept.

@@ -62,6 +62,11 @@ impl Inputs {
         }
     }
 
+    /// Whether a file is among those that were read.
+    pub fn holds(&self, file: &Path) -> bool {
+        std::path::absolute(file).is_ok_and(|file| self.files.iter().any(|of| of.path == file))
+    }
+
     /// Of the run in a folder.
     pub fn load(run: &Path) -> anyhow::Result<Self> {
         let path = run.join(FILE);

@@ -32,7 +32,7 @@ use crate::answer::Answer;
 use crate::changed::{self, Changed};
 use crate::devices::{FitDevice, StepsOption};
 use crate::record::Recorder;
-use crate::{interrupt, output, paths, plain};
+use crate::{interrupt, output, paths, plain, session};
 use anyhow::{Context, bail};
 pub use api::{assigned, check, coverage, sizes, turned, velocities};
 pub use band_plots::{loop_plot, of_runs as plots_of_bands};
@@ -126,16 +126,15 @@ impl Fit {
         let guess = self.data.as_deref().map(|data| init::guess(data, self.model)).transpose()?;
         let (own, base_dir) = self.settings(guess.as_ref())?;
         let text = self.changed(&own, &base_dir)?;
+        let (name, by) = (self.name(), changed::assignments(&self.set));
+        let changed = Changed { name: &name, own: &own, text: &text, by: &by };
         if self.print {
-            let settings = serde_json::to_value(text.parse::<toml::Table>()?)?;
-            return Ok(Answer::text(text).with("settings", settings));
+            return self.printed(&changed, guess.as_ref(), registry);
         }
         if let (Some(guess), Some(data)) = (&guess, &self.data) {
             guess.check(&text, data)?;
             eprint!("{text}\n{}", guess.sentences(&text));
         }
-        let (name, by) = (self.name(), changed::assignments(&self.set));
-        let changed = Changed { name: &name, own: &own, text: &text, by: &by };
         let work = Work::read_changed(&changed)?;
         if let Some(unused) = work.unused(&text) {
             eprintln!("note: {unused}");
@@ -155,6 +154,29 @@ impl Fit {
         self.run_all(&prepared, &text, (&folder, false), device)
     }
 
+    /// The settings as an answer; those of a program that calls this one have to make sense.
+    fn printed(
+        &self,
+        changed: &Changed<'_>,
+        guess: Option<&init::Guess>,
+        registry: &Registry,
+    ) -> anyhow::Result<Answer> {
+        let text = changed.text;
+        let is_called = session::is_here();
+        let mut guessed = Vec::new();
+        if let (Some(guess), Some(data)) = (guess, &self.data) {
+            if is_called {
+                guess.check(text, data)?;
+            }
+            guessed.extend(guess.sentences(text).lines().map(str::to_owned));
+        }
+        if is_called {
+            check(changed, registry)?;
+        }
+        let settings = serde_json::to_value(text.parse::<toml::Table>()?)?;
+        Ok(Answer::text(text.to_owned()).with("settings", settings).with("guessed", guessed))
+    }
+
     /// The fit, and the draws that are wanted after it.
     fn run_all(
         &self,
@@ -163,16 +185,15 @@ impl Fit {
         (folder, resume): (&Folder, bool),
         device: Option<FitDevice>,
     ) -> anyhow::Result<Answer> {
+        let recorder = recorder(folder);
         let prepared = match work {
             Prepared::Emission(prepared) => prepared,
             Prepared::Image(prepared) => {
-                let recorder = Recorder::of_process();
                 let answer = static_image::run(prepared, folder)?;
                 recorder.write_into(folder.path())?;
                 return Ok(answer);
             }
         };
-        let recorder = Recorder::of_process();
         let answer = run::run(prepared, text, (folder, resume), device)?;
         recorder.write_into(folder.path())?;
         let Some(samples) = self.samples else { return Ok(answer) };
@@ -197,6 +218,7 @@ impl Fit {
             (Some(file), _) => plain::path(file),
             // Lines that an error names are those of the settings, not of the data.
             (None, Some(data)) => format!("settings guessed from {}", plain::path(data)),
+            (None, None) if session::settings().is_some() => "settings".to_owned(),
             (None, None) => "built-in experiment".to_owned(),
         }
     }
@@ -205,14 +227,15 @@ impl Fit {
     fn settings(&self, guess: Option<&init::Guess>) -> anyhow::Result<(String, PathBuf)> {
         let (text, base_dir) = match (&self.file, guess) {
             (None, Some(guess)) => (guess.text.clone(), PathBuf::from(".")),
-            (None, None) => (BUILT_IN.to_owned(), PathBuf::from(".")),
+            (None, None) => {
+                let given = session::settings().map(placed);
+                given.unwrap_or_else(|| (BUILT_IN.to_owned(), PathBuf::from(".")))
+            }
             (Some(path), _) => {
                 let folder = path.parent().filter(|folder| *folder != Path::new(""));
                 let folder = std::path::absolute(folder.unwrap_or(Path::new(".")))
                     .with_context(|| path.display().to_string())?;
-                let text = output::read_text(path)?;
-                let folder = if text.starts_with(BASE_DIR) { base_dir_of(&text) } else { folder };
-                (text, folder)
+                placed((output::read_text(path)?, folder))
             }
         };
         // It stands in a line of the run's settings.
@@ -223,7 +246,8 @@ impl Fit {
     /// The text of the settings with `--set`.
     fn changed(&self, own: &str, base_dir: &Path) -> anyhow::Result<String> {
         // The built-in experiment has no folder of its own.
-        let folder = self.file.is_some().then_some(base_dir);
+        let has_folder = self.file.is_some() || session::settings().is_some();
+        let folder = has_folder.then_some(base_dir);
         if !self.set.is_empty() {
             // What is wrong with the file is no fault of --set.
             toml_file::read::<toml::Table>(own).with_context(|| self.name())?;
@@ -249,12 +273,28 @@ impl Fit {
     }
 }
 
+/// The record of a run, whose command names the settings in its folder where a caller has given them as text.
+fn recorder(folder: &Folder) -> Recorder {
+    if session::settings().is_none() {
+        return Recorder::of_process();
+    }
+    let (run, settings) = (folder.path(), folder.path().join(SETTINGS));
+    let words = ["kerrlight".into(), "fit".into(), settings.into(), "-o".into(), run.into()];
+    Recorder::new(words.into())
+}
+
 /// The first line of a run's settings.
 const BASE_DIR: &str = "# Paths start from ";
 
 /// Settings that say from which folder their paths start.
 pub fn from_folder(settings: &str, folder: &Path) -> String {
     format!("{BASE_DIR}{}\n{settings}", folder.display())
+}
+
+/// Settings, with the folder that they say themselves where they do.
+fn placed((text, folder): (String, PathBuf)) -> (String, PathBuf) {
+    let folder = if text.starts_with(BASE_DIR) { base_dir_of(&text) } else { folder };
+    (text, folder)
 }
 
 /// The folder that paths in a run's settings start from.

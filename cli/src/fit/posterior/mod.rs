@@ -14,7 +14,7 @@ use crate::answer::Answer;
 use crate::checksum::{is_whole, sealed};
 use crate::interrupt::{Interrupted, Keeper};
 use crate::record::Recorder;
-use crate::{output, progress, volume_files};
+use crate::{output, progress, session, volume_files};
 use anyhow::{Context, bail};
 use clap::Args;
 use indicatif::ProgressBar;
@@ -160,6 +160,7 @@ pub fn draw(prepared: &Problem, folder: &Folder, samples: u32) -> anyhow::Result
         };
         all.push(kept);
         bar.inc(1);
+        session::reached(&bar);
     }
     bar.finish_and_clear();
     let answer = add_up(prepared, folder, &path, &all)?;

@@ -5,6 +5,7 @@ use crate::fit::{
     band_search, closures, held_out, linear, rotation_search, world_results, world_search,
 };
 use crate::report;
+use crate::session;
 use crate::usage::usage;
 use kerrlight_common::frames::Frames;
 use kerrlight_render::volume::metrics::{self, Mask};
@@ -52,7 +53,7 @@ impl Estimate<'_> {
             "version": env!("CARGO_PKG_VERSION"),
             "steps": now.step,
             "seconds": found.begun.elapsed().as_secs_f64(),
-            "cpu_seconds": usage().map(|usage| usage.cpu_seconds),
+            "cpu_seconds": usage().map(|usage| usage.cpu_seconds - session::cpu_seconds_before()),
             "peak_memory_mib": usage().map(|usage| usage.peak_mib),
             "loss": found.loss.total,
             "chi2_per_datum": chi2,

@@ -10,6 +10,7 @@ use crate::fit::{
 use crate::interrupt::Keeper;
 use crate::plain;
 use crate::progress;
+use crate::session;
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use kerrlight_tomo::Error;
@@ -238,6 +239,7 @@ impl Progress for Kept<'_> {
             }
         };
         self.shows(at, &bar);
+        session::reached(&bar);
         let goes_on = !keeper.stopped();
         self.work = Some((keeper, Some((name(at), bar))));
         goes_on

@@ -1,6 +1,7 @@
 //! What a run says of its steps.
 
 use super::kept::Kept;
+use crate::progress;
 use indicatif::ProgressBar;
 use kerrlight_tomo::fit::settings::AxisSearch;
 use kerrlight_tomo::fit::{Loss, Outcome};
@@ -24,13 +25,13 @@ impl Kept<'_> {
             }
             Outcome::Done(_) => return Ok(()),
             Outcome::SteppedBack { loss, to, caution } => {
-                bar.println(format!(
-                    "the loss rose to {loss:e}: back to step {to}, learning rates scaled by {caution}"
-                ));
+                let back = format!("back to step {to}, learning rates scaled by {caution}");
+                progress::line(bar, &format!("the loss rose to {loss:e}: {back}"));
                 json!({"step": step, "diverged_loss": loss.to_string(), "caution": caution})
             }
             Outcome::Converged => {
-                bar.println(format!("converged at step {step}: no further decrease of the loss"));
+                let end = format!("converged at step {step}: no further decrease of the loss");
+                progress::line(bar, &end);
                 json!({"step": step, "converged": true, "loss": now.state.now.loss})
             }
         };

@@ -17,6 +17,7 @@ use crate::answer::Answer;
 use crate::checksum::sealed;
 use crate::interrupt::{Interrupted, Keeper};
 use crate::progress;
+use crate::session;
 use anyhow::bail;
 use kerrlight_common::frames::Frames;
 use kerrlight_tomo::fit::FrameTerm;
@@ -172,6 +173,7 @@ fn searched(
                 Stage::Draws => "draws of noise",
             });
             bar.set_position(done.fetch_add(solved as u64, Ordering::Relaxed) + 1);
+            session::reached(&bar);
         }
         !keeper.stopped()
     };

@@ -1,8 +1,9 @@
 //! results.json of a static image.
 
-use super::Found;
+use super::{Found, words};
 use crate::fit::closures;
 use crate::fit::results::verdict;
+use crate::session;
 use crate::usage::usage;
 use kerrlight_tomo::fit::static_image::{Candidate, Ring, ShapeFit, Survey};
 use serde_json::{Map, Value, json};
@@ -98,7 +99,7 @@ impl Found<'_> {
             "kind": "static image",
             "steps": found.solution.iterations,
             "seconds": self.begun.elapsed().as_secs_f64(),
-            "cpu_seconds": usage().map(|usage| usage.cpu_seconds),
+            "cpu_seconds": usage().map(|usage| usage.cpu_seconds - session::cpu_seconds_before()),
             "peak_memory_mib": usage().map(|usage| usage.peak_mib),
             "loss": found.solution.loss,
             "chi2_per_datum": chi2,
@@ -131,6 +132,7 @@ impl Found<'_> {
         results["shapes"] = self.shapes.iter().map(shape).collect();
         let [with, all] = self.survey.with_ring();
         results["images_with_ring"] = json!({"count": with, "of": all});
+        results["ring_sentence"] = json!(words::ring(&self.survey, &self.shapes));
         self.add_ring(&mut results);
         results
     }
