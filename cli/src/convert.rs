@@ -95,6 +95,11 @@ impl Convert {
         if let Some(seconds) = self.average.filter(|s| !Averaging::over(*s).is_allowed()) {
             bail!("--average {seconds} is not allowed: seconds in [1e-3, 1e9]");
         }
+        for (name, limit) in [("--uv-min", self.uv_min), ("--uv-max", self.uv_max)] {
+            if let Some(limit) = limit.filter(|limit| limit.is_nan() || *limit < 0.0) {
+                bail!("{name} {limit} is not allowed: wavelengths, 0 or more");
+            }
+        }
         if let Some(snr) = self.closure_traces.filter(|snr| !(0.0..=1e9).contains(snr)) {
             bail!("--closure-traces {snr} is not allowed: a signal-to-noise ratio in [0, 1e9]");
         }

@@ -8,6 +8,7 @@ use crate::interferometry::{ObservationFile, scene_movie};
 use crate::output;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
+use kerrlight_render::scene::shown;
 use kerrlight_vlbi::noise::{
     GainErrors, ScatteringKernel, add_thermal_noise, apply_gains, scatter,
 };
@@ -255,7 +256,7 @@ impl Observe {
             format!("input {}", self.shown()),
             images,
         ];
-        lines.extend(self.fov_uas.map(|fov| format!("field of view {fov} uas")));
+        lines.extend(self.fov_uas.map(|fov| format!("field of view {} uas", shown(fov))));
         lines.extend(self.observing.history(&self.array));
         lines.push(format!("pulse {:?}", self.pulse));
         lines.push(transform);

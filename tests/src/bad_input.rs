@@ -159,6 +159,10 @@ fn overrides_and_arguments_that_make_no_sense() {
     assert!(message.contains("--set hole.spin=2") && message.contains("[-1, 1]"), "{message}");
     assert!(fail(path, &["render", "--set", "hole.color=2"]).contains("color"));
     fail(path, &["render", "--colormap", "jet"]);
+    for limit in ["nan", "-1"] {
+        let error = fail(path, &["convert", "a.uvfits", "b.csv", "--uv-min", limit]);
+        assert!(error.contains("is not allowed: wavelengths"), "{error}");
+    }
     fail(path, &["paint"]);
     fail(path, &["render", "--threads", "0"]);
 }

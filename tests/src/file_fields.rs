@@ -68,6 +68,9 @@ fn exact_fields_of_numpy_images() {
     assert_eq!(seen("b.npz", "--fov-uas 60"), expected);
     assert_ne!(seen("b.npz", ""), expected);
     archive(&at.join("two.npz"), &[("one.npy", &plain), ("other.npy", &plain)]);
+    let two = [60_f64, 30.0].iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<u8>>();
+    let fields = npy("'<f8'", "False", "(2,)", &two);
+    archive(&at.join("fields.npz"), &[("image.npy", &plain), ("field_uas.npy", &fields)]);
     let pair = |n: f64| [n, 0.0].iter().flat_map(|n| n.to_le_bytes()).collect();
     let nan = |n: f64| if n == 4.0 { f64::NAN } else { n }.to_le_bytes().into();
     for (name, array, said) in [
@@ -76,9 +79,10 @@ fn exact_fields_of_numpy_images() {
         ("flat", npy("'<f8'", "False", "(16,)", &bytes(&little, &rows)), "16"),
         ("nan", npy("'<f8'", "False", "(4, 4)", &bytes(&nan, &rows)), "NaN"),
         ("short", plain[..plain.len() - 8].to_vec(), "short.npy"),
-        ("two", Vec::new(), "other"),
+        ("two.npz", Vec::new(), "other"),
+        ("fields.npz", Vec::new(), "field_uas.npy: 2 numbers"),
     ] {
-        let name = if name == "two" { "two.npz".to_owned() } else { format!("{name}.npy") };
+        let name = if name.contains('.') { name.to_owned() } else { format!("{name}.npy") };
         if name.ends_with(".npy") {
             std::fs::write(at.join(&name), array).unwrap();
         }

@@ -231,11 +231,22 @@ impl Experiment {
         Ok(())
     }
 
+    /// Seeds of cases are told by `seeds` alone.
+    fn check_seed(&self) -> anyhow::Result<()> {
+        let levels = self.factor.iter().flat_map(Factor::levels).map(|level| level.set);
+        let mut all = levels.chain([self.set.clone(), self.quick.set.clone()]);
+        if all.any(|set| set.contains_key("seed")) {
+            bail!("`seed` is not allowed among the settings: `seeds` tells how many there are");
+        }
+        Ok(())
+    }
+
     fn check(&self) -> anyhow::Result<()> {
         if self.seeds == 0 {
             bail!("seeds = 0 is not allowed: 1 or more");
         }
         self.check_draws()?;
+        self.check_seed()?;
         for (k, factor) in self.factor.iter().enumerate() {
             factor.check()?;
             if self.factor[..k].iter().any(|other| other.name == factor.name) {

@@ -56,7 +56,11 @@ impl<T: Elementary> PathPoint<T> {
     pub fn momentum(&self, hole: &Kerr<T>, lambda: T) -> [T; 4] {
         let (w, one) = (self.inverse_radius, T::constant(1.0));
         // Δ/r², and p_r = (dr/dτ)/Δ.
-        let gap = one - w * (one + one - hole.spin() * hole.spin() * w);
+        let mut gap = one - w * (one + one - hole.spin() * hole.spin() * w);
+        if gap.value() <= 0.0 {
+            // At the last float outside of a horizon: (1 − r₊w)(1 − r₋w).
+            gap = (one - hole.horizon() * w) * (one - hole.inner_horizon() * w);
+        }
         let p_r = self.inverse_radius_rate / gap;
         let [x, y, u] = self.direction;
         let sin = (x * x + y * y).sqrt();

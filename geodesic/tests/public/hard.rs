@@ -137,6 +137,22 @@ fn returns(rays: &RayTable, radius: f64, context: &str) {
 const METHODS: [Integrator; 3] =
     [Integrator::TaylorMino, Integrator::Elliptic, Integrator::Dop853Mino];
 
+/// At the horizon of an extremal hole Δ = (r − 1)² is that of the last float outside, as everywhere else.
+#[test]
+fn exact_momenta_at_an_extremal_horizon_are_numbers() {
+    let inclination = Inclination::from_degrees(90.0).unwrap();
+    let observer = Observer::at_radius(inclination, 1e9).unwrap();
+    let request = Request { momentum: true, ..Request::samples(Placement::MinoTime(5)) };
+    for spin in [1.0, -1.0] {
+        let hole = Kerr::new(spin).unwrap();
+        let rays = Integrator::TaylorMino
+            .trace(&hole, &observer, &[-2.0 * spin], &[0.0], 1e-12, &request)
+            .unwrap();
+        let momenta = &rays.samples.momentum;
+        assert!(momenta.len() == 5 && momenta.iter().flatten().all(|p| p.is_finite()));
+    }
+}
+
 /// Turns 2e-13 M outside the horizon of an extremal hole. Its time is 2 ∫ dw/√W over the roots of W in 60 digits, and
 /// after it there would be one crossing more within 0.01 M⁻¹.
 #[test]

@@ -144,7 +144,14 @@ pub fn npz_movie(bytes: &[u8]) -> std::result::Result<Pixels, Error> {
             .map(|(_, all)| all))
     };
     let (hours, times) = (member("hours")?, member("times")?);
-    let field_uas = member("field_uas")?.and_then(|all| all.first().copied());
+    let field_uas = match member("field_uas")?.as_deref() {
+        None => None,
+        Some([field]) => Some(*field),
+        Some(several) => {
+            let message = format!("field_uas.npy: {} numbers: one is expected", several.len());
+            return Err(NumpyError::content(message).into());
+        }
+    };
     let none = || NumpyError::content(format!("holds no {name}"));
     let pixels = npy(&archive.member(&name)?.ok_or_else(none)?);
     let pixels = pixels.map_err(|error| NumpyError::member(format!("{name}.npy"), error))?;

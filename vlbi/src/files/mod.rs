@@ -199,6 +199,21 @@ fn number(cell: &str, name: &str) -> Result<f64, String> {
     if f64::is_finite(value) { Ok(value) } else { Err(format!("{name} = {value} is not finite")) }
 }
 
+/// Hours from the day of an observation, or wavelengths of a baseline: what no telescope has is no typing error of a
+/// digit, and would leave single precision.
+fn number_within(cell: &str, name: &str, most: f64) -> Result<f64, String> {
+    match number(cell, name)? {
+        value if value.abs() <= most => Ok(value),
+        value => Err(format!("{name} = {value:e} is not allowed: [-{most:e}, {most:e}]")),
+    }
+}
+
+/// Hours from the day of an observation: a century and more.
+const MOST_HOURS: f64 = 1e6;
+
+/// Wavelengths of 1 µm between here and the Moon, a hundredfold.
+const MOST_WAVELENGTHS: f64 = 1e17;
+
 /// A standard deviation: not negative; NaN where there is none.
 fn sigma(cell: &str, name: &str) -> Result<f64, String> {
     let value =

@@ -1,7 +1,7 @@
 //! eht-imaging's text format of observations: a heading with source, date, frequency and
 //! stations, then 20 columns, amplitudes in Jy and phases in degrees.
 
-use super::{FileError, Names, number, sigma};
+use super::{FileError, MOST_HOURS, MOST_WAVELENGTHS, Names, number, number_within, sigma};
 use crate::Complex64;
 use crate::Error;
 use crate::array;
@@ -11,6 +11,9 @@ use core::fmt::Write;
 
 /// Columns of the data.
 const COLUMNS: usize = 20;
+
+/// Opacity of a sky through which nothing comes.
+const MOST_OPACITY: f64 = 1e6;
 
 /// Whether a text begins as these do.
 pub(super) fn is_obs_text(text: &str) -> bool {
@@ -181,14 +184,19 @@ fn row(line: &str, names: &Names) -> Result<Row, String> {
     if !(0.0..=1e9).contains(&integration_s) {
         return Err(format!("tint = {integration_s} s is not allowed: [0, 1e9]"));
     }
+    let within = |k: usize, name, most| number_within(cells[k], name, most);
+    let stations = [station(2)?, station(3)?];
+    if stations[0] == stations[1] {
+        return Err(format!("a baseline of station {} with itself", cells[2]));
+    }
     Ok(Row {
-        time_h: value(0, "time")?,
+        time_h: within(0, "time", MOST_HOURS)?,
         integration_s,
-        stations: [station(2)?, station(3)?],
-        uv: [value(6, "u")?, value(7, "v")?],
+        stations,
+        uv: [within(6, "u", MOST_WAVELENGTHS)?, within(7, "v", MOST_WAVELENGTHS)?],
         products,
         noise_sigma,
-        opacity: [value(4, "tau1")? as f32, value(5, "tau2")? as f32],
+        opacity: [within(4, "tau1", MOST_OPACITY)? as f32, within(5, "tau2", MOST_OPACITY)? as f32],
         channel: 0,
     })
 }

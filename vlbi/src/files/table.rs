@@ -1,7 +1,9 @@
 //! Tables of total intensity, a visibility a line, columns separated by commas or blanks and told
 //! by a line of names: kerrlight's CSV, and the csv and txt of the EHT's public releases.
 
-use super::{FileError, Names, comments, number, sigma};
+use super::{
+    FileError, MOST_HOURS, MOST_WAVELENGTHS, Names, comments, number, number_within, sigma,
+};
 use crate::Complex64;
 use crate::Error;
 use crate::observation::{Basis, Measured, Observation, Row};
@@ -30,6 +32,8 @@ fn cells(line: &str) -> Vec<&str> {
 
 /// Where the eight columns are, and whether visibilities are polar.
 struct Heading {
+    /// How many there are in all.
+    count: usize,
     columns: [usize; 8],
     polar: bool,
     channel: Option<usize>,
@@ -40,9 +44,16 @@ impl Heading {
         [(COLUMNS, false), (EHT_COLUMNS, true)].into_iter().find_map(|(wanted, polar)| {
             let at = |name: &str| names.iter().position(|n| n.eq_ignore_ascii_case(name));
             let found: Option<Vec<usize>> = wanted.iter().map(|name| at(name)).collect();
-            let channel = at(CHANNEL);
-            Some(Heading { columns: found?.try_into().ok()?, polar, channel })
+            let (channel, count) = (at(CHANNEL), names.len());
+            Some(Heading { count, columns: found?.try_into().ok()?, polar, channel })
         })
+    }
+
+    /// A column that is read and has the name of another one.
+    fn twice<'a>(&self, names: &[&'a str]) -> Option<&'a str> {
+        let same = |a: &str, b: &str| a.eq_ignore_ascii_case(b);
+        let is_twice = |k: &usize| names[k + 1..].iter().any(|name| same(name, names[*k]));
+        self.columns.iter().chain(&self.channel).copied().find(is_twice).map(|k| names[k])
     }
 }
 
@@ -66,9 +77,15 @@ pub fn parse(text: &str) -> Result<Observation, Error> {
             if is_comment && comments::read(bare, &mut observation, &mut names).map_err(located)? {
                 continue;
             }
-            heading = Heading::find(&cells(bare.trim()));
-            if heading.is_some() {
-                continue;
+            let columns = cells(bare.trim());
+            heading = Heading::find(&columns);
+            if let Some(heading) = &heading {
+                match heading.twice(&columns) {
+                    Some(name) => {
+                        return Err(located(format!("column `{name}` appears twice")).into());
+                    }
+                    None => continue,
+                }
             }
             if is_comment {
                 read_facts(bare, &mut observation).map_err(located)?;
@@ -133,6 +150,9 @@ fn row(cells: &[&str], heading: &Heading, names: &mut Names) -> Result<Option<Ro
             .ok_or_else(|| format!("{} columns: column {} is missing", cells.len(), column + 1))
     };
     let value = |k: usize| number(cell(k)?, COLUMNS[k]);
+    if cells.len() > heading.count {
+        return Err(format!("{} columns, but {} names", cells.len(), heading.count));
+    }
     let stations = [names.number(cell(1)?)?, names.number(cell(2)?)?];
     if stations[0] == stations[1] {
         return Err(format!("a baseline of station {} with itself", cell(1)?));
@@ -157,7 +177,9 @@ fn row(cells: &[&str], heading: &Heading, names: &mut Names) -> Result<Option<Ro
             .parse()
             .map_err(|_| format!("channel `{}` is no channel's number", super::shortened(cell)))?,
     };
-    let row = Row::total_intensity(value(0)?, stations, [value(3)?, value(4)?], i);
+    let within = |k: usize, most: f64| number_within(cell(k)?, COLUMNS[k], most);
+    let uv = [within(3, MOST_WAVELENGTHS)?, within(4, MOST_WAVELENGTHS)?];
+    let row = Row::total_intensity(within(0, MOST_HOURS)?, stations, uv, i);
     Ok(Some(Row { channel, ..row }))
 }
 
@@ -253,6 +275,10 @@ mod tests {
         assert!(fail(&format!("{head}\n1,A,B,inf,2,3,4,5\n")).contains("u = inf"));
         assert!(fail(&format!("{head}\n1,A,B,1,2,3,4,-nan\n")).contains("no visibilities"));
         assert!(fail(&format!("{head}\n1,A,B,nan,2,3,4,5\n")).contains("u = NaN"));
+        assert!(fail(&format!("{head}\n1e7,A,B,1,2,3,4,5\n")).contains("time_utc_h = 1e7 is not"));
+        assert!(fail(&format!("{head}\n1,A,B,1,-1e300,3,4,5\n")).contains("v = -1e300 is not"));
+        assert!(fail(&format!("{head}\n1,A,B,1,2,3,4,5,6\n")).contains("9 columns, but 8 names"));
+        assert!(fail(&format!("{head},u\n1,A,B,1,2,3,4,5,6\n")).contains("line 1: column `u` app"));
     }
 
     /// As in UVFITS, a value that is no number means that there is no such datum.

@@ -7,6 +7,8 @@ use kerrlight_common::memory;
 
 /// Refuses a file that its readers would not bear.
 pub(super) fn check(document: &Document, buffers: &[Vec<u8>]) -> Result<(), MeshError> {
+    check_version(document)?;
+    check_rotations(document)?;
     check_views(document, buffers)?;
     document.accessors().try_for_each(|accessor| check_accessor(&accessor))?;
     check_types(document)?;
@@ -29,6 +31,30 @@ pub(super) fn check_positions(document: &Document) -> Result<(), MeshError> {
 fn fail(why: String) -> Result<(), MeshError> {
     Err(MeshError::Content(why))
 }
+
+fn check_version(document: &Document) -> Result<(), MeshError> {
+    let version = &document.as_json().asset.version;
+    match version.split('.').next() {
+        Some("2") => Ok(()),
+        _ => fail(format!("version {version:?} of glTF is not read: 2.0")),
+    }
+}
+
+/// Refuses rotations that would change sizes, too.
+fn check_rotations(document: &Document) -> Result<(), MeshError> {
+    let rotations = document.as_json().nodes.iter().map(|node| node.rotation);
+    for (k, rotation) in rotations.enumerate() {
+        let Some(rotation) = rotation else { continue };
+        let length = rotation.0.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
+        if !((length - 1.0).abs() <= UNIT) {
+            return fail(format!("node {k} (counted from 0): rotation of length {length}: 1"));
+        }
+    }
+    Ok(())
+}
+
+/// How far the length of a quaternion may be from 1: what rounding to a few digits leaves.
+const UNIT: f64 = 1e-2;
 
 fn check_views(document: &Document, buffers: &[Vec<u8>]) -> Result<(), MeshError> {
     for view in document.views() {

@@ -107,6 +107,9 @@ fn color(line: &Line<'_>) -> Result<[f32; 3], MeshError> {
             .fails(format!("{} {kind} is not read: three numbers are expected", line.keyword())));
     }
     let color = line.numbers_up_to(line.keyword(), 1..=3, [f64::NAN; 3])?;
+    if color[1].is_nan() != color[2].is_nan() {
+        return Err(line.fails(format!("{}: one number or three are expected", line.keyword())));
+    }
     Ok(color.map(|c| if c.is_nan() { color[0] as f32 } else { c as f32 }))
 }
 

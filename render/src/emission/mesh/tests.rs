@@ -77,6 +77,10 @@ fn exact_gltf_against_its_specification_says_why() {
         assert!(text != gltf(36), "{from}");
         MeshFile::decode(text.as_bytes(), &none).unwrap_err().to_string()
     };
+    assert!(with("2.0", "3.0").contains("version \"3.0\" of glTF is not read"));
+    let turned = |x: &str| with("\"translation\"", &format!("\"rotation\":[{x}],\"translation\""));
+    assert!(turned("0,0,0,0").contains("node 0 (counted from 0): rotation of length 0: 1"));
+    assert!(turned("0,0,2,0").contains("rotation of length 2"));
     let child = r#""mesh":0,"children":[0]"#;
     assert!(with(r#""mesh":0"#, child).contains("the child of another node or of itself"));
     let nodes = r#"{"children":[1,1]},{"mesh":0}],"meshes""#;
@@ -152,6 +156,13 @@ fn exact_textures_by_coordinates() {
 
 fn error(bytes: &[u8], beside: &[(&str, &[u8])]) -> String {
     MeshFile::decode(bytes, &files(beside)).unwrap_err().to_string()
+}
+
+#[test]
+fn exact_colours_have_one_number_or_three() {
+    let obj = b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n";
+    let said = error(obj, &[("a.mtl", b"newmtl a\nKe 1 2\n")]);
+    assert!(said.contains("Ke: one number or three are expected"), "{said}");
 }
 
 /// Continued lines, a byte order mark, Windows' ends of lines, indices from behind.

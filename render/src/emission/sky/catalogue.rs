@@ -35,6 +35,9 @@ pub enum CatalogueError {
          if there is one, color_index (or bv)"
     )]
     Column(&'static str),
+    /// Two columns tell the same.
+    #[error("the first line names two columns that tell {0}: one of them is expected")]
+    Twice(&'static str),
     /// A value is no number or out of range.
     #[error("line {line}: {column} = {value:?} is not allowed: {allowed}")]
     Value {
@@ -155,6 +158,10 @@ impl Catalogue {
         if let Some(missing) = (0..3).find(|k| places[*k].is_none()) {
             return Err(CatalogueError::Column(COLUMNS[missing][0]).into());
         }
+        let tells = |k: usize| names.iter().filter(|name| COLUMNS[k].contains(&&***name)).count();
+        if let Some(twice) = (0..COLUMNS.len()).find(|k| tells(*k) > 1) {
+            return Err(CatalogueError::Twice(COLUMNS[twice][0]).into());
+        }
         let star = |(number, line): (usize, &str)| {
             let fields = line.split(',').map(str::trim).collect();
             Line { number, fields, places }.star()
@@ -248,6 +255,8 @@ mod tests {
     fn exact_refusals_name_line_and_column() {
         let fail = |text: &str| Catalogue::decode(text.as_bytes()).unwrap_err().to_string();
         assert!(fail("lon,lat\n1,2\n").contains("no column magnitude"));
+        assert!(fail("lon,lat,ra,mag\n1,2,3,4\n").contains("two columns that tell lon"));
+        assert!(fail("lon,lat,mag,lat\n1,2,3,4\n").contains("two columns that tell lat"));
         let said = fail("lon,lat,mag\n1,2,3\n4,95,6\n");
         assert!(said.starts_with("line 3: lat = \"95\" is not allowed"), "{said}");
         assert!(fail("lon,lat,mag,bv\n1,2,3,nan\n").contains("color_index = \"nan\""));

@@ -283,6 +283,9 @@ impl<'a, 'b> Parameters<'a, 'b> {
             let Some(name) = header.text(&format!("PTYPE{k}")) else { continue };
             let name = name.trim_start_matches('_').to_owned();
             let scale = header.number(&format!("PSCAL{k}"))?.unwrap_or(1.0);
+            if scale == 0.0 {
+                return Err(header.error(&format!("PSCAL{k}"), "any number but 0"));
+            }
             let zero = header.number(&format!("PZERO{k}"))?.unwrap_or(0.0);
             named.push((name, Parameter { index: k - 1, scale, zero }));
         }

@@ -1,7 +1,7 @@
 //! Reading.
 
-use super::super::FileError;
 use super::super::fits;
+use super::super::{FileError, MOST_HOURS};
 use super::antennas::AntennaTables;
 use super::flags::{self, Flag};
 use super::frequencies;
@@ -38,8 +38,7 @@ pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
         selectors::only(&units[0], &layout, name)?;
     }
     let tables = AntennaTables::read(&units)?;
-    let reference_hz =
-        reference_frequency(header, tables.frequency_hz.unwrap_or(layout.frequency_hz))?;
+    let reference_hz = reference_frequency(header, &layout, tables.frequency_hz)?;
     let (mut channels, unknown) = frequencies::channels(&units, &layout, reference_hz)?;
     let mut frequency_hz = reference_hz;
     if let [only] = channels[..] {
@@ -102,12 +101,30 @@ fn check_memory(header: &fits::Header<'_>, layout: &Layout, bytes: usize) -> Res
     Ok(())
 }
 
-/// The frequency in Hz that channels count from.
-fn reference_frequency(header: &fits::Header<'_>, hertz: f64) -> Result<f64, FileError> {
-    if (1e6..=1e15).contains(&hertz) {
-        return Ok(hertz);
+/// The frequency in Hz that channels count from: that of the antenna table if it tells.
+fn reference_frequency(
+    header: &fits::Header<'_>,
+    layout: &Layout,
+    of_antennas: Option<f64>,
+) -> Result<f64, FileError> {
+    let named = |k: &i32| header.text(&format!("CTYPE{k}")).is_some_and(|name| name == "FREQ");
+    let fail = |card: &str, why: String| {
+        let axis = (2..=9).find(named).unwrap_or(4);
+        Err(header.error(&format!("{card}{axis}"), why))
+    };
+    let hertz = of_antennas.unwrap_or(layout.frequency_hz);
+    if !(1e6..=1e15).contains(&hertz) {
+        let why = "no frequency in [1e6, 1e15] Hz in AN table or header";
+        return fail("CRVAL", why.to_owned());
     }
-    Err(header.error("CRVAL4", "no frequency in [1e6, 1e15] Hz in AN table or header"))
+    // Writers that do not know it write 0.
+    if layout.frequency_hz != 0.0 && !(0.5..=2.0).contains(&(layout.frequency_hz / hertz)) {
+        return fail("CRVAL", format!("about the {hertz:e} Hz of the AIPS AN table"));
+    }
+    if layout.channel_width_hz.abs() > hertz {
+        return fail("CDELT", format!("less than the frequency, {hertz:e} Hz"));
+    }
+    Ok(hertz)
 }
 
 /// Lines of the history about what the file does not tell, and what was done with its times.
@@ -292,8 +309,8 @@ impl Reader<'_> {
         let value = |parameter| layout.parameter(group, parameter);
         let [date, fraction] = self.date(group);
         let time_h = ((date - day) + fraction) * 24.0;
-        if !time_h.is_finite() {
-            return Err(format!("time {time_h} h: not finite"));
+        if !(-MOST_HOURS..=MOST_HOURS).contains(&time_h) {
+            return Err(format!("{time_h:e} h after the first day: up to {MOST_HOURS:e} h"));
         }
         let positive = |x: f64| if x.is_finite() && x > 0.0 { x } else { 0.0 };
         let opacity = layout.opacity.map_or([0.0; 2], |both| both.map(|p| positive(value(p))));

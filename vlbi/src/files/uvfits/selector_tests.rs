@@ -174,6 +174,15 @@ fn exact_coordinates_and_units_of_others_are_refused() {
         assert_eq!(read_made(&with(key, value)).rows.len(), 2, "{key}");
     }
     assert!(refused(&Made { u: "UU---NCP", ..plain() }).contains("PTYPE1 = 'UU---NCP'"));
+    for (key, value) in [("CRVAL4", "1e300"), ("CRVAL4", "-1.0"), ("CDELT4", "1e30")] {
+        let text = String::from_utf8(bytes(&plain())[..2880].to_vec()).unwrap();
+        let at = text.find(&format!("{key:<8}=")).unwrap();
+        let mut file = bytes(&plain());
+        file[at..at + 80].copy_from_slice(format!("{key:<8}= {value:>20}{:50}", "").as_bytes());
+        let message = read(&file).unwrap_err().to_string();
+        assert!(message.contains(&format!("{key} = {value} is not allowed")), "{message}");
+    }
+    assert!(refused(&with("PSCAL1", "0.0")).contains("PSCAL1 = 0.0 is not allowed"));
     // Wavelengths where seconds belong.
     assert!(refused(&Made { seconds: 1e9, ..plain() }).contains("up to 10000 s"));
     let gains =
