@@ -8,7 +8,7 @@ use crate::interferometry::{ObservationFile, scene_movie};
 use crate::output;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
-use kerrlight_render::scene::shown;
+use kerrlight_common::toml_file::shown;
 use kerrlight_vlbi::noise::{
     GainErrors, ScatteringKernel, add_thermal_noise, apply_gains, scatter,
 };

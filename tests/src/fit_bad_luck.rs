@@ -90,7 +90,7 @@ fn bad_settings_are_named_with_their_line() {
         (
             "kind = \"bhnerf\"",
             "kind = \"feature-grid\"\nlevels = 0",
-            "representation: levels = 0 is not allowed: 1 to 6",
+            "representation.levels = 0 is not allowed: 1 to 6",
         ),
     ] {
         let words = changed(folder.path(), |text| text.replacen(from, to, 1));

@@ -305,7 +305,6 @@ fn exact_impossible_priors_are_refused_before_anything_is_written() {
     std::fs::write(folder.path().join("fit.toml"), settings(50)).unwrap();
     for (change, expected) in [
         ("world.inclination_deg={uniform=[50.0,20.0]}", "high"),
-        ("world={spin={uniform=[0.0,1.5]}}", "missing field `search`"),
         ("world.spin={uniform=[0.0,1.5]}", "world.spin = 1.5 is not allowed: -0.999 to 0.999"),
         ("world.position_angle_deg={isotropic=[0.0,1.0]}", "isotropic is a prior of inclinations"),
         ("world.xi={uniform=[0.5,1.0]}", "velocity = { infall = { xi, beta_r, beta_phi } }"),
