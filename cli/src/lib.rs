@@ -60,8 +60,6 @@ mod movie;
 mod observe;
 mod output;
 mod overlay;
-#[cfg(feature = "parquet")]
-mod parquet_table;
 mod paths;
 pub mod pictures;
 mod plain;

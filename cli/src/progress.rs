@@ -64,11 +64,6 @@ pub fn worlds(count: u64) -> ProgressBar {
     styled(count, "{bar:30} world {pos} of at most {len}  {msg}  {elapsed} gone, {eta} left")
 }
 
-/// A bar that counts rotations.
-pub fn rotations(count: u64) -> ProgressBar {
-    styled(count, "{bar:30} rotation {pos} of about {len}  {elapsed} gone, {eta} left")
-}
-
 /// A bar that counts draws from a posterior, and says what the present one does.
 pub fn samples(count: u64) -> ProgressBar {
     styled(count, "{bar:30} draw {pos} of {len}  {msg}  {elapsed} gone, {eta} left")

@@ -140,15 +140,6 @@ fn exact_same_bytes_after_kills_at_twenty_moments() {
     killed(&["training.steps=200"], 20);
 }
 
-/// Quasi-Newton steps remember more than parameters; the axis is learnt with them.
-#[test]
-#[ignore = "long"]
-fn exact_same_bytes_after_kills_of_quasi_newton_steps() {
-    let axis = "axis={from={start=[0.5,0.1,-0.8],rate=1e-3,last_rate=1e-4}}";
-    let set = ["training.optimiser=lbfgs", "training.batch=all", "training.steps=25", axis];
-    killed(&set, 8);
-}
-
 /// A mask that is looked at at several times, and a price that is drawn at each step.
 #[test]
 #[ignore = "long"]

@@ -131,13 +131,6 @@ fn bad_regularisers_and_optimisers_are_named() {
         let error = fail(folder.path(), &with(&words, &["-o", "run"]));
         assert!(error.contains(said), "{setting}: {error}");
     }
-    let small = small();
-    let error = fail(folder.path(), &with(&small, &["--set", "training.optimiser=lbfgs"]));
-    assert!(error.contains("training.batch = \"all\""), "{error}");
-    let bounded = ["training.optimiser=lbfgs", "training.batch=all", "representation=grid"];
-    let mut words = with(&small, &["--set", "representation.activation=linear"]);
-    bounded.iter().for_each(|change| words.extend(["--set", change]));
-    assert!(fail(folder.path(), &words).contains("does not support bounds"));
 }
 
 /// A movie in text, a row of numbers a line, with a change to one of its numbers.

@@ -66,10 +66,6 @@ fn exact_what_excludes_a_quiescent_image_is_refused() {
         (&["quiescent.smoothness=-1.0"], "quiescent.smoothness = -1"),
         (&["quiescent={upper=1.0,sparsity=0.0}"], "quiescent.smoothness"),
         (&[trained, "training.batch={pixels=9}"], "training.batch: pixels are drawn"),
-        (
-            &[trained, "training.optimiser=lbfgs", "training.batch=all"],
-            "lbfgs does not support bounds",
-        ),
         (&["truth.ring.0.radius=900.0"], "truth.ring.0: no pixel of the screen sees it"),
         (
             &[
@@ -80,7 +76,6 @@ fn exact_what_excludes_a_quiescent_image_is_refused() {
             ],
             "quiescent.smoothness and quiescent.sparsity are not allowed",
         ),
-        (&["faraday={angles=12,iterations=9}"], "faraday needs Q and U"),
     ] {
         let sets: Vec<&str> = set.iter().flat_map(|set| ["--set", *set]).collect();
         let words = [&["fit", &scene], &sets[..], &["-o", "refused"]].concat();
@@ -88,40 +83,5 @@ fn exact_what_excludes_a_quiescent_image_is_refused() {
         let said = fail(folder.path(), &words);
         assert!(said.contains(says), "{set:?}: {said}");
         assert!(!folder.path().join("refused").exists());
-    }
-}
-
-/// A polarised light curve whose position angles are turned by 35° on the way, with and without fluxes that do not move.
-#[test]
-fn exact_a_rotation_of_position_angles_is_found() {
-    let folder = tempfile::tempdir().unwrap();
-    let text = root().join("scenes/fits/orbital_polarimetry_textbook.toml");
-    let text = std::fs::read_to_string(text).unwrap();
-    let (before, rest) = text.split_once("# Worlds that are compared first").unwrap();
-    let (_, output) = rest.split_once("[output]").unwrap();
-    let turned = format!(
-        "{before}[output]{output}\n[world.polarization]\nturn_deg = 35.0\n[faraday]\nangles = 12\niterations = 100\n"
-    );
-    std::fs::write(folder.path().join("curve.toml"), turned).unwrap();
-    let set = "screen.pixels=32 representation.nodes=20 output.nodes=16 light_curve.sigma.I=0.01";
-    let set: Vec<&str> = set.split(' ').flat_map(|set| ["--set", set]).collect();
-    succeed(folder.path(), &[&["fit", "curve.toml"], &set[..], &["-o", "run"]].concat());
-    let found = results(&folder.path().join("run"));
-    let number = |key: &str| found["faraday"][key].as_f64().unwrap();
-    assert_eq!(number("truth_deg"), 35.0);
-    let (angle, sigma) = (number("angle_deg"), number("sigma_deg"));
-    assert!((angle - 35.0).abs() < 3.0 * sigma && sigma < 1.0, "{angle} {sigma}");
-    let steady = [
-        "loss.0.stokes=[\"I\",\"Q\",\"U\"]",
-        "quiescent={upper=1.0}",
-        "truth.ring=[{radius=5.0,sigma=1.0,flux_jy=0.5,q_jy=0.05,u_jy=-0.08}]",
-    ];
-    let steady: Vec<&str> = steady.iter().flat_map(|set| ["--set", *set]).collect();
-    let words = [&["fit", "curve.toml"], &set[..], &steady, &["-o", "steady"]].concat();
-    succeed(folder.path(), &words);
-    let found = results(&folder.path().join("steady"));
-    for (name, jy) in [("I", 0.5), ("Q", 0.05), ("U", -0.08)] {
-        let flux = found["quiescent"][name]["flux_jy"].as_f64().unwrap();
-        assert!((flux - jy).abs() < 0.05, "{name}: {flux}");
     }
 }

@@ -42,7 +42,6 @@ fn training(batch: BatchSize) -> Training {
         seed: 1,
         adam: Adam::default(),
         muon: None,
-        lbfgs: None,
         rate: Polynomial { from: 1e-3, to: 1e-5, steps: 400, power: 1.0 },
         axis_rate: None,
         ramp: 0,

@@ -3,14 +3,14 @@
 //!
 //! `cargo run --release -p kerrlight-tomo --example linear_grid -- 1`
 //!
-//! Arguments, all optional: scene (1, 4 or 8); seconds; `lbfgs`, `cg` or `fista`; weight of the smoothness (0: none);
+//! Arguments, all optional: scene (1, 4 or 8); seconds; weight of the smoothness (0: none);
 //! iterations a round; rounds; coarse nodes; coarse stride; coarse iterations.
 
 mod paper;
 
 use kerrlight_render::dynamics::Axis;
 use kerrlight_tomo::fit::linear::{
-    Change, Coarse, LinearProblem, LinearProgress, LinearSettings, Method, Prior, Voxels, Weighted,
+    Change, Coarse, LinearProblem, LinearProgress, LinearSettings, Prior, Voxels, Weighted,
 };
 use kerrlight_tomo::fit::{ImageTerm, Regulariser, Sightlines};
 use kerrlight_tomo::representation::Degree;
@@ -62,14 +62,8 @@ impl Arguments {
         let mut words = std::env::args().skip(1);
         let scene = words.next().unwrap_or_else(|| "1".to_owned());
         let seconds = words.next().map_or(Ok(10.0), |word| word.parse())?;
-        let method = match words.next().as_deref() {
-            None | Some("lbfgs") => Method::QuasiNewton,
-            Some("cg") => Method::ConjugateGradients,
-            Some("fista") => Method::Fista,
-            Some(other) => return Err(format!("{other}: lbfgs, cg or fista").into()),
-        };
         let weight = words.next().map_or(Ok(0.0), |word| word.parse())?;
-        let mut settings = LinearSettings { method, ..LinearSettings::default() };
+        let mut settings = LinearSettings::default();
         settings.iterations = words.next().map_or(Ok(settings.iterations), |word| word.parse())?;
         settings.rounds = words.next().map_or(Ok(settings.rounds), |word| word.parse())?;
         let mut coarse = Coarse { nodes: 32, stride: 8, iterations: 20 };

@@ -104,7 +104,6 @@ fn training(words: &Words, rate: f64) -> Result<Training, String> {
         seed: words.get("seed", 1)?,
         adam: Adam::default(),
         muon: None,
-        lbfgs: None,
         rate: Polynomial { from, to: from * words.get("last", 0.01)?, steps, power: 1.0 },
         axis_rate: None,
         ramp: 0,

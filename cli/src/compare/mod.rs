@@ -45,8 +45,6 @@ use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use summary::Summary;
-#[cfg(feature = "parquet")]
-pub use summary::Values;
 
 /// Arguments of `kerrlight compare`.
 #[derive(Debug, Args)]

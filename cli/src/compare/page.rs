@@ -9,22 +9,17 @@ use super::{changes, figures, quick, ran, tables, verdicts};
 use crate::output::Output;
 use crate::plain;
 use crate::report::{Figure, Part, Report, Table};
-#[cfg(not(feature = "parquet"))]
-use anyhow::Context;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-
-/// Results as columns, for programs that read some of them out of many rows.
-const PARQUET: &str = "results.parquet";
 
 /// Most failures that the head of the page tells.
 const TOLD: usize = 20;
 
 /// Where the results are, beside the pictures.
 pub fn files(folder: &Path) -> Vec<PathBuf> {
-    let always = ["report.html", "results.json", "results.csv", "tables.md"];
-    let on_request = cfg!(feature = "parquet").then_some(PARQUET);
-    always.into_iter().chain(on_request).map(|name| folder.join(name)).collect()
+    ["report.html", "results.json", "results.csv", "tables.md"]
+        .map(|name| folder.join(name))
+        .to_vec()
 }
 
 /// All that a page is made of.
@@ -77,7 +72,6 @@ impl Page<'_> {
         let Page { experiment, choice, summary } = self;
         let file = |name: &str| Output::new(&folder.join(name), "");
         file("results.csv")?.write(&summary.csv()?)?;
-        self.parquet(folder)?;
         let shown = self.tables(before, folder)?;
         let text: String = shown.iter().map(tables::markdown).collect();
         let text = [self.heading(), text].concat();
@@ -102,26 +96,6 @@ impl Page<'_> {
         };
         report.write(&file("report.html")?)?;
         Ok(text)
-    }
-
-    /// Writes [`PARQUET`].
-    #[cfg(feature = "parquet")]
-    fn parquet(&self, folder: &Path) -> anyhow::Result<()> {
-        let bytes = crate::parquet_table::encode(&self.summary.columns())?;
-        Output::new(&folder.join(PARQUET), "")?.write(&bytes)
-    }
-
-    /// Removes [`PARQUET`]: one that a program with the feature has left would be of other results.
-    #[cfg(not(feature = "parquet"))]
-    #[expect(clippy::unused_self, reason = "as with the feature")]
-    fn parquet(&self, folder: &Path) -> anyhow::Result<()> {
-        let path = folder.join(PARQUET);
-        match std::fs::remove_file(&path) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                Err(error).with_context(|| format!("cannot remove {}", path.display()))
-            }
-            _ => Ok(()),
-        }
     }
 
     /// What ran, what the experiment asks for, and what has changed.

@@ -24,17 +24,6 @@ pub struct Summary<'a> {
 /// Which cases are at the same levels of some factors, by those levels.
 type Groups = HashMap<Vec<u32>, Vec<usize>>;
 
-/// A column of the table of results.
-#[cfg(feature = "parquet")]
-pub enum Values {
-    /// Words.
-    Text(Vec<String>),
-    /// Whole numbers.
-    Whole(Vec<i64>),
-    /// Numbers, of which some may be missing.
-    Number(Vec<Option<f64>>),
-}
-
 /// The best and the worst case by one result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extremes {
@@ -239,31 +228,6 @@ impl<'a> Summary<'a> {
             writer.write_record(levels.chain(of_case).chain(numbers))?;
         }
         Ok(writer.into_inner()?)
-    }
-
-    /// The same column by column.
-    #[cfg(feature = "parquet")]
-    pub fn columns(&self) -> Vec<(String, Values)> {
-        let first = self.all.first().map(|(case, _)| case.levels());
-        let factors = first.into_iter().flatten().map(|(factor, _)| factor);
-        let all = || self.all.iter();
-        let levels = factors.map(|factor| {
-            let level = |case: &Case| case.level(factor).unwrap_or_default().to_owned();
-            (factor.to_owned(), Values::Text(all().map(|(case, _)| level(case)).collect()))
-        });
-        let number = |key: &str| {
-            let of = |line| done(line).and_then(|(_, results)| results.get(key));
-            Values::Number(all().map(of).collect())
-        };
-        let seeds = all().map(|(case, _)| case.seed.cast_signed()).collect();
-        let states = all().map(|(_, status)| word(status).to_owned()).collect();
-        let tail = [
-            ("seed".to_owned(), Values::Whole(seeds)),
-            ("status".to_owned(), Values::Text(states)),
-            ("folder".to_owned(), Values::Text(all().map(|(case, _)| folder(case)).collect())),
-        ];
-        let numbers = RESULTS.iter().map(|(key, ..)| ((*key).to_owned(), number(key)));
-        levels.chain(tail).chain(numbers).collect()
     }
 }
 

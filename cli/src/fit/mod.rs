@@ -20,7 +20,6 @@ mod leakage;
 mod linear;
 pub mod posterior;
 mod results;
-mod rotation_search;
 mod run;
 mod static_image;
 mod work;

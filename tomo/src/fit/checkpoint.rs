@@ -3,7 +3,7 @@
 use super::occupancy::Occupancy;
 use super::state::{Progress, State};
 use crate::Error;
-use crate::optimise::{AdamState, LbfgsState};
+use crate::optimise::AdamState;
 use kerrlight_common::toml_file;
 use kerrlight_render::dynamics::Axis;
 use safetensors::tensor::{Dtype, SafeTensorError, TensorView};
@@ -146,9 +146,6 @@ fn push(of: &str, progress: &Progress<f32>, tensors: &mut Vec<Tensor>) {
     if let Some(mask) = &progress.occupancy {
         single("brightness", &mask.brightness);
     }
-    if let Some(memory) = &progress.lbfgs {
-        single("lbfgs.numbers", &memory.numbers);
-    }
     let mut double = |name: &str, numbers: &[f64]| {
         let bytes = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
         tensors.push((format!("{of}.{name}"), Dtype::F64, bytes));
@@ -158,10 +155,6 @@ fn push(of: &str, progress: &Progress<f32>, tensors: &mut Vec<Tensor>) {
     double("axis.second", &progress.axis_adam.second);
     double("adam.steps", &[progress.adam.steps as f64, progress.axis_adam.steps as f64]);
     double("caution", &[progress.caution, progress.loss]);
-    if let Some(LbfgsState { pairs, value, .. }) = &progress.lbfgs {
-        // A value that is not known yet is none.
-        double("lbfgs.pairs", &[*pairs as f64, value.unwrap_or(f64::NAN)]);
-    }
 }
 
 /// The header of a checkpoint.
@@ -210,14 +203,6 @@ fn progress(
         first: single("adam.first", start.adam.first.len())?,
         second: single("adam.second", start.adam.second.len())?,
     };
-    let lbfgs = |start: &LbfgsState<f32>| {
-        let pairs = double("lbfgs.pairs", 2)?;
-        Ok::<_, CheckpointError>(LbfgsState {
-            numbers: single("lbfgs.numbers", start.numbers.len())?,
-            pairs: pairs[0] as u64,
-            value: Some(pairs[1]).filter(|value| !value.is_nan()),
-        })
-    };
     let axis_adam = AdamState {
         steps: steps[1] as u64,
         first: double("axis.first", 3)?,
@@ -233,7 +218,6 @@ fn progress(
         step,
         parameters: single("parameters", count)?,
         adam,
-        lbfgs: start.lbfgs.as_ref().map(lbfgs).transpose()?,
         axis: Axis::exact([axis[0], axis[1], axis[2]])
             .map_err(|error| CheckpointError::Header(error.to_string()))?,
         axis_adam,

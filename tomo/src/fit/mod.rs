@@ -58,7 +58,6 @@ pub mod journal;
 mod known_field;
 pub mod linear;
 mod movie_loss;
-mod newton;
 mod objective;
 mod occupancy;
 mod penalties;

@@ -3,7 +3,7 @@
 use super::objective::Loss;
 use super::occupancy::Occupancy;
 use super::training::{OccupancyPlan, Training};
-use crate::optimise::{AdamState, LbfgsState};
+use crate::optimise::AdamState;
 use crate::representation::Representation;
 use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::Axis;
@@ -18,10 +18,8 @@ pub struct Progress<T> {
     pub step: u64,
     /// Parameters of the representation.
     pub parameters: Vec<T>,
-    /// What Adam remembers of them; nothing, with quasi-Newton steps.
+    /// What Adam remembers of them.
     pub adam: AdamState<T>,
-    /// What quasi-Newton steps remember of them, and of the axis behind them where it is learnt.
-    pub lbfgs: Option<LbfgsState<T>>,
     /// The axis.
     pub axis: Axis,
     /// What Adam remembers of it.
@@ -59,8 +57,6 @@ pub enum Outcome {
         /// The factor on the rates from there.
         caution: f64,
     },
-    /// No quasi-Newton step makes the loss smaller: it has come to a minimum within rounding.
-    Converged,
 }
 
 /// Why a fit cannot go on.
@@ -84,14 +80,10 @@ impl<T: Float> State<T> {
         let mut parameters = vec![T::zero(); count];
         representation.initialise(training.seed, &mut parameters);
         let mask = |plan: OccupancyPlan| Occupancy::new(plan.settings, training.region);
-        let learnt = training.learns_axis(representation);
-        let numbers = count + if learnt { 3 } else { 0 };
-        let lbfgs = training.lbfgs.map(|rule| LbfgsState::new(numbers, rule.memory));
         let now = Progress {
             step: 0,
             parameters,
-            adam: AdamState::new(if lbfgs.is_some() { 0 } else { count }),
-            lbfgs,
+            adam: AdamState::new(count),
             axis,
             axis_adam: AdamState::new(3),
             occupancy: training.occupancy.map(mask),

@@ -5,7 +5,7 @@ use super::objective::{Gradients, Loss};
 use super::occupancy::Occupancy;
 use super::penalties::Draw;
 use super::selection::Selection;
-use super::state::{Diverged, Outcome, Progress, State, step_back};
+use super::state::{Outcome, Progress, State, step_back};
 use super::trainer::Trainer;
 use super::training::{BatchSize, Training};
 use crate::Error;
@@ -37,11 +37,6 @@ impl<T: Float> Trainer<'_, T> {
         }
         let now = &mut state.now;
         self.refresh(now);
-        if let Some(rule) = self.training.lbfgs {
-            let (step, setbacks) = (now.step, state.setbacks);
-            let diverged = |loss| Diverged { loss, step, setbacks };
-            return Ok(self.quasi_newton(rule, now).map_err(diverged)?);
-        }
         let mut of_axis = [0.0; 3];
         let (step, occupancy) = (now.step, self.mask(now));
         let place = Place { parameters: &now.parameters, axis: now.axis, occupancy, step };
@@ -68,8 +63,6 @@ impl<T: Float> Trainer<'_, T> {
             let (representation, parameters) = (self.representation, &now.parameters);
             let times = self.training.change.map_or(Vec::new(), |change| change.knots.times());
             mask.refresh(representation, parameters, (seed, &times), self.buffers.workspace());
-            // The loss is another one now.
-            now.lbfgs.iter_mut().for_each(|memory| memory.value = None);
         }
     }
 

@@ -7,7 +7,6 @@ mod falling_volume;
 mod leakage;
 mod orbital;
 mod penalised;
-mod quasi_newton;
 mod quiescent;
 mod stokes;
 mod training;

@@ -4,7 +4,7 @@ use super::change_price::ChangePrice;
 use super::occupancy::OccupancySettings;
 use super::penalties::Penalties;
 use super::sightlines::Region;
-use crate::optimise::{Adam, Lbfgs, Muon, Polynomial};
+use crate::optimise::{Adam, Muon, Polynomial};
 use crate::representation::Representation;
 use kerrlight_common::simd::Float;
 use schemars::JsonSchema;
@@ -42,9 +42,6 @@ pub struct Training {
     pub adam: Adam,
     /// Another rule for the weight matrices of networks.
     pub muon: Option<Muon>,
-    /// Quasi-Newton steps instead of Adam's, for small problems: they have no rates, need [`BatchSize::All`], and their
-    /// draws are those of step 0, so that the loss is the same function at every step.
-    pub lbfgs: Option<Lbfgs>,
     /// First learning rate of Adam and Muon.
     pub rate: Polynomial,
     /// Rates of the axis; without them it is held.

@@ -4,7 +4,7 @@ use super::problem::Problem;
 use crate::fit::FluxDatum;
 use crate::fit::scan::{AxisLoss, AxisScan};
 use crate::fit::settings::{FitFile, UnknownWorld};
-use crate::fit::setup::{self, BandScan, FoundWorld, Held, Rotation};
+use crate::fit::setup::{self, BandScan, FoundWorld, Held};
 use crate::fit::world::World;
 use kerrlight_render::dynamics::Axis;
 
@@ -16,8 +16,6 @@ pub enum Stage {
     World,
     /// The same, by the light curve of a flare in an orbital band.
     Band,
-    /// A rotation of all position angles.
-    Rotation,
     /// A weight, by data that are held out.
     Weight,
 }
@@ -30,8 +28,6 @@ pub enum Found<'a> {
     World(&'a Problem, &'a UnknownWorld, &'a FoundWorld),
     /// Worlds and bands.
     Band(&'a Problem, &'a BandScan),
-    /// A rotation.
-    Rotation(&'a Problem, &'a Rotation),
     /// Values of a weight.
     Weight(&'a FitFile, &'a [Held]),
 }
@@ -44,8 +40,6 @@ pub enum Searched {
     World(Box<FoundWorld>),
     /// Worlds and bands, with their probabilities.
     Band(BandScan),
-    /// A rotation.
-    Rotation(Rotation),
 }
 
 /// What of it the rest of the fit goes on with.
@@ -65,8 +59,6 @@ pub enum Choice {
         /// What the background is expected to be, Jy with its standard deviation.
         background: Option<Vec<FluxDatum>>,
     },
-    /// Degrees.
-    Rotation(f64),
     /// Dimensionless, in the unit of its setting.
     Weight(f64),
 }
@@ -85,7 +77,6 @@ impl Found<'_> {
                     background: scan.background.clone(),
                 }
             }
-            Found::Rotation(_, rotation) => Choice::Rotation(rotation.angle_deg),
             Found::Weight(_, held) => {
                 Choice::Weight(setup::best_held(held).map_or(f64::NAN, |best| best.value))
             }

@@ -27,8 +27,6 @@ pub enum At<'a> {
     },
     /// Worlds that were weighed by the light curve of a band.
     Band(usize),
-    /// Rotations of position angles that were compared, of about so many.
-    Rotation(usize, usize),
     /// A value, and a part of the data that is held out, from 0.
     HeldOut(usize, usize),
     /// Axes that were compared, of about so many.

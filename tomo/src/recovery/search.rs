@@ -6,7 +6,7 @@ use super::{Problem, Stopped};
 use crate::Error;
 use crate::fit::Motion;
 use crate::fit::settings::{FitFile, Kind, UnknownWorld};
-use crate::fit::setup::{self, BandScan, FoundWorld, HeldData, Instrument, Measured, Rotation};
+use crate::fit::setup::{self, BandScan, FoundWorld, HeldData, Instrument, Measured};
 use crate::fit::world::{Parameter, World};
 use kerrlight_render::dynamics::{Axis, Velocity};
 use std::sync::{Mutex, PoisonError};
@@ -59,15 +59,6 @@ impl Placed {
                 let measured = background.as_ref().map(|values| measured.before(values.clone()));
                 Self { file, instrument, motion, measured }
             }
-            Choice::Rotation(angle) => {
-                let mut file = settings.clone();
-                if let Some(law) = &mut file.polarization {
-                    law.turn_deg += angle;
-                }
-                let motion = setup::motion(settings, measured.times.clone())?;
-                let instrument = Instrument::new(&file)?;
-                Self { file, instrument, motion, measured: None }
-            }
             Choice::Weight(_) => return Ok(None),
         };
         Ok(Some(placed))
@@ -81,10 +72,9 @@ pub(super) fn placed(
 ) -> Result<Option<(Placed, Option<Searched>)>, Error> {
     let settings = &problem.settings;
     let unknown = settings.unknown_world()?;
-    let stage = match (&unknown, &settings.band, &settings.faraday) {
-        (Some(_), ..) => Stage::World,
-        (_, Some(_), _) => Stage::Band,
-        (.., Some(_)) => Stage::Rotation,
+    let stage = match (&unknown, &settings.band) {
+        (Some(_), _) => Stage::World,
+        (None, Some(_)) => Stage::Band,
         _ => return Ok(None),
     };
     let (choice, searched) = match (progress.chosen(stage)?, stage, &unknown) {
@@ -94,13 +84,9 @@ pub(super) fn placed(
             let choice = progress.keep(&Found::World(problem, unknown, &found))?;
             (choice, Some(Searched::World(Box::new(found))))
         }
-        (None, Stage::Band, _) => {
+        _ => {
             let found = band(problem, progress)?;
             (progress.keep(&Found::Band(problem, &found))?, Some(Searched::Band(found)))
-        }
-        _ => {
-            let found = rotation(problem, progress)?;
-            (progress.keep(&Found::Rotation(problem, &found))?, Some(Searched::Rotation(found)))
         }
     };
     Ok(Placed::of(problem, &choice)?.map(|placed| (placed, searched)))
@@ -131,22 +117,6 @@ fn band(problem: &Problem, progress: &mut dyn Progress) -> Result<BandScan, Erro
     let scan = setup::scan_band(settings, measured, band, &*journal, &watch)
         .map_err(|error| error.while_in("band"))?;
     Ok(scan.ok_or(Stopped::Kept)?)
-}
-
-fn rotation(problem: &Problem, progress: &mut dyn Progress) -> Result<Rotation, Error> {
-    let Problem { settings, instrument, measured, .. } = problem;
-    let Some(faraday) = &settings.faraday else {
-        return Err(Stopped::Lost("rotations were compared").into());
-    };
-    let motion = setup::motion(settings, measured.times.clone())?;
-    let mut objective = problem.objective(instrument, &motion, measured)?;
-    let (axis, _) = setup::axis(settings)?;
-    objective.model.weigh(axis);
-    let mut watch = |done: usize, of: usize| progress.goes_on(At::Rotation(done, of));
-    let seen = (axis, &instrument.seen);
-    let found = setup::find_rotation((settings, faraday), &objective, seen, &mut watch)
-        .map_err(|error| error.while_in("faraday"))?;
-    Ok(found.ok_or(Stopped::Lost("rotations were compared"))?)
 }
 
 /// The settings with the weight that held-out data choose.

@@ -5,7 +5,7 @@ use super::{Fit, Stopped};
 use crate::Error;
 use crate::fit::linear::LinearError;
 use crate::fit::settings::FitFile;
-use crate::fit::{Outcome, State, Trainer};
+use crate::fit::{State, Trainer};
 use std::time::Instant;
 
 impl Fit<'_, '_> {
@@ -29,18 +29,14 @@ impl Fit<'_, '_> {
             };
             let step = state.now.step;
             let stop = !progress.goes_on(At::Step(step));
-            let converged = outcome == Outcome::Converged;
             progress.stepped(self.now(state), outcome)?;
             let late = saved.elapsed().as_secs_f64() > self.file.training.checkpoint_seconds;
-            if stop || late || converged || step == steps {
+            if stop || late || step == steps {
                 progress.save(state)?;
                 saved = Instant::now();
             }
             if stop {
                 return Err(Stopped::After(step).into());
-            }
-            if converged {
-                break;
             }
         }
         Ok(())

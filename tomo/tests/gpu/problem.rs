@@ -188,7 +188,6 @@ pub fn training(batch: BatchSize, masked: bool) -> Training {
         seed: 11,
         adam: Adam::default(),
         muon: None,
-        lbfgs: None,
         rate,
         axis_rate: None,
         ramp: 3,

@@ -11,7 +11,7 @@ use kerrlight_tomo::fit::linear::LinearProgress;
 use kerrlight_tomo::fit::settings::{FitFile, Kind, Start};
 use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
 use kerrlight_tomo::fit::verdict::Tested;
-use kerrlight_tomo::fit::{Motion, Objective, Outcome, State, Trainer};
+use kerrlight_tomo::fit::{Motion, Objective, State, Trainer};
 use kerrlight_tomo::representation::Registry;
 use std::ops::ControlFlow;
 
@@ -148,7 +148,6 @@ fn learn(
             return Ok(false);
         }
         match trainer.step(state) {
-            Ok(Outcome::Converged) => break,
             Ok(_) => told(&format!("step {}, loss {:.4e}", state.now.step, state.now.loss)),
             Err(error) => bail!("a draw diverged at step {}: {error}", state.now.step),
         }

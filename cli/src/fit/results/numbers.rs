@@ -1,9 +1,7 @@
 //! What was found, in numbers.
 
 use super::{Estimate, Found, bounds, quadrature, verdict};
-use crate::fit::{
-    band_search, closures, held_out, linear, rotation_search, world_results, world_search,
-};
+use crate::fit::{band_search, closures, held_out, linear, world_results, world_search};
 use crate::report;
 use crate::session;
 use crate::usage::usage;
@@ -136,9 +134,6 @@ impl Estimate<'_> {
         if let Some(band) = band_search::found(self.folder)? {
             band_search::numbers(&band).into_iter().for_each(|(key, value)| results[key] = value);
             results["band"] = band;
-        }
-        if let Some(faraday) = rotation_search::found(self.folder)? {
-            results["faraday"] = faraday;
         }
         Ok(())
     }

@@ -12,8 +12,7 @@ use crate::fit::SETTINGS;
 use crate::fit::curves::{loss_plot, psnr_plot};
 use crate::fit::folder::Folder;
 use crate::fit::{
-    band_plots, band_search, band_words, held_out, labels, rotation_search, world_results,
-    world_scan,
+    band_plots, band_search, band_words, held_out, labels, world_results, world_scan,
 };
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
@@ -36,7 +35,6 @@ impl Estimate<'_> {
         let mut plots: Vec<LinePlot> = loss_plot(&lines).into_iter().collect();
         plots.extend(psnr_plot(&lines));
         plots.extend(held_out::plot(&results["held_out"]));
-        plots.extend(rotation_search::plot(&results["faraday"]));
         plots.extend(self.light_curves(&found.seen)?);
         if let Some(band) = band_search::found(self.folder)? {
             plots.extend(band_plots::of_runs(&[("these data".to_owned(), band)], ""));
@@ -190,7 +188,6 @@ impl Estimate<'_> {
         if results["band"].is_object() {
             lines.extend(band_search::sentences(&results["band"]));
         }
-        lines.extend(rotation_search::sentences(&results["faraday"]));
         lines.extend(held_out::sentence(&results["held_out"]));
         lines.extend(quadrature::sentence(results));
         lines.extend(bounds::sentences(results));

@@ -4,8 +4,7 @@ use super::folder::{self, Folder};
 use crate::devices::FitDevice;
 use crate::fit::journal::Journal;
 use crate::fit::{
-    axis_scan, band_search, closures, delegate, held_out, labels, leakage, linear, rotation_search,
-    world_search,
+    axis_scan, band_search, closures, delegate, held_out, labels, leakage, linear, world_search,
 };
 use crate::interrupt::Keeper;
 use crate::plain;
@@ -42,7 +41,6 @@ fn name(at: At<'_>) -> &'static str {
     match at {
         At::World { .. } => "world",
         At::Band(_) => "band",
-        At::Rotation(..) => "rotation",
         At::HeldOut(..) => "held out",
         At::Axis(..) => "axis",
         At::Linear(_) => "linear",
@@ -80,9 +78,6 @@ impl<'a> Kept<'a> {
             At::Linear(_) => Keeper::brief(
                 "stopped while the linear grid was being solved: nothing is kept of that",
             ),
-            At::Rotation(..) => {
-                Keeper::brief("stopped while rotations were compared: nothing is kept of that")
-            }
             _ => Keeper::brief(self.folder.stopped()),
         }
     }
@@ -97,7 +92,6 @@ impl<'a> Kept<'a> {
                 });
                 progress::worlds(count as u64)
             }
-            At::Rotation(_, of) => progress::rotations(of as u64),
             At::HeldOut(..) => {
                 let held = settings.held_out.as_ref();
                 progress::held_out(held.map_or(0, |held| held.values.len() * held.folds) as u64)
@@ -117,7 +111,7 @@ impl<'a> Kept<'a> {
                 bar.set_message(format!("search {} of {of}, least chi2/2 {least:.5e}", search + 1));
             }
             At::Band(done) => bar.set_position(done as u64),
-            At::Rotation(done, of) | At::Axis(done, of) => {
+            At::Axis(done, of) => {
                 bar.set_length(of as u64);
                 bar.set_position(done as u64);
             }
@@ -214,10 +208,6 @@ impl<'a> Kept<'a> {
                 band_search::write(folder, problem, scan)?;
                 band_search::chosen(folder)
             }
-            Found::Rotation(problem, rotation) => {
-                rotation_search::write(folder, problem, rotation)?;
-                rotation_search::chosen(folder)
-            }
             Found::Weight(file, held) => {
                 held_out::write(folder, file, held)?;
                 held_out::chosen(folder)
@@ -256,7 +246,6 @@ impl Progress for Kept<'_> {
         let found = match stage {
             Stage::World => world_search::chosen(folder, &self.problem.settings),
             Stage::Band => band_search::chosen(folder),
-            Stage::Rotation => rotation_search::chosen(folder),
             Stage::Weight => held_out::chosen(folder),
             _ => Ok(None),
         };

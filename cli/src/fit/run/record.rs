@@ -29,11 +29,6 @@ impl Kept<'_> {
                 progress::line(bar, &format!("the loss rose to {loss:e}: {back}"));
                 json!({"step": step, "diverged_loss": loss.to_string(), "caution": caution})
             }
-            Outcome::Converged => {
-                let end = format!("converged at step {step}: no further decrease of the loss");
-                progress::line(bar, &end);
-                json!({"step": step, "converged": true, "loss": now.state.now.loss})
-            }
         };
         self.folder.log(&line)
     }

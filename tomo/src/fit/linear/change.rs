@@ -76,11 +76,6 @@ impl Change {
         within.is_none_or(|region| higher(region).holds(position))
     }
 
-    /// Whether the penalty is linear, or none.
-    pub(super) fn is_quadratic(&self) -> bool {
-        !self.is_any() || self.is_born() || self.weight == 0.0
-    }
-
     /// What penalties on the field of each knot are multiplied by.
     pub(super) fn share(&self) -> f64 {
         if self.is_born() { 1.0 } else { 1.0 / self.knots.count as f64 }

@@ -1,27 +1,11 @@
 //! Minimisation over a box.
 //!
-//! [`Method::QuasiNewton`]: L-BFGS steps of the numbers that are free to move, projected onto the box
-//! (Bertsekas 1982). [`Method::ConjugateGradients`]: conjugate gradients on the free numbers, with
-//! proportioning where those on the boundary want to leave it (Dostál & Schöberl 2005, MPRGP), and a projected
-//! step where they would leave the box. [`Method::Fista`]: accelerated projected gradients (Beck & Teboulle 2009) with
-//! O'Donoghue & Candès's (2015) restart.
+//! L-BFGS steps of the numbers that are free to move, projected onto the box (Bertsekas 1982).
 
 use super::quasi_newton::Pairs;
 use super::scaled::{Scaled, add, dot};
 use core::ops::ControlFlow;
 use std::collections::VecDeque;
-
-/// How the box-constrained problem is solved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Method {
-    /// For any convex and smooth function.
-    QuasiNewton,
-    /// For quadratic functions.
-    ConjugateGradients,
-    /// For any convex and smooth one.
-    Fista,
-}
 
 /// Why iterations ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,9 +51,6 @@ impl Lately {
 /// Told the value and the numbers after each iteration.
 pub(super) type Each<'a> = dyn FnMut(f64, &[f64]) -> ControlFlow<()> + 'a;
 
-/// Steps between gradients that are computed anew.
-const ANEW: usize = 40;
-
 /// Where a descent ended.
 pub(super) struct Descended {
     pub x: Vec<f64>,
@@ -100,12 +81,8 @@ impl<'a, 'b> Descent<'a, 'b> {
         Self { problem, each, y, gradient, value }
     }
 
-    pub fn run(mut self, method: Method, stop: Stop) -> Descended {
-        let ending = match method {
-            Method::QuasiNewton => self.quasi_newton(stop),
-            Method::ConjugateGradients => self.conjugate(stop),
-            Method::Fista => self.accelerated(stop),
-        };
+    pub fn run(mut self, stop: Stop) -> Descended {
+        let ending = self.steps(stop);
         Descended { x: self.problem.to(&self.y), value: self.value, ending }
     }
 
@@ -123,20 +100,6 @@ impl<'a, 'b> Descent<'a, 'b> {
         Parts { free, leaving }
     }
 
-    /// The longest step against a direction that stays in the box.
-    fn longest_step(&self, p: &[f64]) -> f64 {
-        let of = |(k, (y, p)): (usize, (&f64, &f64))| {
-            if *p > 0.0 {
-                y / p
-            } else if *p < 0.0 {
-                (y - self.problem.upper(k)) / p
-            } else {
-                f64::INFINITY
-            }
-        };
-        self.y.iter().zip(p).enumerate().map(of).fold(f64::INFINITY, f64::min)
-    }
-
     fn tell(&mut self) -> ControlFlow<()> {
         let x = self.problem.to(&self.y);
         (self.each)(self.value, &x)
@@ -146,7 +109,7 @@ impl<'a, 'b> Descent<'a, 'b> {
         self.value = self.problem.value_and_gradient(&self.y, &mut self.gradient);
     }
 
-    fn quasi_newton(&mut self, stop: Stop) -> Ending {
+    fn steps(&mut self, stop: Stop) -> Ending {
         let (mut pairs, mut lately) = (Pairs::default(), Lately(VecDeque::new()));
         let enough = stop.tolerance * self.violation();
         for _ in 0..stop.iterations {
@@ -203,55 +166,6 @@ impl<'a, 'b> Descent<'a, 'b> {
         if step.is_finite() && step > 0.0 { step } else { reach }
     }
 
-    fn conjugate(&mut self, stop: Stop) -> Ending {
-        let mut parts = self.parts();
-        let size =
-            |parts: &Parts| dot(&parts.free, &parts.free) + dot(&parts.leaving, &parts.leaving);
-        let enough = size(&parts) * stop.tolerance * stop.tolerance;
-        let (mut p, mut product) = (parts.free.clone(), Vec::new());
-        for iteration in 0..stop.iterations {
-            if size(&parts) <= enough {
-                return Ending::Converged;
-            }
-            if iteration % ANEW == ANEW - 1 {
-                self.look();
-                parts = self.parts();
-                p.clone_from(&parts.free);
-            }
-            let proportional = dot(&parts.leaving, &parts.leaving) <= dot(&parts.free, &parts.free);
-            let direction = if proportional { &p } else { &parts.leaving };
-            self.problem.curvature(direction, &mut product);
-            let (slope, bend) = (dot(&self.gradient, direction), dot(direction, &product));
-            if !(slope > 0.0 && bend > 0.0) {
-                return Ending::Rounding;
-            }
-            let step = slope / bend;
-            if step <= self.longest_step(direction) {
-                add(&mut self.y, -step, direction);
-                add(&mut self.gradient, -step, &product);
-                self.value -= 0.5 * step * slope;
-                parts = self.parts();
-                if proportional {
-                    let gamma = dot(&parts.free, &product) / bend;
-                    p.iter_mut().zip(&parts.free).for_each(|(p, free)| *p = free - gamma * *p);
-                } else {
-                    p.clone_from(&parts.free);
-                }
-            } else {
-                let direction = direction.clone();
-                if !self.project(step, &direction) && !self.project(step, &parts.free) {
-                    return Ending::Rounding;
-                }
-                parts = self.parts();
-                p.clone_from(&parts.free);
-            }
-            if self.tell().is_break() {
-                return Ending::Cancelled;
-            }
-        }
-        Ending::Exhausted
-    }
-
     /// A step against the direction and back into the box, shortened until the value falls.
     fn project(&mut self, step: f64, direction: &[f64]) -> bool {
         let (from, before, gradient) = (self.y.clone(), self.value, self.gradient.clone());
@@ -267,75 +181,6 @@ impl<'a, 'b> Descent<'a, 'b> {
             step *= 0.25;
         }
         (self.y, self.value, self.gradient) = (from, before, gradient);
-        false
-    }
-
-    /// The largest second derivative, from steps of gradients.
-    fn steepness(&mut self) -> f64 {
-        let (y, mut other) = (self.y.clone(), Vec::new());
-        let norm = |x: &[f64]| dot(x, x).sqrt();
-        let mut direction = self.gradient.clone();
-        let mut largest = 0.0f64;
-        for _ in 0..8 {
-            let length = norm(&direction);
-            let reach = 1e-2 * norm(&y).max(1.0) / length.max(f64::MIN_POSITIVE);
-            let mut moved = y.clone();
-            add(&mut moved, reach, &direction);
-            self.problem.value_and_gradient(&moved, &mut other);
-            add(&mut other, -1.0, &self.gradient);
-            largest = largest.max(norm(&other) / (reach * length));
-            direction.clone_from(&other);
-        }
-        largest
-    }
-
-    fn accelerated(&mut self, stop: Stop) -> Ending {
-        let mut steepness = self.steepness();
-        let enough = stop.tolerance * self.violation();
-        let (mut z, mut momentum) = (self.y.clone(), 1.0f64);
-        for _ in 0..stop.iterations {
-            let before = self.y.clone();
-            if !self.from(&z, &mut steepness) {
-                return Ending::Rounding;
-            }
-            let moved: Vec<f64> = self.y.iter().zip(&before).map(|(a, b)| a - b).collect();
-            let back = z.iter().zip(&self.y).map(|(z, y)| z - y).zip(&moved).map(|(a, b)| a * b);
-            let uphill = back.sum::<f64>() > 0.0;
-            let grown = 0.5 * (1.0 + (1.0 + 4.0 * momentum * momentum).sqrt());
-            let push = if uphill { 0.0 } else { (momentum - 1.0) / grown };
-            momentum = if uphill { 1.0 } else { grown };
-            z.clone_from(&self.y);
-            add(&mut z, push, &moved);
-            self.problem.project(&mut z);
-            if self.violation() <= enough {
-                return Ending::Converged;
-            }
-            if self.tell().is_break() {
-                return Ending::Cancelled;
-            }
-        }
-        Ending::Exhausted
-    }
-
-    /// A projected step from z, as long as the steepness allows, which grows where it was too small.
-    fn from(&mut self, z: &[f64], steepness: &mut f64) -> bool {
-        let mut of_z = Vec::new();
-        let at_z = self.problem.value_and_gradient(z, &mut of_z);
-        for _ in 0..40 {
-            if !(*steepness > 0.0 && steepness.is_finite()) {
-                return false;
-            }
-            self.y.copy_from_slice(z);
-            add(&mut self.y, -1.0 / *steepness, &of_z);
-            self.problem.project(&mut self.y);
-            self.look();
-            let step: Vec<f64> = self.y.iter().zip(z).map(|(y, z)| y - z).collect();
-            let model = at_z + dot(&of_z, &step) + 0.5 * *steepness * dot(&step, &step);
-            if self.value <= model + 1e-7 * at_z.abs() {
-                return true;
-            }
-            *steepness *= 2.0;
-        }
         false
     }
 

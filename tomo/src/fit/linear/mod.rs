@@ -40,7 +40,7 @@ pub use crate::fit::regulariser::Prior;
 pub use certificate::{Certificate, Stationarity};
 pub use change::Change;
 pub use data::Weighted;
-pub use descent::{Ending, Method};
+pub use descent::Ending;
 pub use error::LinearError;
 pub use gaussian::{GaussianField, Matern, Roughness};
 pub use log_normal::LogNormalField;

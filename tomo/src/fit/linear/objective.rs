@@ -107,14 +107,6 @@ impl<'a, 'b, T: Float + Default> Objective<'a, 'b, T> {
         Self { operator, data, terms, dark, evaluations: 0 }
     }
 
-    /// Whether second derivatives are the same everywhere.
-    pub fn is_quadratic(&self) -> bool {
-        let Penalised { priors, change, .. } = self.terms;
-        self.data.is_quadratic()
-            && change.is_quadratic()
-            && priors.iter().all(|prior| prior.regulariser.is_quadratic())
-    }
-
     /// Refuses a value that is no finite number, and says which data have it.
     pub fn finite(&self, value: f64, x: &[f64]) -> Result<f64, Error> {
         if value.is_finite() {

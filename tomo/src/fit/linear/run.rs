@@ -2,7 +2,7 @@
 
 use super::certificate::{Certificate, Stationarity};
 use super::data::Data;
-use super::descent::{Descended, Descent, Each, Ending, Method, Stop};
+use super::descent::{Descended, Descent, Each, Ending, Stop};
 use super::error::LinearError;
 use super::lit::{Lit, Spots, Trials};
 use super::nodes::{dilated, refined};
@@ -106,10 +106,6 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         x: &[f64],
         iterations: usize,
     ) -> Descended {
-        let method = match self.settings.method {
-            Method::ConjugateGradients if !objective.is_quadratic() => Method::QuasiNewton,
-            method => method,
-        };
         let (active, entries) = (&objective.operator.active, objective.operator.entries());
         let (round, before) = (self.round, self.evaluations);
         let mut iteration = 0;
@@ -125,7 +121,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         let settled = settled * (2.0 / objective.data.count as f64).sqrt();
         let stop = Stop { iterations, tolerance, settled };
         let scaled = Scaled::new(objective, self.problem.upper);
-        Descent::new(scaled, x, each).run(method, stop)
+        Descent::new(scaled, x, each).run(stop)
     }
 
     /// The coarse problem's solution at the nodes of the grid, and where they count.

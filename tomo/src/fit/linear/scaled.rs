@@ -47,12 +47,6 @@ impl<'a> Scaled<'a> {
         value
     }
 
-    pub fn curvature(&mut self, direction: &[f64], out: &mut Vec<f64>) {
-        self.fill(direction);
-        self.inner.curvature(&self.unscaled, out);
-        self.divide(out);
-    }
-
     fn fill(&mut self, y: &[f64]) {
         self.unscaled.clear();
         self.unscaled.extend(y.iter().zip(&self.root).map(|(y, root)| y / root));

@@ -1,7 +1,5 @@
 //! How a linear problem is solved.
 
-use super::descent::Method;
-
 /// Where a solution is first looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coarse {
@@ -16,8 +14,6 @@ pub struct Coarse {
 /// How a linear problem is solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinearSettings {
-    /// By which steps; quasi-Newton ones in place of conjugate gradients where the problem is not quadratic.
-    pub method: Method,
     /// The coarse problem whose solution says where to begin; all nodes of the grid count at once, without one.
     pub coarse: Option<Coarse>,
     /// Nodes count at first where the coarse solution exceeds this part of its maximum, or a node not farther than
@@ -31,7 +27,7 @@ pub struct LinearSettings {
     pub iterations: usize,
     /// A round ends where the projected gradient has fallen to this part of what it began with.
     pub tolerance: f64,
-    /// A round of quasi-Newton steps ends, too, where ten of them lower the function by less than this part of what noise
+    /// A round ends, too, where ten of them lower the function by less than this part of what noise
     /// changes it by, √(2/data) of it.
     pub settled: f64,
     /// Nodes are admitted whose slope is below minus this part of the largest one where nothing shines, and
@@ -44,7 +40,6 @@ pub struct LinearSettings {
 impl Default for LinearSettings {
     fn default() -> Self {
         Self {
-            method: Method::QuasiNewton,
             coarse: Some(Coarse { nodes: 32, stride: 8, iterations: 20 }),
             threshold: 0.02,
             dilation: 2,

@@ -7,7 +7,6 @@ mod band;
 mod change;
 mod data;
 mod error;
-mod faraday;
 mod gaussian;
 mod held_out;
 mod instrument;
@@ -32,7 +31,6 @@ pub use change::ChangeSettings;
 pub use data::{DataFiles, Loss, LossKind};
 pub use error::FitError;
 pub(crate) use error::{Within, refuse};
-pub use faraday::FaradaySettings;
 pub use gaussian::{FieldKind, FieldSettings, Negative, PriorOfVoxels};
 pub use held_out::{HeldOutBy, HeldOutSettings, Weight};
 pub use instrument::{GainPhases, GainSettings, InstrumentSettings, LeakageSettings};
@@ -86,9 +84,6 @@ pub struct FitFile {
     /// Magnetic field of the gas and its polarized light; total intensity alone without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polarization: Option<PolarizationLaw>,
-    /// A rotation of all position angles between source and data that is fitted.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub faraday: Option<FaradaySettings>,
     /// Chooses a number of the linear problem by cross-validation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<HeldOutSettings>,

@@ -72,7 +72,6 @@ impl FitFile {
                 injection_time: None,
             },
             polarization: None,
-            faraday: None,
             held_out: None,
             change: None,
             quiescent: None,

@@ -379,8 +379,6 @@ pub enum Optimiser {
     Adam,
     /// The same for all but the weight matrices of networks, which step along orthogonal matrices.
     Muon,
-    /// Quasi-Newton steps on all data, for small problems.
-    Lbfgs,
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use super::change::{self, change};
 use super::quiescent::{self, quiescent};
-use super::{Result, axis, faraday, linear, motion, polarized};
+use super::{Result, axis, linear, motion, polarized};
 use crate::fit::linear::Change;
 use crate::fit::settings;
 use crate::fit::settings::{
@@ -11,7 +11,7 @@ use crate::fit::settings::{
 use crate::fit::{
     BatchSize, Beside, ChangePrice, OccupancyPlan, OccupancySettings, Region, Training,
 };
-use crate::optimise::{Adam, Lbfgs, Muon, Polynomial};
+use crate::optimise::{Adam, Muon, Polynomial};
 use crate::representation::{
     Activation, Carrier, Changing, Degree, FeatureGrid, FeatureGridSettings, Grid, GridSettings,
     Knots, Network, NetworkSettings, OwnSettings, Registry, Representation, Spline,
@@ -171,7 +171,6 @@ pub fn training(
     if matches!(chosen.batch, BatchSize::Pixels(0) | BatchSize::Frames(0)) {
         refuse!("training.batch of 0 is not allowed: 1 or more");
     }
-    let lbfgs = lbfgs(file)?;
     let muon = (chosen.optimiser == Optimiser::Muon).then(Muon::default);
     let occupancy = chosen.occupancy.as_ref().map(occupancy).transpose()?;
     if occupancy.is_some() && file.representation.kind == Kind::Mlp4d {
@@ -183,7 +182,6 @@ pub fn training(
         seed: file.seed,
         adam: Adam::default(),
         muon,
-        lbfgs,
         rate: rate.checked().within(name)?,
         axis_rate,
         ramp: chosen.ramp,
@@ -246,25 +244,6 @@ fn occupancy(chosen: &Occupancy) -> Result<OccupancyPlan> {
     })
 }
 
-/// Quasi-Newton steps, if they are requested and the loss is the same at every step.
-fn lbfgs(file: &FitFile) -> Result<Option<Lbfgs>> {
-    if file.training.optimiser != Optimiser::Lbfgs {
-        return Ok(None);
-    }
-    if file.training.batch != BatchSize::All {
-        refuse!(
-            "training.optimiser = lbfgs needs the same data at every step: give training.batch = \"all\" (pixels and frames are random)"
-        );
-    }
-    let linear = file.representation.activation == Activation::Linear;
-    if file.representation.kind == Kind::Grid && linear {
-        refuse!(
-            "training.optimiser = lbfgs does not support bounds, and a grid with activation linear is bounded below by 0; use representation = linear-grid, or activation sigmoid or softplus"
-        );
-    }
-    Ok(Some(Lbfgs::default()))
-}
-
 /// Refuses what can be told of settings without tracing rays.
 ///
 /// # Errors
@@ -278,7 +257,6 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     change::check(file)?;
     polarized::check(file)?;
     quiescent::check(file)?;
-    faraday::check(file)?;
     if let Some(held_out) = &file.held_out {
         held_out.check(file)?;
     }

@@ -4,7 +4,6 @@ mod band;
 mod change;
 mod coarse_view;
 mod curve;
-mod faraday;
 mod gains;
 mod glyph;
 mod held_out;
@@ -39,7 +38,6 @@ pub use band::{BandScan, BandWatch, BandWorld, band_motion, check_band, in_band_
 pub use change::{change, emission_times};
 pub use coarse_view::CoarseView;
 pub use curve::Curve;
-pub use faraday::{Rotation, RotationWatch, Tried, find_rotation};
 pub use held_out::{Held, HeldData, HeldWatch, best as best_held, check_folds, hold_out};
 pub use imprint::{Given, Imprinted, imprint};
 pub use instrument::Instrument;

@@ -3,7 +3,7 @@
 use super::seen::seen;
 use super::{Result, spacing};
 use crate::fit::linear::Prior;
-use crate::fit::settings::{FitError, FitFile, Kind, Optimiser, QuiescentSettings, refuse};
+use crate::fit::settings::{FitError, FitFile, Kind, QuiescentSettings, refuse};
 use crate::fit::{BatchSize, Quiescent, Regulariser, Seen};
 use kerrlight_render::polarization::StokesParameter;
 
@@ -75,11 +75,6 @@ pub(super) fn check(file: &FitFile) -> Result<()> {
     if matches!(file.training.batch, BatchSize::Pixels(_)) {
         refuse!(
             "training.batch: pixels are drawn where rays meet the region, and a quiescent image has others; use frames = N"
-        );
-    }
-    if file.training.optimiser == Optimiser::Lbfgs {
-        refuse!(
-            "training.optimiser = lbfgs does not support bounds, and a quiescent image is bounded below by 0; use adam"
         );
     }
     Ok(())

@@ -1,9 +1,7 @@
 //! Stokes factors of a fit against published formulas, pictures of the renderer and each other.
 
 use super::*;
-use crate::fit::linear::{
-    Change, LinearProblem, LinearProgress, LinearSettings, Method, Voxels, Weighted,
-};
+use crate::fit::linear::{Change, LinearProblem, LinearProgress, LinearSettings, Voxels, Weighted};
 use crate::representation::Degree;
 use core::f64::consts::{PI, TAU};
 use kerrlight_render::polarization::{
@@ -304,7 +302,6 @@ fn exact_fluxes_are_sums_of_images() {
     };
     let settings = LinearSettings {
         coarse: None,
-        method: Method::QuasiNewton,
         iterations: 400,
         tolerance: 0.0,
         ..LinearSettings::default()

@@ -10,7 +10,6 @@ pub(super) fn settings() -> Training {
         seed: 11,
         adam: Adam::default(),
         muon: None,
-        lbfgs: None,
         rate,
         axis_rate: Some(rate),
         ramp: 3,

@@ -1,7 +1,7 @@
 //! The field that is nowhere negative and nearest to one that is.
 
 use super::super::convex::Convex;
-use super::super::descent::{Descent, Method, Stop};
+use super::super::descent::{Descent, Stop};
 use super::super::scaled::Scaled;
 use super::GaussianField;
 use core::ops::ControlFlow;
@@ -41,6 +41,6 @@ impl GaussianField {
         let mut problem = &about;
         let mut each = |_: f64, _: &[f64]| ControlFlow::Continue(());
         let descent = Descent::new(Scaled::new(&mut problem, upper), &start, &mut each);
-        descent.run(Method::QuasiNewton, ENOUGH).x
+        descent.run(ENOUGH).x
     }
 }
