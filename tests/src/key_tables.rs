@@ -5,7 +5,8 @@
 
 use crate::documents::read;
 use crate::support::root;
-use kerrlight_common::toml_file::{Key, Keys, shown};
+use kerrlight_common::toml_file::{Key, Keys, bound};
+use kerrlight_render::scene::Scene;
 use kerrlight_tomo::fit::settings::{FitFile, StaticImageFile};
 use std::collections::BTreeSet;
 
@@ -13,8 +14,9 @@ use std::collections::BTreeSet;
 const MARK: &str = "<!-- keys of a ";
 
 /// Keys that hold a copy of what stands elsewhere, or what is not ours.
-const COPIES: [&str; 8] = [
+const COPIES: [&str; 9] = [
     "motion.velocity.perturbed.of",
+    "volume.rotation.perturbed.of",
     "world.hole",
     "world.observer",
     "world.region",
@@ -54,7 +56,6 @@ impl Page<'_> {
             let below =
                 if path.is_empty() { key.name.clone() } else { format!("{path}.{}", key.name) };
             if self.own.contains(&below) || !self.described.insert(below.clone()) {
-                self.described.insert(below);
                 continue;
             }
             *out += &row(&key, (prefix, is_choice));
@@ -88,7 +89,7 @@ fn value(key: &Key) -> String {
         "table" => return String::new(),
         kind => kind.to_owned(),
     };
-    let shown = |value: f64| shown(value).replace('-', "−").replace("e−", "e-");
+    let shown = |value: f64| bound(value).replace('-', "−").replace("e−", "e-");
     match &key.range {
         Some(range) if range.is_given() => match (range.least, range.most) {
             (Some(least), Some(most)) => format!("{kind}, {} to {}", shown(least), shown(most)),
@@ -108,8 +109,9 @@ fn paths<'a>(line: &'a str, kind: &str) -> Option<Vec<&'a str>> {
 /// The page with the tables of these keys made anew.
 fn renewed(text: &str, (keys, kind): (&Keys, &str)) -> (String, BTreeSet<String>) {
     let all = text.lines().filter_map(|line| paths(line, kind)).flatten();
-    let own = all.filter(|path| !path.is_empty()).map(str::to_owned).collect();
-    let mut page = Page { keys, own, described: BTreeSet::new() };
+    let own = all.filter(|path| !path.is_empty()).map(str::to_owned);
+    let own: Vec<String> = own.collect();
+    let mut page = Page { keys, described: own.iter().cloned().collect(), own };
     let mut out = String::new();
     let mut lines = text.lines().peekable();
     while let Some(line) = lines.next() {
@@ -134,15 +136,20 @@ fn all(keys: &Keys, path: &str, out: &mut BTreeSet<String>) {
 
 #[test]
 fn exact_tables_of_keys_are_those_of_the_types() {
-    let path = root().join("docs/reference/fit-file.md");
+    check("fit-file.md", &[(FitFile::keys(), "fit"), (StaticImageFile::keys(), "static image")]);
+    check("scene-file.md", &[(Scene::keys(), "scene")]);
+}
+
+fn check(page: &str, kinds: &[(&Keys, &str)]) {
+    let path = root().join("docs/reference").join(page);
     let mut text = read(&path);
     let before = text.clone();
-    for (keys, kind) in [(FitFile::keys(), "fit"), (StaticImageFile::keys(), "static image")] {
+    for (keys, kind) in kinds {
         let (renewed, described) = renewed(&text, (keys, kind));
         let mut wanted = BTreeSet::new();
         all(keys, "", &mut wanted);
         let missing: Vec<_> = wanted.difference(&described).collect();
-        assert!(missing.is_empty(), "fit-file.md has no table with {missing:?} of a {kind}");
+        assert!(missing.is_empty(), "{page} has no table with {missing:?} of a {kind}");
         text = renewed;
     }
     if std::env::var_os("KERRLIGHT_WRITE_REFERENCE").is_some() {

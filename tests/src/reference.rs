@@ -66,16 +66,6 @@ fn code_words(text: &str) -> BTreeSet<&str> {
     spans.flat_map(|span| span.split(move |c| !is_word(c))).collect()
 }
 
-/// The section of a page under a heading; the whole page without one.
-fn section<'a>(page: &'a str, heading: &str) -> &'a str {
-    if heading.is_empty() {
-        return page;
-    }
-    let start = page.find(&format!("\n## {heading}\n")).unwrap_or_else(|| panic!("no {heading}"));
-    let rest = &page[start + 4..];
-    &rest[..rest.find("\n## ").unwrap_or(rest.len())]
-}
-
 /// The keys that a table may have, as the refusal of an unknown one lists them behind its name.
 fn allowed(folder: &Path, arguments: &[&str]) -> Vec<String> {
     const AROUND: [&str; 7] = ["expected", "one", "of", "or", "in", "available", "keys"];
@@ -92,37 +82,6 @@ fn check(page: &str, text: &str, keys: &[String]) {
     let words = code_words(text);
     for key in keys {
         assert!(words.contains(key.as_str()), "docs/reference/{page} does not describe {key}");
-    }
-}
-
-#[test]
-fn regress_the_reference_has_every_key_of_a_scene() {
-    let page = read(&root().join("docs/reference/scene-file.md"));
-    for (scene, table, heading) in [
-        ("hot_spots", "hole", "[hole]"),
-        ("hot_spots", "observer", "[observer]"),
-        ("camera_orbit", "camera", "[camera]"),
-        ("camera_orbit", "camera.key.0", "[camera]"),
-        ("hot_spots", "screen", "[screen]"),
-        ("hot_spots", "effects", "[effects]"),
-        ("hot_spots", "tracer", "[tracer]"),
-        ("hot_spots", "magnetic_field", "[magnetic_field]"),
-        ("gold2020/test1", "gas", "[gas]"),
-        ("disc_plunging", "disc", "[disc]"),
-        ("disc_plunging", "disc.plunging", "[disc]"),
-        ("hot_spots", "spot.0", "[[spot]]"),
-        ("volume", "volume.0", "[[volume]]"),
-        ("volume", "volume.0.region", "[[volume]]"),
-        ("mesh", "mesh.0", "[[mesh]]"),
-        ("sky_checker", "sky.checker", "[sky]"),
-        ("sky_stars", "sky.stars", "[sky]"),
-        ("sky_image", "sky.image", "[sky]"),
-        ("sky_catalogue", "sky.catalogue", "[sky]"),
-    ] {
-        let file = format!("scenes/{scene}.toml");
-        let unknown = format!("{table}.nonsense=1");
-        let keys = allowed(&root(), &["render", &file, "--set", &unknown]);
-        check("scene-file.md", section(&page, heading), &keys);
     }
 }
 

@@ -41,7 +41,7 @@ fn a_folder_without_a_fit() {
     let told = fail(folder.path(), &["view", "run", "--web", "page"]);
     assert!(told.contains("run: no scene.toml"), "{told}");
     let told = fail(folder.path(), &["view", "--set", "hole.spin=2", "--web", "page"]);
-    assert!(told.contains("hole.spin") && told.contains("[-1, 1]"), "{told}");
+    assert!(told.contains("hole.spin") && told.contains("-1 to 1"), "{told}");
 }
 
 /// Size of the window; the settings take 236 pixels of it.

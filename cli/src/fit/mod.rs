@@ -15,7 +15,6 @@ mod held_out;
 mod init;
 mod inputs;
 mod journal;
-mod labels;
 mod leakage;
 mod linear;
 pub mod posterior;

@@ -1,6 +1,6 @@
 //! What is said of a world that was found: lines, sentences, and distances from a known one.
 
-use super::{labels, world_scan};
+use super::world_scan;
 use kerrlight_tomo::fit::verdict::EXCESS;
 use kerrlight_tomo::fit::world::Parameter;
 use serde_json::{Value, json};
@@ -85,7 +85,7 @@ pub fn sentences(results: &Value) -> Vec<String> {
         let name = parameter.name();
         let number = |key: &str| results[key][name].as_f64();
         let value = number("world")?;
-        let (words, unit) = labels::parameter(parameter);
+        let (words, unit) = parameter.label();
         let truth =
             number("truth").map_or(String::new(), |truth| format!(" (truth: {truth:.3}{unit})"));
         let [from, to] = ends(results, "interval_95", name)?;
@@ -126,7 +126,7 @@ fn rival(results: &Value) -> Option<String> {
     }
     let value = |parameter: Parameter| {
         let value = nearest["end"][parameter.name()].as_f64()?;
-        let (words, unit) = labels::parameter(parameter);
+        let (words, unit) = parameter.label();
         Some(format!("{words} {value:.3}{unit}"))
     };
     let values: Vec<String> = Parameter::ALL.into_iter().filter_map(value).collect();
@@ -158,7 +158,7 @@ const EDGE: f64 = 0.02;
 fn edges(results: &Value) -> Vec<String> {
     let of = |parameter: Parameter| {
         let (name, unit) = (parameter.name(), parameter.unit());
-        let (words, degrees) = labels::parameter(parameter);
+        let (words, degrees) = parameter.label();
         let value = results["world"][name].as_f64()?;
         let [low, high] = ends(results, "bounds", name)?;
         let range = parameter.range().map(|end| end / unit);

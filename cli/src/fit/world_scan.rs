@@ -1,7 +1,6 @@
 //! The map of a scan over parameters of the world: as a table, as a picture and in words.
 
 use super::folder::Folder;
-use super::labels;
 use crate::output;
 use crate::report::{Drawing, GridAxis, GridMap};
 use kerrlight_tomo::fit::world::{Parameter, Scanned, World, WorldScan};
@@ -37,7 +36,7 @@ pub fn sentence(scan: &Value) -> Option<String> {
     let over = scan["over"].as_array()?.iter();
     let names = over.filter_map(|over| {
         let parameter = Parameter::ALL.into_iter().find(|p| over["parameter"] == p.name())?;
-        Some(labels::parameter(parameter).0)
+        Some(parameter.label().0)
     });
     let names: Vec<&str> = names.collect();
     Some(format!(
@@ -78,7 +77,7 @@ fn map(scan: &WorldScan, truth: Option<&World>) -> GridMap {
         values.into_iter().map(|value| (2.0 * (value - least)).max(0.0).sqrt()).collect()
     };
     let axis = |Scanned { parameter, values }: &Scanned| {
-        let (name, unit) = labels::parameter(*parameter);
+        let (name, unit) = parameter.label();
         let unit = if unit.is_empty() { String::new() } else { format!(" ({})", unit.trim()) };
         let of = |world: &World| world.get(*parameter) / parameter.unit();
         GridAxis {

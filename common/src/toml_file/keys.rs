@@ -107,9 +107,9 @@ impl Range {
     fn words(&self) -> String {
         let unit = if self.unit.is_empty() { String::new() } else { format!(" ({})", self.unit) };
         match (self.least, self.most) {
-            (Some(least), Some(most)) => format!("{} to {}{unit}", shown(least), shown(most)),
-            (Some(least), None) => format!("at least {}{unit}", shown(least)),
-            (None, Some(most)) => format!("at most {}{unit}", shown(most)),
+            (Some(least), Some(most)) => format!("{} to {}{unit}", bound(least), bound(most)),
+            (Some(least), None) => format!("at least {}{unit}", bound(least)),
+            (None, Some(most)) => format!("at most {}{unit}", bound(most)),
             (None, None) => format!("a finite number{unit}"),
         }
     }
@@ -134,6 +134,12 @@ pub fn shown(value: f64) -> String {
     } else {
         value.to_string()
     }
+}
+
+/// An end of a range: large round numbers as powers of ten.
+pub fn bound(value: f64) -> String {
+    let (plain, power) = (shown(value), format!("{value:e}"));
+    if value.abs() >= 1e5 && power.len() < plain.len() { power } else { plain }
 }
 
 /// A part of the schema with the range that it takes from above.

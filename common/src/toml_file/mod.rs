@@ -10,7 +10,7 @@ mod keys;
 mod serializer;
 
 pub use error::ReadError;
-pub use keys::{Key, Keys, OutOfRange, Range, shown};
+pub use keys::{Key, Keys, OutOfRange, Range, bound, shown};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use kerrlight_geodesic::ZamoFrame;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The `[magnetic_field]` of a scene: a mixture of three fields whose components are those
@@ -11,14 +12,14 @@ use serde::{Deserialize, Serialize};
 /// The axes are e_r, e_θ, e_φ of the observer of zero angular momentum, boosted without
 /// rotation to the gas's velocity. The three are orthogonal in the equatorial plane; off it
 /// the vertical and the radial field enclose the angle θ.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MagneticField {
     /// Along +z: cos θ e_r − sin θ e_θ.
     pub vertical: f64,
-    /// Away from the hole, e_r; relative to the other components.
+    /// Away from the hole, e_r.
     pub radial: f64,
-    /// Around +z, e_φ; relative to the other components.
+    /// Around +z, e_φ. Not all three are 0.
     pub toroidal: f64,
 }
 

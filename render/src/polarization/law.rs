@@ -76,7 +76,7 @@ pub struct PolarizationLaw {
     /// Exponent of sin θ_B: 1 + spectral index in the textbook.
     #[schemars(range(min = 0.0, max = 20.0), extend("unit" = "an exponent"))]
     pub sine_power: f64,
-    /// Linearly polarized part of the light.
+    /// Linearly polarised part of the light.
     #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "a part of the light"))]
     pub fraction: f64,
     /// What |b| is measured in.

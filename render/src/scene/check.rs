@@ -14,14 +14,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {
     check_screen(scene)?;
     check_effects(scene)?;
     check_combinations(scene)?;
-    let tolerance = scene.tracer.tolerance;
-    number(
-        "tracer.tolerance",
-        tolerance,
-        (1e-14..=1e-2).contains(&tolerance),
-        "a number in [1e-14, 1e-2]",
-    )?;
-    // The spin was checked above.
+    // Its range is that of its key.
     let Ok(hole) = Kerr::new(scene.hole.spin) else { return Ok(()) };
     if let Some(disc) = &scene.disc {
         check_disc(disc, &hole)?;
@@ -42,12 +35,8 @@ pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {
 }
 
 fn check_hole_and_observer(scene: &Scene) -> Result<(), Invalid> {
-    let spin = scene.hole.spin;
-    number("hole.spin", spin, (-1.0..=1.0).contains(&spin), "a number in [-1, 1]")?;
     check_scales(scene)?;
     let observer = &scene.observer;
-    let ok = observer.time.abs() <= 1e9;
-    number("observer.time", observer.time, ok, "a time in [-1e9, 1e9] (M)")?;
     if scene.camera.is_some() {
         return super::camera::check(scene);
     }
@@ -56,12 +45,7 @@ fn check_hole_and_observer(scene: &Scene) -> Result<(), Invalid> {
         let why = "give it, or a `[camera]`";
         return Err(Invalid::missing("observer.inclination_deg", why));
     }
-    let ok = (0.0..=180.0).contains(&degrees);
-    number("observer.inclination_deg", degrees, ok, "an angle in [0, 180]")?;
-    let azimuth = observer.azimuth_deg;
-    let ok = (-3600.0..=3600.0).contains(&azimuth);
-    number("observer.azimuth_deg", azimuth, ok, "an angle in [-3600, 3600]")?;
-    let (radius, allowed) = (observer.radius, "inf, or a radius in [10, 1e9] (M)");
+    let (radius, allowed) = (observer.radius, "10 to 1e9 (M), or inf");
     number(
         "observer.radius",
         radius,
@@ -81,23 +65,15 @@ fn check_scales(scene: &Scene) -> Result<(), Invalid> {
     let in_units = || scene.gas.is_some().then_some("[gas]");
     let asks = on_sky().or_else(in_units);
     let scales = [
-        ("mass_msun", hole.mass_msun, [1e-20, 1e15], "4.154e6", "mass in solar masses"),
-        ("distance_kpc", hole.distance_kpc, [1e-9, 1e12], "8.178", "distance in kpc"),
+        ("mass_msun", hole.mass_msun, "4.154e6", "mass in solar masses"),
+        ("distance_kpc", hole.distance_kpc, "8.178", "distance in kpc"),
     ];
-    for (name, value, [low, high], such_as, what) in scales {
-        let key = format!("hole.{name}");
-        match (value, asks) {
-            (Some(value), _) => {
-                let allowed = format!("{low:e} to {high:e}, the {what}");
-                number(key, value, (low..=high).contains(&value), &allowed)?;
-            }
-            (None, Some(asks)) => {
-                let why = format!(
-                    "{asks} needs the {what}; give `{name} = …` in [hole], e.g. {such_as} for Sgr A*"
-                );
-                return Err(Invalid::missing(key, why));
-            }
-            (None, None) => {}
+    for (name, value, such_as, what) in scales {
+        if let (None, Some(asks)) = (value, asks) {
+            let why = format!(
+                "{asks} needs the {what}; give `{name} = …` in [hole], e.g. {such_as} for Sgr A*"
+            );
+            return Err(Invalid::missing(format!("hole.{name}"), why));
         }
     }
     Ok(())
@@ -118,38 +94,19 @@ fn check_screen(scene: &Scene) -> Result<(), Invalid> {
             return Err(Invalid::new("screen.field_of_view_uas", shown(angle), allowed));
         }
     }
-    for (key, size) in [("screen.width", screen.width), ("screen.height", screen.rows())] {
-        if !(1..=16_384).contains(&size) {
-            return Err(Invalid::new(key, size, "a whole number in [1, 16384]"));
-        }
-    }
     let root = screen.samples_per_pixel.isqrt();
-    if root * root != screen.samples_per_pixel || !(1..=32).contains(&root) {
-        let allowed = "a square number in [1, 1024]: 1, 4, 9, 16, …";
+    if root * root != screen.samples_per_pixel {
+        let allowed = "a square number: 1, 4, 9, 16, …";
         return Err(Invalid::new("screen.samples_per_pixel", screen.samples_per_pixel, allowed));
     }
-    if let Some(error) = screen.image_error {
-        let ok = (1e-6..=0.5).contains(&error);
-        number("screen.image_error", error, ok, "a number in [1e-6, 0.5]")?;
-        if root != 1 {
-            let allowed = "1 with image_error, by which pixels are refined";
-            return Err(Invalid::new(
-                "screen.samples_per_pixel",
-                screen.samples_per_pixel,
-                allowed,
-            ));
-        }
+    if screen.image_error.is_some() && root != 1 {
+        let allowed = "1 with image_error, by which pixels are refined";
+        return Err(Invalid::new("screen.samples_per_pixel", screen.samples_per_pixel, allowed));
     }
     if screen.channels.as_ref().is_some_and(Vec::is_empty) {
         return Err(Invalid::new("screen.channels", "[]", "one name at least"));
     }
-    if scene.camera.is_none() {
-        check_reach(scene)?;
-    }
-    screen.total_flux_jy.map_or(Ok(()), |flux| {
-        let ok = (1e-30..=1e30).contains(&flux);
-        number("screen.total_flux_jy", flux, ok, "a number in [1e-30, 1e30]")
-    })
+    if scene.camera.is_some() { Ok(()) } else { check_reach(scene) }
 }
 
 /// Impact parameters so large that their squares lose the hole are no picture of it.
@@ -181,17 +138,14 @@ fn check_effects(scene: &Scene) -> Result<(), Invalid> {
         if !scene.effects.redshift {
             return Err(Invalid::new(key, value, "only with redshift = true"));
         }
-        return number(key, power, (-8.0..=12.0).contains(&power), "a number in [-8, 12]");
+        return Ok(());
     }
     match (scene.effects.redshift, scene.effects.spectral_index) {
         (true, None) => {
             let why = "needed with redshift = true (1 is the law of bolometric intensity)";
             Err(Invalid::missing(key, why))
         }
-        (_, Some(index)) => {
-            number(key, index, (-10.0..=10.0).contains(&index), "a number in [-10, 10]")
-        }
-        (false, None) => Ok(()),
+        _ => Ok(()),
     }
 }
 
@@ -232,13 +186,7 @@ fn check_combinations(scene: &Scene) -> Result<(), Invalid> {
         return Err(Invalid::new("effects.lensing", false, allowed));
     }
     check_falls(scene)?;
-    check_polarization(scene)?;
-    match effects.half_orbits {
-        Some(n) if n > 100 => {
-            Err(Invalid::new("effects.half_orbits", n, "a whole number in [0, 100]"))
-        }
-        _ => Ok(()),
-    }
+    check_polarization(scene)
 }
 
 fn check_polarization(scene: &Scene) -> Result<(), Invalid> {

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use kerrlight_common::toml_file::ReadError;
-use kerrlight_common::toml_file::shown;
+use kerrlight_common::toml_file::{OutOfRange, shown};
 use toml_edit::{Document, Item};
 
 /// Why a scene text is not a scene.
@@ -59,6 +59,13 @@ pub(super) struct Invalid {
     key: String,
     value: Option<String>,
     allowed: String,
+}
+
+impl From<OutOfRange> for Invalid {
+    fn from(wrong: OutOfRange) -> Self {
+        let allowed = wrong.allowed();
+        Invalid::new(wrong.key, shown(wrong.value), allowed)
+    }
 }
 
 impl Invalid {
@@ -146,9 +153,4 @@ pub(super) fn number(
 
 pub(super) fn positive(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
     number(key, value, value > 0.0 && value.is_finite(), "a finite number above 0")
-}
-
-/// Brightness in any unit: the channels are 32-bit floats.
-pub(super) fn brightness(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
-    number(key, value, (0.0..=1e12).contains(&value), "a number in [0, 1e12]")
 }

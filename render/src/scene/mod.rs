@@ -25,10 +25,15 @@ pub use sources::{
 
 use crate::Error;
 use crate::polarization::MagneticField;
-use kerrlight_common::toml_file;
+use invalid::Invalid;
+use kerrlight_common::toml_file::{self, Keys};
 pub use kerrlight_geodesic::Integrator;
 use kerrlight_geodesic::{Kerr, orbits};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
+
+static KEYS: LazyLock<Keys> = LazyLock::new(Keys::of::<Scene>);
 
 /// A complete scene: the hole, who looks at it, what shines, and how rays are traced.
 ///
@@ -56,58 +61,61 @@ use serde::{Deserialize, Serialize};
 /// assert_eq!(tilted.observer.inclination_deg, 17.0);
 /// # Ok::<(), kerrlight_render::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// The black hole.
     pub hole: Hole,
-    /// Where it is seen from, and when.
+    /// Where the scene is seen from, and when.
     #[serde(default)]
     pub observer: ObserverConfig,
-    /// A camera at a finite radius, in place of the observer's screen.
+    /// A camera in place of the observer, except its time, and of the field of view of the screen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraConfig>,
-    /// What part of the sky is rendered, on which pixels.
+    /// Field of view and pixels.
     pub screen: Screen,
-    /// Which effects are simulated.
+    /// Effects that are simulated. What is off is not computed.
     #[serde(default)]
     pub effects: Effects,
     /// How rays are traced.
     pub tracer: TracerConfig,
-    /// A thin equatorial disc.
+    /// A thin disc in the equatorial plane with the flux profile of Page & Thorne (1974).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disc: Option<Disc>,
-    /// The field of the gas, for polarised light.
+    /// Magnetic field of the gas, for polarised light: components in the frame of the gas.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub magnetic_field: Option<MagneticField>,
-    /// A volumetric flow.
+    /// Volumetric gas with an analytic density and motion (Gold et al. 2020).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gas: Option<Gas>,
-    /// Hot spots on Keplerian orbits.
+    /// Gaussian hot spots on circular Keplerian orbits.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spot: Vec<Spot>,
-    /// Emission on the nodes of boxes.
+    /// Emission on the nodes of a box, carried along by rotating matter.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub volume: Vec<VolumeSource>,
-    /// Triangle meshes.
+    /// Surfaces given as triangles.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub mesh: Vec<Mesh>,
-    /// What the rays that escape see.
+    /// What the rays that escape see: one of four. It adds to R, G, B only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sky: Option<Sky>,
 }
 
 /// The black hole.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hole {
-    /// Spin a/M ∈ \[−1, 1\]; negative: the hole turns against +z.
+    /// Spin a along +z; negative: the hole rotates against +z.
+    #[schemars(range(min = -1.0, max = 1.0), extend("unit" = "a/M"))]
     pub spin: f64,
-    /// Mass in solar masses; needed where anything is in seconds, µas, Jy or physical units.
+    /// Mass, solar masses; needed with µas, Jy, gas, or times in seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1e-20, max = 1e15), extend("unit" = "solar masses"))]
     pub mass_msun: Option<f64>,
-    /// Distance in kiloparsecs; needed where anything is in µas or Jy.
+    /// Distance, kpc; needed with µas, Jy or gas.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1e-9, max = 1e12), extend("unit" = "kpc"))]
     pub distance_kpc: Option<f64>,
 }
 
@@ -124,21 +132,24 @@ impl Hole {
 }
 
 /// Where the scene is seen from, and when.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ObserverConfig {
-    /// Angle between +z (the spin axis for a > 0) and the line of sight, degrees in \[0, 180\];
-    /// NaN in a scene with a camera, which has a place of its own.
+    /// Angle between +z and the line of sight, degrees; needed without `[camera]`.
     #[serde(default = "nowhere", skip_serializing_if = "is_nowhere")]
+    #[schemars(range(min = 0.0, max = 180.0), extend("unit" = "degrees"))]
     pub inclination_deg: f64,
-    /// Azimuth of the observer in degrees.
+    /// Azimuth of the observer, degrees.
     #[serde(default)]
+    #[schemars(range(min = -3600.0, max = 3600.0), extend("unit" = "degrees"))]
     pub azimuth_deg: f64,
-    /// Boyer–Lindquist radius in M (screen coordinates stay constants of motion), or `inf`.
+    /// Boyer–Lindquist radius, M, at most 1e9 or `inf`; half the diagonal of the field must stay below 0.9 of it.
     #[serde(default = "infinity")]
+    #[schemars(range(min = 10.0), extend("unit" = "M"))]
     pub radius: f64,
-    /// Time of observation in M.
+    /// Time of observation, M.
     #[serde(default)]
+    #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub time: f64,
 }
 
@@ -163,35 +174,40 @@ impl Default for ObserverConfig {
 }
 
 /// What part of the sky is rendered. Exactly one of the two fields of view must be given.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Screen {
-    /// Width of the field of view in M.
+    /// Width of the field, M, 1e-9 to 1e7 a side. This or the next, without `[camera]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field_of_view_m: Option<f64>,
-    /// Width of the field of view in microarcseconds.
+    /// Width of the field, µas.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field_of_view_uas: Option<f64>,
-    /// Pixels from left to right.
+    /// Pixels per row; pixels are square.
+    #[schemars(range(min = 1, max = 16_384), extend("unit" = "pixels"))]
     pub width: u32,
-    /// Pixels from top to bottom, which are square; as many as from left to right without it.
+    /// Pixels per column; as many as per row without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = 16_384), extend("unit" = "pixels"))]
     pub height: Option<u32>,
-    /// Rays per pixel, a square number: a regular grid inside the pixel.
+    /// Rays per pixel, a square number, on a regular grid.
     #[serde(default = "one")]
+    #[schemars(range(min = 1, max = 1024), extend("unit" = "rays"))]
     pub samples_per_pixel: u32,
-    /// What becomes of photon rings that are narrower than a pixel.
+    /// Sampling of photon rings, which are narrower than a pixel.
     #[serde(default)]
     pub rings: Rings,
-    /// Flux density to which the emission is scaled, in Jy.
+    /// Scales `intensity` to this flux, Jy; scene units without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1e-30, max = 1e30), extend("unit" = "Jy"))]
     pub total_flux_jy: Option<f64>,
-    /// Relative L1 error of the intensity image below which pixels are refined, in place of
-    /// `samples_per_pixel`; off without it.
+    /// Refines pixels until the estimated relative L1 error of `intensity` is below this value; needs
+    /// `samples_per_pixel = 1`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1e-6, max = 0.5), extend("unit" = "a part of the light"))]
     pub image_error: Option<f64>,
-    /// Names of the channels or layers that are kept, [`DEFAULT_CHANNELS`] for those that are kept without this key: all
-    /// that cost nothing.
+    /// Channels or layers to write, such as `["intensity"]` or `["default", "A", "sky"]`; `"default"` stands for
+    /// all but those on request.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channels: Option<Vec<String>>,
 }
@@ -204,7 +220,7 @@ fn one() -> u32 {
 }
 
 /// How images of higher order, next to the critical curve, are sampled.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rings {
     /// Pixels next to the critical curve have more rays, placed along the images.
@@ -215,45 +231,42 @@ pub enum Rings {
 }
 
 /// Which effects are simulated. What is off is not computed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Effects {
-    /// Gravitational lensing, the one effect that is on unless switched off: off, rays are
-    /// straight lines r n in the same coordinates, for comparison.
+    /// Gravitational lensing; if off, rays are straight lines in the same coordinates.
     #[serde(default = "on")]
     pub lensing: bool,
-    /// Gravitational redshift and Doppler shift: I = g^{3+α} I_em of a surface,
-    /// dI = g^{2+α} j ds of a volume, with the spectral index α.
+    /// Gravitational redshift and Doppler shift: I = g^{3+α} I_em of a surface, dI = g^{2+α} j ds of a volume.
     #[serde(default)]
     pub redshift: bool,
-    /// Spectral index α (dimensionless) of the emitted spectrum ν^{−α}; 1 is the law of bolometric intensity. Needed
-    /// when `redshift` is on.
+    /// α of the spectrum ν^−α; 1 is the law of bolometric intensity. Needed with `redshift`, unless the next key is
+    /// given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -10.0, max = 10.0), extend("unit" = "an exponent"))]
     pub spectral_index: Option<f64>,
-    /// 2 + α, as fits have it, in place of α: dI = g^power j ds of a volume.
+    /// 2 + α, as in fits, in place of `spectral_index`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -8.0, max = 12.0), extend("unit" = "an exponent"))]
     pub redshift_power: Option<f64>,
-    /// Emission at each point is that of the moment when the light passed it; off: of the
-    /// time of observation everywhere.
+    /// Whether emission is evaluated at the time when the light passed.
     #[serde(default)]
     pub slow_light: bool,
     /// Whether gas absorbs what is behind it.
     #[serde(default)]
     pub absorption: bool,
-    /// The last lensed image that is seen, by its number n of half-orbits: 0 leaves the direct
-    /// image alone. Light is taken from a ray up to half-way in Mino time between its crossings
-    /// number n + 1 and n + 2 of the equatorial plane. All of them without this key.
+    /// Order of the last lensed image to include; 0: the direct image only; all without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(max = 100), extend("unit" = "half-orbits"))]
     pub half_orbits: Option<u32>,
-    /// Polarised synchrotron light of electrons with the power law of `spectral_index` in the
-    /// field `[magnetic_field]`: emissivities become those across a field of unit strength.
+    /// Polarised synchrotron emission; needs `redshift` and `[magnetic_field]`.
     #[serde(default)]
     pub polarization: bool,
-    /// Lorentz factor of the electrons that radiate at the observed frequency, by which circular
-    /// polarisation falls; without it V is 0 and not computed.
+    /// Lorentz factor of the emitting electrons; without it V is not computed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 10.0, max = 1e12), extend("unit" = "a factor"))]
     pub circular_polarization_lorentz_factor: Option<f64>,
-    /// The sky is averaged over what the bundle of rays between neighbouring rays covers of it.
+    /// Averages the sky over the solid angle between neighbouring rays.
     #[serde(default)]
     pub ray_bundles: bool,
 }
@@ -288,13 +301,15 @@ impl Effects {
 }
 
 /// How rays are traced.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TracerConfig {
-    /// Which integrator.
+    /// `elliptic` (closed form on SIMD lanes, fastest), `taylor-mino`, `dop853-mino` or `rk45-mino`.
     #[serde(with = "integrator")]
+    #[schemars(with = "String")]
     pub integrator: Integrator,
-    /// Largest local error of a step, relative.
+    /// Local error of a step, and relative error of the light integrated along a ray.
+    #[schemars(range(min = 1e-14, max = 1e-2), extend("unit" = "a part"))]
     pub tolerance: f64,
 }
 
@@ -326,8 +341,15 @@ impl Scene {
     /// line, the key and what is allowed.
     pub fn parse(text: &str) -> Result<Self, Error> {
         let scene: Scene = toml_file::read(text).map_err(SceneError::Syntax)?;
-        check::check(&scene).map_err(|invalid| invalid.locate(text))?;
+        let table = sources::with_own_names(toml_file::read(text).map_err(SceneError::Syntax)?);
+        let ranges = Self::keys().check(&table).map_err(Invalid::from);
+        ranges.and_then(|()| check::check(&scene)).map_err(|invalid| invalid.locate(text))?;
         Ok(scene)
+    }
+
+    /// All keys of such a file, with their documentation.
+    pub fn keys() -> &'static Keys {
+        &KEYS
     }
 
     /// Whether it has a source whose light counts for `intensity`: any but a sky.

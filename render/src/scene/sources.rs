@@ -1,36 +1,42 @@
 //! What shines: gas, disc, hot spots, meshes and skies.
 
 use super::rotation::Rotation;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A volumetric flow with an analytic density and motion (Gold et al. 2020, ApJ 897, 148, section
 /// 3.2), in physical units: intensities of its scene are erg s⁻¹ cm⁻² Hz⁻¹ sr⁻¹. With redshift the
 /// emissivity goes like ν^−α and the absorption like ν^−(5/2 + α), α = `effects.spectral_index`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Gas {
-    /// How the density falls with the radius.
+    /// Density over x = r/`scale_radius`.
     pub profile: GasProfile,
-    /// The radius x = 1 of the profile, in M.
+    /// Radius x = 1, M, above 0.
     pub scale_radius: f64,
-    /// h of the density's factor exp(−(h cos θ)²/2): 0 for a sphere.
+    /// h of the factor exp(−(h cos θ)²/2): 0 for a sphere.
+    #[schemars(range(min = 0.0, max = 1e4), extend("unit" = "a factor"))]
     pub flatness: f64,
-    /// How it moves.
+    /// Motion of the gas.
     pub motion: GasMotion,
-    /// Emissivity at density 1 and the observed frequency, in erg s⁻¹ cm⁻³ Hz⁻¹ sr⁻¹.
+    /// At density 1 and the observed frequency, erg s⁻¹ cm⁻³ Hz⁻¹ sr⁻¹; scales as ν^−α.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "erg s⁻¹ cm⁻³ Hz⁻¹ sr⁻¹"))]
     pub emissivity: f64,
-    /// Absorption coefficient in cm⁻¹ over the emissivity.
+    /// Absorption coefficient, cm⁻¹, over the emissivity; scales as ν^(−5/2 − α).
     #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e30), extend("unit" = "cm⁻¹ over the emissivity"))]
     pub absorptivity: f64,
-    /// Radius in M beyond which there is none.
+    /// No gas beyond, M; above the horizon.
+    #[schemars(range(max = 1e6), extend("unit" = "M"))]
     pub outer_radius: f64,
-    /// Linear colour of its light in the R, G, B channels, dimensionless.
+    /// Linear colour of its light: R, G, B.
     #[serde(default = "white")]
+    #[schemars(inner(range(min = 0.0, max = 1e6)), extend("unit" = "a colour"))]
     pub color: [f32; 3],
 }
 
 /// How the density of a gas falls with x = r/scale.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum GasProfile {
@@ -39,18 +45,20 @@ pub enum GasProfile {
     /// x^−slope.
     PowerLaw {
         /// The slope.
+        #[schemars(range(min = 0.0, max = 20.0), extend("unit" = "an exponent"))]
         slope: f64,
     },
 }
 
 /// How a gas moves.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum GasMotion {
     /// On circles with −u_φ/u_t = l₀ R^{3/2}/(1 + R), R = r sin θ, down to the horizon.
     AngularMomentum {
         /// l₀.
+        #[schemars(range(min = -10.0, max = 10.0), extend("unit" = "M"))]
         l0: f64,
     },
     /// On circles about +z with Ω = 1/(R^{3/2} + a), R = r sin θ; dark where that is not slower
@@ -61,27 +69,32 @@ pub enum GasMotion {
 }
 
 /// A thin disc in the equatorial plane with the flux profile of Page & Thorne (1974).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Disc {
-    /// Inner edge in M; without it the innermost stable circular orbit.
+    /// Inner edge, M, at or outside the innermost stable orbit; that orbit without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inner_edge: Option<f64>,
-    /// Outer edge in M.
+    /// Outer edge, M, outside the inner one.
+    #[schemars(range(max = 1e9), extend("unit" = "M"))]
     pub outer_edge: f64,
-    /// Intensity in the gas frame where the flux profile peaks; it defines the scene units.
+    /// Intensity in the gas frame at the flux peak of the profile that starts at the innermost stable orbit,
+    /// wherever the inner edge is.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "scene units"))]
     pub peak_intensity: f64,
-    /// Whether the disc hides what is behind it.
+    /// Whether it hides what is behind it.
     pub opaque: bool,
-    /// Temperature in K where the flux profile peaks, of a disc that shines like a black body: its
-    /// R, G, B are those of a black body, times its colour, which is white then unless given.
+    /// Temperature at the flux peak, K: black-body colours; with redshift only with `spectral_index = 1`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 300.0, max = 1e8), extend("unit" = "K"))]
     pub peak_temperature_k: Option<f64>,
-    /// Matter that falls in from the innermost stable orbit; without it all is dark inside.
+    /// Emission of matter that falls in from the innermost stable orbit, which `inner_edge` must be; dark inside
+    /// without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plunging: Option<Plunging>,
-    /// Linear colour of its light in the R, G, B channels, dimensionless.
+    /// Linear colour of its light: R, G, B.
     #[serde(default = "white")]
+    #[schemars(inner(range(min = 0.0, max = 1e6)), extend("unit" = "a colour"))]
     pub color: [f32; 3],
 }
 
@@ -89,12 +102,14 @@ pub struct Disc {
 /// the energy and angular momentum that it had there (Cunningham 1975, ApJ 202, 788). The flux of
 /// Page & Thorne (1974) is 0 from that orbit on inward, so that it says nothing about this light:
 /// I = intensity (r/r_isco)^exponent in the matter's frame.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Plunging {
-    /// Intensity in the matter's frame at the innermost stable orbit, scene units.
+    /// Intensity in the gas frame at that orbit.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "scene units"))]
     pub intensity: f64,
-    /// Exponent of r.
+    /// Exponent of (r/r_isco) inside.
+    #[schemars(range(min = -20.0, max = 20.0), extend("unit" = "an exponent"))]
     pub exponent: f64,
 }
 
@@ -103,27 +118,32 @@ fn white() -> [f32; 3] {
 }
 
 /// A Gaussian hot spot on a circular Keplerian orbit about any axis.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Spot {
-    /// Orbit radius in M.
+    /// Radius of the orbit, M, outside the photon orbit and 3 M.
+    #[schemars(range(max = 1e6), extend("unit" = "M"))]
     pub radius: f64,
-    /// Angle along the orbit at time 0, in degrees from the image of the x axis when z is
-    /// tipped onto the orbit's axis along the shortest way.
+    /// Angle along the orbit at time 0, degrees.
+    #[schemars(range(min = -3600.0, max = 3600.0), extend("unit" = "degrees"))]
     pub phase_deg: f64,
-    /// Axis of the orbit, a vector of any length; the spot turns about it right-handed.
+    /// Axis of the orbit, right-handed, a vector of any length.
     #[serde(default = "up")]
     pub axis: [f64; 3],
-    /// Standard deviation of the Gaussian in M.
+    /// Standard deviation, M, at most the radius.
+    #[schemars(range(min = 1e-3), extend("unit" = "M"))]
     pub sigma: f64,
-    /// Emissivity at the centre, in intensity per M.
+    /// Emissivity at the centre, intensity per M.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "intensity per M"))]
     pub peak_emissivity: f64,
-    /// Time in M since which differential rotation shears the spot; without it the spot keeps
-    /// its shape.
+    /// Time at which a round spot lights up, M, at most 2000 before `observer.time`. Differential rotation shears
+    /// it from then on, and it is dark before. With slow light this is a time of emission. Rigid and always lit
+    /// without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sheared_since: Option<f64>,
-    /// Linear colour of its light in the R, G, B channels, dimensionless.
+    /// Linear colour of its light: R, G, B.
     #[serde(default = "white")]
+    #[schemars(inner(range(min = 0.0, max = 1e6)), extend("unit" = "a colour"))]
     pub color: [f32; 3],
 }
 
@@ -133,36 +153,41 @@ fn up() -> [f64; 3] {
 
 /// A triangle mesh as a surface. Its coordinates are r n in M: Boyer–Lindquist ones taken as
 /// Cartesian.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Mesh {
-    /// OBJ, glTF or GLB file, relative to the scene file.
+    /// OBJ (with its MTL), glTF or GLB file; what it refers to lies beside or below it.
     pub path: String,
-    /// M for one unit of the file.
+    /// M per unit of the file.
+    #[schemars(range(min = 1e-9, max = 1e9), extend("unit" = "M per unit of the file"))]
     pub scale: f64,
-    /// Where the file's origin comes to lie, in M.
+    /// x, y, z of the origin of the file, M.
     #[serde(default)]
+    #[schemars(inner(range(min = -1e6, max = 1e6)), extend("unit" = "M"))]
     pub position: [f64; 3],
-    /// Axis about which it is turned first, a vector of any length.
+    /// Axis of the rotation that is applied after scaling, right-handed.
     #[serde(default = "up")]
     pub rotation_axis: [f64; 3],
-    /// By how much it is turned, right-handed, in degrees.
+    /// Its angle, degrees.
     #[serde(default)]
+    #[schemars(range(min = -3600.0, max = 3600.0), extend("unit" = "degrees"))]
     pub rotation_deg: f64,
     /// Whether it hides what is behind it.
     pub opaque: bool,
-    /// Intensity in scene units, in the surface's frame, where its colour is 1; 0: black.
+    /// Intensity in the frame of the surface where its colour is 1; 0: black.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "scene units"))]
     pub brightness: f64,
-    /// Linear colour of its light (R, G, B; dimensionless); without it that of its materials.
+    /// Linear colour of its light: R, G, B; that of its materials without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = 0.0, max = 1e6)), extend("unit" = "a colour"))]
     pub color: Option<[f32; 3]>,
-    /// How its matter moves; needed when `effects.redshift` is on.
+    /// Motion of its matter, for the redshift, with which it is needed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity: Option<MeshVelocity>,
 }
 
 /// How the matter of a mesh moves, for its redshift: the surface itself stays where it is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum MeshVelocity {
@@ -174,49 +199,70 @@ pub enum MeshVelocity {
 
 /// Emission on the nodes of a box that matter on circles about an axis carries along. Coordinates
 /// are r n in M: Boyer–Lindquist ones taken as Cartesian.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VolumeSource {
-    /// NPZ or NPY file, relative to the scene file.
+    /// NPZ or NPY file, or a Zarr store.
     pub path: String,
-    /// Emissivity where the file has 1, in intensity per M.
+    /// Emissivity where the file has 1, intensity per M.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "intensity per M"))]
     pub factor: f64,
-    /// Coordinates of the first node in M; without it those of the file.
+    /// Coordinates of the first node, M; those of the file without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = -1e6, max = 1e6)), extend("unit" = "M"))]
     pub low: Option<[f64; 3]>,
-    /// Coordinates of the last node in M; without it those of the file.
+    /// Coordinates of the last node, M; those of the file without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = -1e6, max = 1e6)), extend("unit" = "M"))]
     pub high: Option<[f64; 3]>,
-    /// Axis about which it turns right-handed, a vector of any length; without it that of the file.
+    /// Rotation axis, right-handed; that of the file without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<[f64; 3]>,
-    /// How fast it turns; `velocity` means the same, as fits call it.
+    /// Motion of the matter; `velocity` means the same, as fits call it.
     #[serde(alias = "velocity")]
+    #[schemars(with = "super::rotation::RotationKeys")]
     pub rotation: Rotation,
-    /// Time in M at which it is as in the file; needed if it turns.
+    /// Time at which the volume is as in the file, M; needed if it rotates.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub reference_time: Option<f64>,
-    /// Time in M before which nothing of it shines.
+    /// Dark before this time, M; always lit without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub injection_time: Option<f64>,
-    /// Where it shines, at rest while matter passes through; wherever the file has light without it.
+    /// Lit only where r_min ≤ r < r_max and |z| ≤ z_width, at rest; everywhere without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region: Option<VolumeRegion>,
-    /// Linear colour of its light in the R, G, B channels, dimensionless.
+    /// Linear colour of its light: R, G, B.
     #[serde(default = "white")]
+    #[schemars(inner(range(min = 0.0, max = 1e6)), extend("unit" = "a colour"))]
     pub color: [f32; 3],
 }
 
+/// The table of a scene in which keys of volumes that have two names have their own.
+pub(super) fn with_own_names(mut scene: toml::Table) -> toml::Table {
+    let volumes = scene.get_mut("volume").and_then(toml::Value::as_array_mut);
+    for volume in volumes.into_iter().flatten().filter_map(toml::Value::as_table_mut) {
+        if let Some(rotation) = volume.remove("velocity") {
+            volume.insert("rotation".to_owned(), rotation);
+        }
+    }
+    scene
+}
+
 /// Where a volume shines: r_min ≤ r < r_max, |z| ≤ z_width, as the region of a fit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VolumeRegion {
     /// Least radius, M.
+    #[schemars(range(min = 0.0, max = 1e6), extend("unit" = "M"))]
     pub r_min: f64,
     /// Largest radius, M.
+    #[schemars(range(max = 1e6), extend("unit" = "M"))]
     pub r_max: f64,
-    /// Largest |z|, M; any without it.
+    /// Largest |z|, M, above 0; any without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(max = 1e6), extend("unit" = "M"))]
     pub z_width: Option<f64>,
 }
 
@@ -228,7 +274,7 @@ impl VolumeRegion {
 }
 
 /// What the rays that escape see: `[sky.checker]`, `[sky.stars]`, `[sky.catalogue]` or `[sky.image]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Sky {
@@ -244,39 +290,47 @@ pub enum Sky {
 }
 
 /// A checkered sky.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Checker {
-    /// Side of a field in degrees; must divide 180.
+    /// Side of a square, degrees, above 0.5; divides 180.
     pub field_deg: f64,
-    /// Factor on the linear colours.
+    /// Factor on the colours.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "scene units"))]
     pub brightness: f64,
 }
 
 /// Random stars.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Stars {
-    /// Mean number of stars on the whole sphere.
+    /// Mean number of stars on the sphere.
+    #[schemars(range(min = 1, max = 10_000_000), extend("unit" = "stars"))]
     pub count: u32,
-    /// Angular radius of a star's disc in degrees.
+    /// Radius of a star, degrees, above 0.
+    #[schemars(range(max = 2.0), extend("unit" = "degrees"))]
     pub radius_deg: f64,
-    /// Factor on the linear colours.
+    /// Brightness of a star.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "scene units"))]
     pub brightness: f64,
     /// Seed of the pattern.
     pub seed: u64,
 }
 
 /// Stars of a catalogue, as points whose light is spread over pixels.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StarCatalogue {
-    /// CSV file, relative to the scene file.
+    /// CSV. Its first line names the columns: `lon`, `lat` (or `ra`, `dec`) in degrees, `magnitude` (or `mag`), and
+    /// optionally `color_index` (B − V; white without it). `lon` is the azimuth, `lat` the angle above the
+    /// equatorial plane of the hole.
     pub path: String,
     /// Light of a star of magnitude 0, in scene units × square degrees.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "scene units"))]
     pub brightness: f64,
-    /// Full width at half maximum of the Gaussian point-spread function, in pixels.
+    /// Full width at half maximum of the Gaussian point-spread function, pixels.
     #[serde(default = "two")]
+    #[schemars(range(min = 1.6, max = 64.0), extend("unit" = "pixels"))]
     pub psf_fwhm_pixels: f64,
 }
 
@@ -285,11 +339,12 @@ fn two() -> f64 {
 }
 
 /// A picture as sky.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SkyImage {
-    /// PNG, JPEG, HDR or EXR file, relative to the scene file.
+    /// Equirectangular image: PNG or JPEG (sRGB), HDR or EXR (linear).
     pub path: String,
     /// Factor on the linear colours.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "scene units"))]
     pub brightness: f64,
 }

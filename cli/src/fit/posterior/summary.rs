@@ -1,7 +1,6 @@
 //! What follows from draws: intervals of the world, mean and spread of the volume, features, and how often a known truth
 //! lies inside.
 
-use super::super::labels;
 use super::Kept;
 use super::predictive::{self, Check};
 use kerrlight_render::volume::ranks::{Ranks, rank};
@@ -223,7 +222,7 @@ impl Interval {
     }
 
     fn sentence(&self) -> String {
-        let (words, unit) = labels::parameter(self.parameter);
+        let (words, unit) = self.parameter.label();
         let truth = self.truth.map(|truth| if truth.abs() < 5e-4 { 0.0 } else { truth });
         let truth = truth.map_or(String::new(), |truth| format!(" (truth: {truth:.3}{unit})"));
         let ([from, to], [low, high]) = (self.ends(), self.bounds);

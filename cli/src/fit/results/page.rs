@@ -11,9 +11,7 @@ use super::{Estimate, Found, bounds, quadrature};
 use crate::fit::SETTINGS;
 use crate::fit::curves::{loss_plot, psnr_plot};
 use crate::fit::folder::Folder;
-use crate::fit::{
-    band_plots, band_search, band_words, held_out, labels, world_results, world_scan,
-};
+use crate::fit::{band_plots, band_search, band_words, held_out, world_results, world_scan};
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
 use anyhow::Context;
@@ -180,7 +178,7 @@ impl Estimate<'_> {
             rounded(file.observer.inclination_deg),
             self.measured.times.len(),
             data.join(", "),
-            labels::described(file)
+            file.recovered()
         )];
         if results["world"].is_object() {
             lines.extend(world_results::sentences(&results["world"]));

@@ -4,7 +4,7 @@ use super::folder::{self, Folder};
 use crate::devices::FitDevice;
 use crate::fit::journal::Journal;
 use crate::fit::{
-    axis_scan, band_search, closures, delegate, held_out, labels, leakage, linear, world_search,
+    axis_scan, band_search, closures, delegate, held_out, leakage, linear, world_search,
 };
 use crate::interrupt::Keeper;
 use crate::plain;
@@ -146,7 +146,7 @@ impl<'a> Kept<'a> {
             model.frames(),
             model.rays(),
             now.instrument.lines.points(),
-            labels::representation(&now.settings.representation.kind),
+            now.settings.representation.kind.label(),
             now.trainer.representation.parameters(),
         )
     }

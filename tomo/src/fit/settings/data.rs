@@ -33,7 +33,7 @@ pub enum DataFiles {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         scattering: Option<Scattering>,
         /// Adds jy/(1 + (|u|/uv)²)^(power/2) to all errors, for what the source varies and the model does not; not
-        /// with polarized products.
+        /// with polarised products.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         variability: Option<Variability>,
     },

@@ -10,11 +10,11 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InstrumentSettings {
-    /// Complex gains, one a station and frame. Needs one loss of visibilities, polarized visibilities or
+    /// Complex gains, one a station and frame. Needs one loss of visibilities, polarised visibilities or
     /// amplitudes. Every station needs a prior.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gains: Option<GainSettings>,
-    /// Leakage between the feeds, the same in all frames. Needs polarized visibilities, circular feeds, and a
+    /// Leakage between the feeds, the same in all frames. Needs polarised visibilities, circular feeds, and a
     /// linear-grid or a linear start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub leakage: Option<LeakageSettings>,

@@ -61,7 +61,7 @@ mod tests {
                 "hole.mass_msun=1e300",
                 "hole.mass_msun = 1e300 is not allowed: 1e-20 to 1e15 (solar masses)",
             ),
-            ("screen.width=1e-300", "screen.width = 1e-300 is not allowed: 0.001 to 1000000 (M)"),
+            ("screen.width=1e-300", "screen.width = 1e-300 is not allowed: 0.001 to 1e6 (M)"),
             ("effects.redshift_power=-1e9", "effects.redshift_power = -1e9"),
             ("motion.velocity.keplerian.drag=1e300", "motion.velocity.keplerian.drag = 1e300"),
             ("motion.reference_time=inf", "motion.reference_time = inf"),

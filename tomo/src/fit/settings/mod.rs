@@ -81,7 +81,7 @@ pub struct FitFile {
     pub effects: Effects,
     /// Motion of the emitting matter: circles about an axis, or with a radial velocity.
     pub motion: Motion,
-    /// Magnetic field of the gas and its polarized light; total intensity alone without it.
+    /// Magnetic field of the gas and its polarised light; total intensity alone without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polarization: Option<PolarizationLaw>,
     /// Chooses a number of the linear problem by cross-validation.
@@ -127,7 +127,7 @@ pub struct FitFile {
     pub probe: Option<ProbeSettings>,
     /// How the recovered emission is represented.
     pub representation: Representation,
-    /// How the representation is optimized.
+    /// How the representation is optimised.
     #[serde(default)]
     pub training: Training,
     /// The linear problem of voxels, for linear-grid, a linear start, a scan of axes and searches.

@@ -99,6 +99,18 @@ impl Kind {
         }
     }
 
+    /// A few words for it.
+    pub fn label(&self) -> &str {
+        match self {
+            Kind::Bhnerf => "network (BH-NeRF)",
+            Kind::Mlp4d => "network of space and time",
+            Kind::FeatureGrid => "grids of features",
+            Kind::Grid => "grid of voxels",
+            Kind::LinearGrid => "linear grid of voxels",
+            Kind::Own(name) => name,
+        }
+    }
+
     /// Keys of `representation` that it has a use for, `kind` aside; none of one that a program adds, which says itself
     /// what it needs.
     fn keys(&self) -> Option<&'static [&'static str]> {

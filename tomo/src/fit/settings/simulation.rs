@@ -214,7 +214,7 @@ pub struct Observation {
     /// Gain errors of the stations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gains: Option<GainErrors>,
-    /// Root mean square of |d| of the leakage, drawn once for each feed; needs a loss of polarized visibilities.
+    /// Root mean square of |d| of the leakage, drawn once for each feed; needs a loss of polarised visibilities.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "a root mean square of |d|"))]
     pub leakage: Option<f64>,

@@ -44,7 +44,7 @@ pub struct StaticImageFile {
     /// Measures a ring in the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ring: Option<RingSettings>,
-    /// Fits linear polarization as well.
+    /// Fits linear polarisation as well.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub polarization: Option<StaticPolarization>,
 }

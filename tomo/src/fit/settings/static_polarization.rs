@@ -22,7 +22,7 @@ pub struct StaticPolarization {
     /// Adds jy/(1 + (|u|/uv)²)^(power/2) to errors of RL and LR.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variability: Option<Variability>,
-    /// Factor on ∫ e |∇m|², e the brightness over its mean and m the fraction of polarization.
+    /// Factor on ∫ e |∇m|², e the brightness over its mean and m the fraction of polarisation.
     #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "a factor"))]
     pub smoothness: f64,
     /// Iterations, at most.

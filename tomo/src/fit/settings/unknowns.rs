@@ -29,6 +29,27 @@ impl FitFile {
         Ok(())
     }
 
+    /// What is recovered, in a sentence for somebody who does not know the names.
+    pub fn recovered(&self) -> &str {
+        match &self.representation.kind {
+            Kind::Bhnerf => {
+                "a neural network on coordinates pulled back to the reference time (BH-NeRF)"
+            }
+            Kind::Mlp4d => "a neural network of place and time, which knows nothing of orbits",
+            Kind::FeatureGrid => {
+                "a small neural network on multi-resolution feature grids that move with the matter"
+            }
+            Kind::Grid => "values at the nodes of a grid that is carried along the orbits",
+            Kind::LinearGrid if !self.is_convex() => {
+                "voxel values on a grid that moves with the matter, found by descent from several starts because these data make the problem non-convex"
+            }
+            Kind::LinearGrid => {
+                "voxel values on a grid that moves with the matter, the solution of a convex problem"
+            }
+            Kind::Own(name) => name,
+        }
+    }
+
     /// What a reader has to know of what these data leave open, a paragraph each.
     pub fn unknowns(&self) -> Vec<String> {
         let mut all = Vec::new();

@@ -99,6 +99,24 @@ const RADIAL: [&str; KNOTS] = [
     "radial_factor_5",
 ];
 
+/// Their words in a sentence.
+const ANGULAR_LABELS: [&str; KNOTS] = [
+    "angular velocity at the first radius over the assumed one",
+    "angular velocity at the second radius over the assumed one",
+    "angular velocity at the third radius over the assumed one",
+    "angular velocity at the fourth radius over the assumed one",
+    "angular velocity at the fifth radius over the assumed one",
+    "angular velocity at the sixth radius over the assumed one",
+];
+const RADIAL_LABELS: [&str; KNOTS] = [
+    "radial velocity at the first radius over the assumed one",
+    "radial velocity at the second radius over the assumed one",
+    "radial velocity at the third radius over the assumed one",
+    "radial velocity at the fourth radius over the assumed one",
+    "radial velocity at the fifth radius over the assumed one",
+    "radial velocity at the sixth radius over the assumed one",
+];
+
 impl Parameter {
     /// All of them, in the order of [`World`].
     pub const ALL: [Parameter; PARAMETERS] = [
@@ -146,6 +164,25 @@ impl Parameter {
             Parameter::BetaPhi => 10,
             Parameter::Angular(knot) => 11 + usize::from(knot),
             Parameter::Radial(knot) => 11 + KNOTS + usize::from(knot),
+        }
+    }
+
+    /// Its words in a sentence, and its unit, degrees for angles.
+    pub fn label(self) -> (&'static str, &'static str) {
+        match self {
+            Parameter::Spin => ("spin", ""),
+            Parameter::Inclination => ("inclination", "°"),
+            Parameter::PositionAngle => ("position angle of the spin", "°"),
+            Parameter::OffsetX => ("horizontal position of the hole", " M"),
+            Parameter::OffsetY => ("vertical position of the hole", " M"),
+            Parameter::Mass => ("mass over the assumed one", ""),
+            Parameter::Rotation => ("angular velocity over the assumed one", ""),
+            Parameter::RedshiftPower => ("power of the redshift factor", ""),
+            Parameter::Xi => ("angular momentum over that of circular orbits", ""),
+            Parameter::BetaR => ("part of the radial velocity that is not free fall", ""),
+            Parameter::BetaPhi => ("part of the angular velocity that is not free fall", ""),
+            Parameter::Angular(knot) => (ANGULAR_LABELS[usize::from(knot)], ""),
+            Parameter::Radial(knot) => (RADIAL_LABELS[usize::from(knot)], ""),
         }
     }
 
