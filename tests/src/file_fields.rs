@@ -90,7 +90,7 @@ fn exact_numpy_files_that_are_no_image_are_refused() {
     let fields = npy("'<f8'", "False", "(2,)", &two);
     archive(&at.join("fields.npz"), &[("image.npy", &plain), ("field_uas.npy", &fields)]);
     let pair = |n: f64| [n, 0.0].iter().flat_map(|n| n.to_le_bytes()).collect();
-    let nan = |n: f64| if n == 4.0 { f64::NAN } else { n }.to_le_bytes().into();
+    let nan = |n: f64| if n == 5.0 { f64::NAN } else { n }.to_le_bytes().into();
     for (name, array, said) in [
         ("complex", npy("'<c16'", "False", "(4, 4)", &bytes(&pair, &rows)), "c16"),
         ("records", npy("[('x', '<f8')]", "False", "(4, 4)", &bytes(&little, &rows)), "x"),
