@@ -87,22 +87,28 @@ pub struct Convert {
 const INCOHERENT: f64 = 0.05;
 
 impl Convert {
-    /// Converts.
-    pub fn run(&self) -> anyhow::Result<Answer> {
-        let output = ObservationFile::new(&self.output, self.format, self.comments)?;
-        output.spares(&self.input)?;
-        self.gains.iter().chain(&self.leakage).try_for_each(|table| output.spares(table))?;
+    /// Refuses numbers of options before anything is read.
+    fn check_numbers(&self) -> anyhow::Result<()> {
         if let Some(seconds) = self.average.filter(|s| !Averaging::over(*s).is_allowed()) {
             bail!("--average {seconds} is not allowed: seconds in [1e-3, 1e9]");
+        }
+        if let Some(snr) = self.closure_traces.filter(|snr| !(0.0..=1e9).contains(snr)) {
+            bail!("--closure-traces {snr} is not allowed: a signal-to-noise ratio in [0, 1e9]");
         }
         for (name, limit) in [("--uv-min", self.uv_min), ("--uv-max", self.uv_max)] {
             if let Some(limit) = limit.filter(|limit| limit.is_nan() || *limit < 0.0) {
                 bail!("{name} {limit} is not allowed: wavelengths, 0 or more");
             }
         }
-        if let Some(snr) = self.closure_traces.filter(|snr| !(0.0..=1e9).contains(snr)) {
-            bail!("--closure-traces {snr} is not allowed: a signal-to-noise ratio in [0, 1e9]");
-        }
+        Ok(())
+    }
+
+    /// Converts.
+    pub fn run(&self) -> anyhow::Result<Answer> {
+        let output = ObservationFile::new(&self.output, self.format, self.comments)?;
+        output.spares(&self.input)?;
+        self.gains.iter().chain(&self.leakage).try_for_each(|table| output.spares(table))?;
+        self.check_numbers()?;
         let (_, mut observation) = interferometry::read(&self.input)?;
         self.complete(&mut observation)?;
         let flags = Flags {

@@ -129,7 +129,7 @@ fn exact_lines_are_those_of_the_file() {
     let new = "with --set hole.mass=1: hole: unknown field `mass`";
     for (words, said) in [
         ("fit wrong_f.toml", steps.as_str()),
-        ("fit wrong_f.toml --set observer.radius=100 --set hole.spin=0.1", &steps),
+        ("fit wrong_f.toml --set observer.radius=900 --set hole.spin=0.1", &steps),
         ("fit f.toml --set hole.mass=1", &format!("f.toml {new}")),
         ("fit f.toml --set hole.spin=7", "f.toml with --set hole.spin=7: hole.spin = 7 is not"),
         ("render wrong_s.toml", &colour),

@@ -23,17 +23,28 @@ fn archive(path: &Path, arrays: &[(&str, &[u8])]) {
 const SEEN: &str =
     "--array EHT2017 --source m87 --mjd 57854 --utc 3-4 --frames 1 --tint 10 --transform direct";
 
-/// An image of 4² pixels, its rows from the north, as every kind of array.
+/// Pixels of an image of 4², in an order.
+fn bytes(number: &dyn Fn(f64) -> Vec<u8>, order: &dyn Fn(usize) -> usize) -> Vec<u8> {
+    (0..16).flat_map(|k| number(1.0 + (order(k) * order(k) % 7) as f64)).collect()
+}
+
+fn rows(k: usize) -> usize {
+    k
+}
+
+fn columns(k: usize) -> usize {
+    4 * (k % 4) + k / 4
+}
+
+fn little(number: f64) -> Vec<u8> {
+    number.to_le_bytes().to_vec()
+}
+
+/// An image, its rows from the north, as every kind of array.
 #[test]
 fn exact_fields_of_numpy_images() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let pixels: [f64; 16] = core::array::from_fn(|k| 1.0 + (k * k % 7) as f64);
-    let bytes = |number: &dyn Fn(f64) -> Vec<u8>, order: &dyn Fn(usize) -> usize| {
-        (0..16).flat_map(|k| number(pixels[order(k)])).collect::<Vec<u8>>()
-    };
-    let (rows, columns) = (|k: usize| k, |k: usize| 4 * (k % 4) + k / 4);
-    let little = |n: f64| n.to_le_bytes().to_vec();
     let plain = npy("'<f8'", "False", "(4, 4)", &bytes(&little, &rows));
     let seen = |name: &str, field: &str| {
         let words = format!("observe {name} {field} {SEEN} -o -");
@@ -67,12 +78,19 @@ fn exact_fields_of_numpy_images() {
     archive(&at.join("b.npz"), &[("image.npy", &plain), ("field_uas.npy", &half)]);
     assert_eq!(seen("b.npz", "--fov-uas 60"), expected);
     assert_ne!(seen("b.npz", ""), expected);
+}
+
+#[test]
+fn exact_numpy_files_that_are_no_image_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let plain = npy("'<f8'", "False", "(4, 4)", &bytes(&little, &rows));
     archive(&at.join("two.npz"), &[("one.npy", &plain), ("other.npy", &plain)]);
     let two = [60_f64, 30.0].iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<u8>>();
     let fields = npy("'<f8'", "False", "(2,)", &two);
     archive(&at.join("fields.npz"), &[("image.npy", &plain), ("field_uas.npy", &fields)]);
     let pair = |n: f64| [n, 0.0].iter().flat_map(|n| n.to_le_bytes()).collect();
-    let nan = |n: f64| if n == 4.0 { f64::NAN } else { n }.to_le_bytes().into();
+    let nan = |n: f64| if n == 5.0 { f64::NAN } else { n }.to_le_bytes().into();
     for (name, array, said) in [
         ("complex", npy("'<c16'", "False", "(4, 4)", &bytes(&pair, &rows)), "c16"),
         ("records", npy("[('x', '<f8')]", "False", "(4, 4)", &bytes(&little, &rows)), "x"),

@@ -50,8 +50,12 @@ pub fn parse(text: &str) -> Result<GainTable, Error> {
         let located = |message: String| FileError::line(index + 1, message);
         let cells: Vec<&str> = line.split(',').map(str::trim).take(64).collect();
         match &places {
-            None => places = Some(heading(&cells).map_err(located)?),
-            Some(places) => gains.push(gain(&cells, places).map_err(located)?),
+            None => places = Some((heading(&cells).map_err(located)?, cells.len())),
+            Some((_, names)) if cells.len() > *names => {
+                let message = format!("{} columns, but {names} names", cells.len());
+                return Err(located(message).into());
+            }
+            Some((places, _)) => gains.push(gain(&cells, places).map_err(located)?),
         }
     }
     if gains.is_empty() {
@@ -65,6 +69,10 @@ pub fn parse(text: &str) -> Result<GainTable, Error> {
 type Places = [Option<usize>; COLUMNS.len()];
 
 fn heading(cells: &[&str]) -> Result<Places, String> {
+    let times = |name: &str| cells.iter().filter(|cell| **cell == name).count();
+    if let Some(twice) = COLUMNS.iter().find(|name| times(name) > 1) {
+        return Err(format!("column `{twice}` appears twice"));
+    }
     let places = COLUMNS.map(|name| cells.iter().position(|cell| *cell == name));
     let missing =
         COLUMNS.iter().zip(places).find(|(name, at)| at.is_none() && !OPTIONAL.contains(name));
@@ -131,6 +139,8 @@ mod tests {
             (format!("{head}1.0,60,AA,x,0\n"), "line 2: column amplitude: `x` is not a number"),
             (format!("{head}1.0,60,AA,1\n"), "line 2: column phase_deg is missing"),
             (format!("{head}1.0,-5,AA,1,0\n"), "line 2: column span_s: -5 s is not allowed"),
+            (format!("{head}1.0,60,AA,1,0,7\n"), "line 2: 6 columns, but 5 names"),
+            (format!("span_s,{head}60,1.0,60,AA,1,0\n"), "line 1: column `span_s` appears twice"),
             (head.to_owned(), "no gains"),
         ] {
             let error = parse(&text).unwrap_err().to_string();

@@ -40,7 +40,12 @@ pub fn parse(text: &str) -> Result<LeakageTable, Error> {
     }
     let row =
         |(k, line): (usize, &str)| station(line).map_err(|message| FileError::line(k + 1, message));
-    Ok(LeakageTable { stations: lines.map(row).collect::<Result<_, _>>()? })
+    let stations: Vec<StationLeakage> = lines.map(row).collect::<Result<_, _>>()?;
+    let is_twice = |k: &usize| stations[..*k].iter().any(|s| s.station == stations[*k].station);
+    if let Some(k) = (1..stations.len()).find(is_twice) {
+        return Err(FileError::whole(format!("{} is listed twice", stations[k].station)).into());
+    }
+    Ok(LeakageTable { stations })
 }
 
 fn station(line: &str) -> Result<StationLeakage, String> {
@@ -79,6 +84,7 @@ mod tests {
         let refused = |text: &str| parse(text).unwrap_err().to_string();
         assert!(refused("station,d\n").starts_with("line 1: `station,d`"));
         assert!(refused(&format!("{text}AA,1,2\n")).contains("line 4: 3 columns"));
+        assert!(refused(&format!("{text}AA,1,2,3,4,5,6\n")).contains("AA is listed twice"));
         let bad = text.replace("0.1,", "x,");
         assert!(bad == text || refused(&bad).contains("column"));
         assert!(refused(&text.replacen("-0.05", "much", 1)).contains("line 2: column d_r_im:"));

@@ -26,6 +26,8 @@ struct TimeColumn {
 
 /// Where the columns are.
 struct Heading {
+    /// How many there are in all.
+    count: usize,
     time: TimeColumn,
     values: [Option<usize>; 4],
     sigmas: [Option<usize>; 4],
@@ -66,11 +68,19 @@ impl Heading {
         let values = StokesParameter::ALL.map(value);
         values.iter().any(Option::is_some).then_some(())?;
         Some(Heading {
+            count: names.len(),
             time: TimeColumn::find(names)?,
             values,
             sigmas: StokesParameter::ALL.map(error),
             by: at("baseline"),
         })
+    }
+
+    /// The number of a column that is read and has the name of another one.
+    fn twice(&self, names: &[String]) -> Option<usize> {
+        let read = [self.values, self.sigmas].into_iter().flatten().flatten();
+        let is_twice = |k: &usize| names[k + 1..].contains(&names[*k]);
+        read.chain([self.time.at]).find(is_twice)
     }
 }
 
@@ -142,10 +152,15 @@ pub fn parse(text: &str) -> Result<LightCurve, Error> {
         }
         let cells = cells(line);
         if heading.is_none() {
-            let here = Heading::find(&names(line));
-            let is_names = here.is_some();
+            let here = names(line);
+            let is_names = Heading::find(&here).is_some();
+            let named = if is_names { here } else { std::mem::take(&mut comment) };
             let why = || located(format!("`{}` names no {}", shown(line), wanted()));
-            heading = Some(here.or_else(|| Heading::find(&comment)).ok_or_else(why)?);
+            let found = Heading::find(&named).ok_or_else(why)?;
+            if let Some(k) = found.twice(&named) {
+                return Err(located(format!("column `{}` appears twice", named[k])).into());
+            }
+            heading = Some(found);
             if is_names {
                 continue;
             }
@@ -196,6 +211,9 @@ fn sample(
         let count = cells.len();
         cells.get(at).copied().ok_or_else(|| format!("column {name} is missing: {count} cells"))
     };
+    if cells.len() > columns.count {
+        return Err(format!("{} cells, but {} names", cells.len(), columns.count));
+    }
     let TimeColumn { at, days } = columns.time;
     let time_h = hours(cell(at, "time")?, days, first_day)?;
     let mut stokes = [None; 4];
@@ -332,6 +350,8 @@ mod tests {
             ("when,I\n1,2\n", "line 1: `when,I` names no columns time_utc_h"),
             ("time,I,Q\n1,2\n", "line 2: column Q is missing"),
             ("time,I\n1e9,2\n", "line 2: column time: 1000000000 h is not allowed"),
+            ("time,Q,Q\n1,2,3\n", "line 1: column `q` appears twice"),
+            ("time,I\n1,2,3\n", "line 2: 3 cells, but 2 names"),
             ("", "no line names columns time_utc_h"),
         ] {
             let error = parse(text).unwrap_err().to_string();

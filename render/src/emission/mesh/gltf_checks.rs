@@ -46,7 +46,8 @@ fn check_rotations(document: &Document) -> Result<(), MeshError> {
     for (k, rotation) in rotations.enumerate() {
         let Some(rotation) = rotation else { continue };
         let length = rotation.0.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
-        if !((length - 1.0).abs() <= UNIT) {
+        let is_unit = (length - 1.0).abs() <= UNIT;
+        if !is_unit {
             return fail(format!("node {k} (counted from 0): rotation of length {length}: 1"));
         }
     }

@@ -79,12 +79,7 @@ pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
     };
     observation.history = remarks(unknown, ahead_h, layout.weighted);
     observation.history.extend(uncalibrated);
-    if !flags.is_empty() {
-        observation.history.push(format!("flags of AIPS FG applied: {}", flags.len()));
-    }
-    if left_out > 0 {
-        observation.history.push(format!("{left_out} groups without valid data left out"));
-    }
+    observation.history.extend(without_data(flags.len(), left_out));
     observation.history.extend(tables.remarks);
     observation.stations = tables.stations;
     Ok(observation)
@@ -140,6 +135,13 @@ fn remarks(without_fq: bool, ahead_h: f64, weighted: bool) -> Vec<String> {
         lines.push("no weights: errors of 1 Jy".to_owned());
     }
     lines
+}
+
+/// Lines of the history about data that there are none of.
+fn without_data(flags: usize, left_out: usize) -> impl Iterator<Item = String> {
+    let flags = (flags > 0).then(|| format!("flags of AIPS FG applied: {flags}"));
+    let groups = (left_out > 0).then(|| format!("{left_out} groups without valid data left out"));
+    flags.into_iter().chain(groups)
 }
 
 /// Baselines of interferometers in space are shorter than this, seconds of light.
