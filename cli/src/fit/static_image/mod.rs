@@ -112,7 +112,8 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
         begun,
     };
     found.images()?;
-    let results = found.results();
+    let mut results = found.results();
+    results["ring_sentence"] = words::ring(&found.survey, &found.shapes).into();
     folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
     found.report(&evidence, &results)?;
     let files = ["report.html", "results.json", "image.npz", "image.png"];

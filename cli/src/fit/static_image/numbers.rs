@@ -1,6 +1,6 @@
 //! results.json of a static image.
 
-use super::{Found, words};
+use super::Found;
 use crate::fit::closures;
 use crate::fit::results::verdict;
 use crate::session;
@@ -132,7 +132,6 @@ impl Found<'_> {
         results["shapes"] = self.shapes.iter().map(shape).collect();
         let [with, all] = self.survey.with_ring();
         results["images_with_ring"] = json!({"count": with, "of": all});
-        results["ring_sentence"] = json!(words::ring(&self.survey, &self.shapes));
         self.add_ring(&mut results);
         results
     }
