@@ -32,6 +32,7 @@ mod interferometry;
 mod kerr_references;
 mod leakage;
 mod lensing;
+mod other_sky;
 #[cfg(unix)]
 mod pictures;
 mod posterior;

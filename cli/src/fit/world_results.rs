@@ -30,6 +30,7 @@ pub fn lines(results: &Value) -> Vec<String> {
             }
         })
         .collect();
+    lines.extend(own(results).map(|said| format!("world: {said}")));
     lines.extend(small_residuals(results).map(|said| format!("note: {said}")));
     lines.extend(rival(results).map(|said| format!("note: {said}")));
     lines.extend(unfinished(results).map(|said| format!("note: {said}")));
@@ -102,6 +103,7 @@ pub fn sentences(results: &Value) -> Vec<String> {
         })
     };
     let mut all: Vec<String> = Parameter::ALL.into_iter().filter_map(of).collect();
+    all.extend(own(results).map(|said| format!("Errors: {said}.")));
     all.extend(small_residuals(results).map(|said| format!("Note that {said}.")));
     all.extend(rival(results).map(|said| format!("Note that {said}.")));
     all.extend(unfinished(results).map(|said| format!("Note that {said}.")));
@@ -114,6 +116,33 @@ pub fn sentences(results: &Value) -> Vec<String> {
         )
     }));
     all
+}
+
+/// How much of the errors the model makes itself.
+fn own(results: &Value) -> Option<String> {
+    let parts = results["model_error"].as_object().filter(|parts| !parts.is_empty())?;
+    let of = |parameter: Parameter| {
+        let (words, unit) = labels::parameter(parameter);
+        let name = parameter.name();
+        let sigma = results["sigma"][name].as_f64()?;
+        let mut each: Vec<(&str, f64)> = parts
+            .iter()
+            .filter_map(|(source, moved)| Some((source.as_str(), moved[name].as_f64()?)))
+            .collect();
+        each.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let whole = each.iter().map(|(_, moved)| moved * moved).sum::<f64>().sqrt();
+        let each = each.iter().map(|(source, moved)| format!("{source} {moved:.4}{unit}"));
+        let each = each.collect::<Vec<_>>().join(", ");
+        Some(match results["open"][name] == true {
+            true => format!("the model leaves the {words} open ({each})"),
+            false => format!(
+                "of ± {sigma:.4}{unit} in {words}, {:.4}{unit} is the model's own ({each})",
+                whole.min(sigma)
+            ),
+        })
+    };
+    let all: Vec<String> = Parameter::ALL.into_iter().filter_map(of).collect();
+    (!all.is_empty()).then(|| all.join("; "))
 }
 
 /// A world far from the best one that explains the data about as well: one of two mirror images, say.
