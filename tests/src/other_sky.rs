@@ -96,6 +96,34 @@ fn found(folder: &Path, sky: &Sky, noise: f64) -> Value {
     serde_json::from_slice(&text).expect("JSON")
 }
 
+/// Far from the hole rays are straight: light of a spot there is its flux, and lies where the screen says.
+#[test]
+fn exact_a_distant_spot_is_where_its_azimuth_says() {
+    let (radius, sigma) = (12.0, 1.0);
+    let azimuth = 1.5 * core::f64::consts::PI;
+    let spot = Arc { radius, azimuth, pitch: 0.0, length: sigma, sigma, amplitude: 1.0 };
+    let face_on = |position_angle_deg: f64| {
+        let sky = Sky { spin: 0.0, inclination_deg: 0.01, position_angle_deg, arcs: vec![spot] };
+        let screen = Screen { width: 36.0, pixels: 36, rays: 1 };
+        let image = sky.movie(screen, &[0.0]).unwrap().remove(0);
+        let total: f64 = image.iter().sum();
+        let mean = |place: fn(usize) -> usize| {
+            let places = image.iter().enumerate();
+            places.map(|(k, x)| (place(k) as f64 - 17.5) * x).sum::<f64>() / total
+        };
+        ([mean(|k| k % 36), -mean(|k| k / 36)], total)
+    };
+    let (upright, flux) = face_on(0.0);
+    // Of a Gaussian in space times g² of its orbit, within what lensing adds.
+    let bare = (core::f64::consts::TAU).powf(1.5) * (1.0 - 3.0 / radius);
+    assert!((flux / bare - 1.0).abs() < 0.2, "{flux} {bare}");
+    let distance = upright[0].hypot(upright[1]);
+    assert!((distance - radius - 1.0).abs() < 0.5, "{upright:?}");
+    // A position angle of 90 degrees turns north to east, to the left.
+    let (turned, _) = face_on(90.0);
+    assert!((turned[0] + upright[1]).abs() < 0.1 && (turned[1] - upright[0]).abs() < 0.1);
+}
+
 /// Voxels and pixels of the fit are too coarse for the filaments: χ² of 4 and errors of the data alone would claim a spin that
 /// is wrong by 300 of them.
 #[test]

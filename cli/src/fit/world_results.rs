@@ -97,7 +97,7 @@ pub fn sentences(results: &Value) -> Vec<String> {
             ));
         }
         let interval = format!("between {from:.3}{unit} and {to:.3}{unit} at 95 %{truth}");
-        Some(match unexplained(results) {
+        Some(match unexplained(results).filter(|_| !has_own(results)) {
             None => format!("The {words} is {interval}."),
             Some(_) => format!("If the model were right, the {words} would be {interval}."),
         })
@@ -120,7 +120,7 @@ pub fn sentences(results: &Value) -> Vec<String> {
 
 /// How much of the errors the model makes itself.
 fn own(results: &Value) -> Option<String> {
-    let parts = results["model_error"].as_object().filter(|parts| !parts.is_empty())?;
+    let parts = results["model_error"].as_object()?;
     let of = |parameter: Parameter| {
         let (words, unit) = labels::parameter(parameter);
         let name = parameter.name();
@@ -142,7 +142,7 @@ fn own(results: &Value) -> Option<String> {
         })
     };
     let all: Vec<String> = Parameter::ALL.into_iter().filter_map(of).collect();
-    (!all.is_empty()).then(|| all.join("; "))
+    has_own(results).then(|| all.join("; "))
 }
 
 /// A world far from the best one that explains the data about as well: one of two mirror images, say.
@@ -167,13 +167,13 @@ fn rival(results: &Value) -> Option<String> {
     ))
 }
 
-/// How many searches the limit on their worlds has stopped.
+/// How many searches have ended before they had converged, most at the limit on their worlds.
 fn unfinished(results: &Value) -> Option<String> {
     let trials = results["trials"].as_array()?;
     let open = trials.iter().filter(|trial| trial["converged"] == false).count();
     (open > 0).then(|| {
         format!(
-            "{open} of {} searches were stopped by world.search.coarse.worlds before they had converged: more of them may \
+            "{open} of {} searches ended before they had converged: with a larger world.search.coarse.worlds more of them may \
              end at the same world, or at a better one",
             trials.len()
         )
@@ -209,14 +209,22 @@ fn edges(results: &Value) -> Vec<String> {
 /// χ²/N of the best world above which its errors do not hold: where the verdict of a fit begins to say so.
 const ROUGH: f64 = 1.0 + EXCESS;
 
-/// Why errors of the world do not hold where its volume leaves data unexplained.
+/// Whether the errors have grown by what the model may be wrong by.
+fn has_own(results: &Value) -> bool {
+    results["model_error"].as_object().is_some_and(|parts| !parts.is_empty())
+}
+
+/// What it means for a world that its volume leaves data unexplained.
 fn unexplained(results: &Value) -> Option<String> {
     let chi2 = results["chi2_per_datum"].as_f64().filter(|chi2| *chi2 > ROUGH)?;
+    let means = match has_own(results) {
+        true => "and errors have grown by what finer models make of that",
+        false => "which pulls at the world more than its errors say",
+    };
     Some(format!(
-        "the volume of the best world leaves χ²/N = {chi2:.2}, which pulls at the world more than its errors say: \
-         matter may move by another law than motion.velocity, or emission lie outside of the region; else \
-         world.search.finest or linear.degree = \"quadratic\" may help, as may a higher order of region.nodes, and pulse = \
-         \"delta\" where data are of finer pixels"
+        "the volume of the best world leaves χ²/N = {chi2:.2}, {means}: matter may move by another law than \
+         motion.velocity, or emission lie outside of the region; else world.search.finest or linear.degree = \"quadratic\" \
+         may help, as may a higher order of region.nodes, and pulse = \"delta\" where data are of finer pixels"
     ))
 }
 
@@ -303,15 +311,40 @@ mod tests {
     }
 
     #[test]
+    fn exact_errors_of_the_model_are_told() {
+        let mut results = found();
+        results["chi2_per_datum"] = json!(3.3);
+        results["sigma"]["inclination_deg"] = json!(0.5);
+        results["model_error"] = json!({
+            "voxels": {"spin": 0.3, "inclination_deg": 0.3, "position_angle_deg": 0.0},
+            "pixels": {"spin": 0.1, "inclination_deg": 0.4, "position_angle_deg": 1.2},
+        });
+        let said = own(&results).unwrap();
+        assert!(
+            said.starts_with("the model leaves the spin open (voxels 0.3000, pixels 0.1000); "),
+            "{said}"
+        );
+        let inclination = "of ± 0.5000° in inclination, 0.5000° is the model's own (pixels 0.4000°, voxels 0.3000°)";
+        assert!(said.contains(inclination), "{said}");
+        assert!(
+            said.contains("of ± 1.5000° in position angle, 1.2000° is the model's own"),
+            "{said}"
+        );
+        // They are part of the interval, which then needs no model that is right.
+        assert!(sentences(&results)[1].starts_with("The inclination is between"));
+        assert!(lines(&results).iter().any(|line| line.contains("errors have grown by")));
+    }
+
+    #[test]
     fn exact_what_stopped_and_what_lies_at_an_edge_is_told() {
         let mut results = found();
         let note = |results: &Value, part: &str| {
             [lines(results), sentences(results)].map(|all| all.iter().any(|s| s.contains(part)))
         };
         results["trials"] = json!([{"converged": false}, {"converged": true}]);
-        assert_eq!(note(&results, "1 of 2 searches were stopped by"), [true; 2]);
+        assert_eq!(note(&results, "1 of 2 searches ended before"), [true; 2]);
         results["trials"][0]["converged"] = json!(true);
-        assert_eq!(note(&results, "were stopped by"), [false; 2]);
+        assert_eq!(note(&results, "ended before"), [false; 2]);
         assert_eq!(note(&results, "edge of its prior"), [false; 2]);
         results["open"]["spin"] = json!(false);
         results["world"]["spin"] = json!(0.94);
