@@ -244,3 +244,28 @@ pub fn world_of(file: &FitFile, free: &[Free], results: &Value) -> anyhow::Resul
         Ok(world.with(*parameter, value * parameter.unit()))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kerrlight_tomo::fit::world::Prior;
+
+    #[test]
+    fn exact_a_search_ends_at_the_best_world_within_its_interval() {
+        let prior = Prior::Uniform { low: -0.9, high: 0.9 };
+        let free = [Free { parameter: Parameter::Spin, prior }];
+        let trial = |spin: f64, value: f64| {
+            let end = World::new(spin, 1.0, 2.0);
+            Trial { start: end, end, reduced_chi2: 1.0, value, worlds: 1, converged: true }
+        };
+        // Of 200 data, whose χ²/2 scatters by 10; the interval reaches 0.0196 to each side.
+        for (spin, above, expected) in
+            [(0.51, 5.0, true), (0.53, 5.0, false), (0.53, 1.0, true), (0.51, 50.0, false)]
+        {
+            let trials = [trial(0.5, 100.0), trial(spin, 100.0 + above)];
+            let same = is_same(&free, &trials[1], (&trials, &|_| Some(0.01)));
+            assert_eq!(same, expected, "{spin} {above}");
+            assert!(is_same(&free, &trials[0], (&trials, &|_| None)));
+        }
+    }
+}

@@ -17,8 +17,8 @@ fn finer(count: usize) -> usize {
     (FINER * count as f64).round() as usize
 }
 
-/// What finer models say of a world that is seen through pixels of this width, M; nothing where data are simulated by the same sums, and where no bowl of the data is
-/// known.
+/// What finer models say of a world that is seen through pixels of this width, M; nothing where data are simulated by the
+/// same sums, and where no bowl of the data is known.
 pub(super) fn errors(
     (seen, view): (&Seen, &WorldView),
     (unknown, width): (&UnknownWorld, f64),
@@ -41,13 +41,14 @@ pub(super) fn errors(
 
 /// None with a [prior](crate::fit::linear::GaussianField) of the voxels, which says what lies between them.
 fn voxels(standing: &Standing, problem: &WorldProblem<'_, f32>) -> Result<Option<Refined>> {
-    let nodes = finer(problem.effort.nodes);
-    if problem.gaussian.is_some() || nodes > MOST {
+    let few = problem.effort.nodes;
+    let nodes = finer(few).min(MOST);
+    if problem.gaussian.is_some() || nodes <= few {
         return Ok(None);
     }
     let effort = Effort { nodes, ..problem.effort };
-    let kind =
-        Refinement { source: "voxels", onwards: onwards(effort.degree.taps() as f64, FINER) };
+    let onwards = onwards(effort.degree.taps() as f64, nodes as f64 / few as f64);
+    let kind = Refinement { source: "voxels", onwards };
     Ok(standing.refined(kind, &WorldProblem { effort, ..*problem })?)
 }
 
@@ -59,7 +60,7 @@ fn sums(standing: &Standing, problem: &WorldProblem<'_, f32>) -> Result<Option<R
 }
 
 /// Images may be samples or means over pixels. Visibilities are those of a smooth image, whose sums converge faster than any
-/// power of the pixel, unless the data are known to have pixels.
+/// power of the pixel, unless the data are known to have pixels. Polarised light is seen along single rays.
 fn pixels(
     (seen, view): (&Seen, &WorldView),
     (unknown, width): (&UnknownWorld, f64),
@@ -67,6 +68,9 @@ fn pixels(
     problem: &WorldProblem<'_, f32>,
 ) -> Result<Option<Refined>> {
     let kind = Refinement { source: "pixels", onwards: 1.0 };
+    if problem.model.polarization.is_some() {
+        return Ok(None);
+    }
     if seen.is_images() {
         let kind = Refinement { onwards: onwards(2.0, 2.0), ..kind };
         let model = WorldModel { quartered: Some(width), ..problem.model.clone() };
