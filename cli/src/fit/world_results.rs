@@ -30,7 +30,7 @@ pub fn lines(results: &Value) -> Vec<String> {
             }
         })
         .collect();
-    lines.extend(own(results).map(|said| format!("world: {said}")));
+    lines.extend(own(results).into_iter().map(|said| format!("world: {said}")));
     lines.extend(small_residuals(results).map(|said| format!("note: {said}")));
     lines.extend(rival(results).map(|said| format!("note: {said}")));
     lines.extend(unfinished(results).map(|said| format!("note: {said}")));
@@ -103,7 +103,10 @@ pub fn sentences(results: &Value) -> Vec<String> {
         })
     };
     let mut all: Vec<String> = Parameter::ALL.into_iter().filter_map(of).collect();
-    all.extend(own(results).map(|said| format!("Errors: {said}.")));
+    let own = own(results);
+    if !own.is_empty() {
+        all.push(format!("Errors: {}.", own.join("; ")));
+    }
     all.extend(small_residuals(results).map(|said| format!("Note that {said}.")));
     all.extend(rival(results).map(|said| format!("Note that {said}.")));
     all.extend(unfinished(results).map(|said| format!("Note that {said}.")));
@@ -118,9 +121,11 @@ pub fn sentences(results: &Value) -> Vec<String> {
     all
 }
 
-/// How much of the errors the model makes itself.
-fn own(results: &Value) -> Option<String> {
-    let parts = results["model_error"].as_object()?;
+/// How much of the error of each parameter the model makes itself; nothing where that is not known.
+fn own(results: &Value) -> Vec<String> {
+    let Some(parts) = results["model_error"].as_object().filter(|parts| !parts.is_empty()) else {
+        return Vec::new();
+    };
     let of = |parameter: Parameter| {
         let (words, unit) = labels::parameter(parameter);
         let name = parameter.name();
@@ -133,16 +138,17 @@ fn own(results: &Value) -> Option<String> {
         let whole = each.iter().map(|(_, moved)| moved * moved).sum::<f64>().sqrt();
         let each = each.iter().map(|(source, moved)| format!("{source} {moved:.4}{unit}"));
         let each = each.collect::<Vec<_>>().join(", ");
-        Some(match results["open"][name] == true {
-            true => format!("the model leaves the {words} open ({each})"),
-            false => format!(
-                "of ± {sigma:.4}{unit} in {words}, {:.4}{unit} is the model's own ({each})",
-                whole.min(sigma)
-            ),
-        })
+        if results["open"][name] == true {
+            // It may be the data that do.
+            let is_most = whole > sigma * core::f64::consts::FRAC_1_SQRT_2;
+            return is_most.then(|| format!("the model leaves the {words} open ({each})"));
+        }
+        let whole = whole.min(sigma);
+        Some(format!(
+            "of ± {sigma:.4}{unit} in {words}, {whole:.4}{unit} is the model's own ({each})"
+        ))
     };
-    let all: Vec<String> = Parameter::ALL.into_iter().filter_map(of).collect();
-    has_own(results).then(|| all.join("; "))
+    Parameter::ALL.into_iter().filter_map(of).collect()
 }
 
 /// A world far from the best one that explains the data about as well: one of two mirror images, say.
@@ -319,7 +325,7 @@ mod tests {
             "voxels": {"spin": 0.3, "inclination_deg": 0.3, "position_angle_deg": 0.0},
             "pixels": {"spin": 0.1, "inclination_deg": 0.4, "position_angle_deg": 1.2},
         });
-        let said = own(&results).unwrap();
+        let said = own(&results).join("; ");
         assert!(
             said.starts_with("the model leaves the spin open (voxels 0.3000, pixels 0.1000); "),
             "{said}"
@@ -327,7 +333,7 @@ mod tests {
         let inclination = "of ± 0.5000° in inclination, 0.5000° is the model's own (pixels 0.4000°, voxels 0.3000°)";
         assert!(said.contains(inclination), "{said}");
         assert!(
-            said.contains("of ± 1.5000° in position angle, 1.2000° is the model's own"),
+            said.contains("of ± 1.5000° in position angle of the spin, 1.2000° is the model's own"),
             "{said}"
         );
         // They are part of the interval, which then needs no model that is right.
