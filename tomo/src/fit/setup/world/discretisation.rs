@@ -49,14 +49,14 @@ fn voxels(standing: &Standing, problem: &WorldProblem<'_, f32>) -> Result<Option
     let effort = Effort { nodes, ..problem.effort };
     let onwards = onwards(effort.degree.taps() as f64, nodes as f64 / few as f64);
     let kind = Refinement { source: "voxels", onwards };
-    Ok(standing.refined(kind, &WorldProblem { effort, ..*problem })?)
+    standing.refined(kind, &WorldProblem { effort, ..*problem })
 }
 
 /// Gauss–Legendre panels converge faster than any power of their length.
 fn sums(standing: &Standing, problem: &WorldProblem<'_, f32>) -> Result<Option<Refined>> {
     let model = WorldModel { split: 2 * problem.model.split, ..problem.model.clone() };
     let kind = Refinement { source: "sums along rays", onwards: 1.0 };
-    Ok(standing.refined(kind, &WorldProblem { model: &model, ..*problem })?)
+    standing.refined(kind, &WorldProblem { model: &model, ..*problem })
 }
 
 /// Images may be samples or means over pixels. Visibilities are those of a smooth image, whose sums converge faster than any
@@ -74,7 +74,7 @@ fn pixels(
     if seen.is_images() {
         let kind = Refinement { onwards: onwards(2.0, 2.0), ..kind };
         let model = WorldModel { quartered: Some(width), ..problem.model.clone() };
-        return Ok(standing.refined(kind, &WorldProblem { model: &model, ..*problem })?);
+        return standing.refined(kind, &WorldProblem { model: &model, ..*problem });
     }
     let CoarseView { file, measured, .. } = &seen.view;
     if measured.pulse != Pulse::Delta {
@@ -82,7 +82,7 @@ fn pixels(
     }
     let other = seen.sampled(finer(file.screen.pixels))?;
     let how = (problem.scale, problem.memory);
-    other.with(unknown, view, how, |problem| Ok(standing.refined(kind, problem)?))
+    other.with(unknown, view, how, |problem| standing.refined(kind, problem))
 }
 
 /// What endless refinement does over what a `finer`-fold one does, where errors go with this power of the size of parts.
