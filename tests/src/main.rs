@@ -34,6 +34,7 @@ mod kerr_references;
 mod key_tables;
 mod leakage;
 mod lensing;
+mod other_sky;
 #[cfg(unix)]
 mod pictures;
 mod posterior;

@@ -14,6 +14,7 @@ pub mod photon_ring;
 pub mod report;
 pub mod schwarzschild;
 mod search;
+pub mod sky;
 
 use report::Case;
 

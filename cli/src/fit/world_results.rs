@@ -30,6 +30,7 @@ pub fn lines(results: &Value) -> Vec<String> {
             }
         })
         .collect();
+    lines.extend(own(results).into_iter().map(|said| format!("world: {said}")));
     lines.extend(small_residuals(results).map(|said| format!("note: {said}")));
     lines.extend(rival(results).map(|said| format!("note: {said}")));
     lines.extend(unfinished(results).map(|said| format!("note: {said}")));
@@ -96,12 +97,16 @@ pub fn sentences(results: &Value) -> Vec<String> {
             ));
         }
         let interval = format!("between {from:.3}{unit} and {to:.3}{unit} at 95 %{truth}");
-        Some(match unexplained(results) {
+        Some(match unexplained(results).filter(|_| !has_own(results)) {
             None => format!("The {words} is {interval}."),
             Some(_) => format!("If the model were right, the {words} would be {interval}."),
         })
     };
     let mut all: Vec<String> = Parameter::ALL.into_iter().filter_map(of).collect();
+    let own = own(results);
+    if !own.is_empty() {
+        all.push(format!("Errors: {}.", own.join("; ")));
+    }
     all.extend(small_residuals(results).map(|said| format!("Note that {said}.")));
     all.extend(rival(results).map(|said| format!("Note that {said}.")));
     all.extend(unfinished(results).map(|said| format!("Note that {said}.")));
@@ -114,6 +119,36 @@ pub fn sentences(results: &Value) -> Vec<String> {
         )
     }));
     all
+}
+
+/// How much of the error of each parameter the model makes itself; nothing where that is not known.
+fn own(results: &Value) -> Vec<String> {
+    let Some(parts) = results["model_error"].as_object().filter(|parts| !parts.is_empty()) else {
+        return Vec::new();
+    };
+    let of = |parameter: Parameter| {
+        let (words, unit) = labels::parameter(parameter);
+        let name = parameter.name();
+        let sigma = results["sigma"][name].as_f64()?;
+        let mut each: Vec<(&str, f64)> = parts
+            .iter()
+            .filter_map(|(source, moved)| Some((source.as_str(), moved[name].as_f64()?)))
+            .collect();
+        each.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let whole = each.iter().map(|(_, moved)| moved * moved).sum::<f64>().sqrt();
+        let each = each.iter().map(|(source, moved)| format!("{source} {moved:.4}{unit}"));
+        let each = each.collect::<Vec<_>>().join(", ");
+        if results["open"][name] == true {
+            // It may be the data that do.
+            let is_most = whole > sigma * core::f64::consts::FRAC_1_SQRT_2;
+            return is_most.then(|| format!("the model leaves the {words} open ({each})"));
+        }
+        let whole = whole.min(sigma);
+        Some(format!(
+            "of ± {sigma:.4}{unit} in {words}, {whole:.4}{unit} is the model's own ({each})"
+        ))
+    };
+    Parameter::ALL.into_iter().filter_map(of).collect()
 }
 
 /// A world far from the best one that explains the data about as well: one of two mirror images, say.
@@ -138,13 +173,13 @@ fn rival(results: &Value) -> Option<String> {
     ))
 }
 
-/// How many searches the limit on their worlds has stopped.
+/// How many searches have ended before they had converged, most at the limit on their worlds.
 fn unfinished(results: &Value) -> Option<String> {
     let trials = results["trials"].as_array()?;
     let open = trials.iter().filter(|trial| trial["converged"] == false).count();
     (open > 0).then(|| {
         format!(
-            "{open} of {} searches were stopped by world.search.coarse.worlds before they had converged: more of them may \
+            "{open} of {} searches ended before they had converged: with a larger world.search.coarse.worlds more of them may \
              end at the same world, or at a better one",
             trials.len()
         )
@@ -180,14 +215,22 @@ fn edges(results: &Value) -> Vec<String> {
 /// χ²/N of the best world above which its errors do not hold: where the verdict of a fit begins to say so.
 const ROUGH: f64 = 1.0 + EXCESS;
 
-/// Why errors of the world do not hold where its volume leaves data unexplained.
+/// Whether the errors have grown by what the model may be wrong by.
+fn has_own(results: &Value) -> bool {
+    results["model_error"].as_object().is_some_and(|parts| !parts.is_empty())
+}
+
+/// What it means for a world that its volume leaves data unexplained.
 fn unexplained(results: &Value) -> Option<String> {
     let chi2 = results["chi2_per_datum"].as_f64().filter(|chi2| *chi2 > ROUGH)?;
+    let means = match has_own(results) {
+        true => "and errors have grown by what finer models make of that",
+        false => "which pulls at the world more than its errors say",
+    };
     Some(format!(
-        "the volume of the best world leaves χ²/N = {chi2:.2}, which pulls at the world more than its errors say: \
-         matter may move by another law than motion.velocity, or emission lie outside of the region; else \
-         world.search.finest or linear.degree = \"quadratic\" may help, as may a higher order of region.nodes, and pulse = \
-         \"delta\" where data are of finer pixels"
+        "the volume of the best world leaves χ²/N = {chi2:.2}, {means}: matter may move by another law than \
+         motion.velocity, or emission lie outside of the region; else world.search.finest or linear.degree = \"quadratic\" \
+         may help, as may a higher order of region.nodes, and pulse = \"delta\" where data are of finer pixels"
     ))
 }
 
@@ -274,15 +317,40 @@ mod tests {
     }
 
     #[test]
+    fn exact_errors_of_the_model_are_told() {
+        let mut results = found();
+        results["chi2_per_datum"] = json!(3.3);
+        results["sigma"]["inclination_deg"] = json!(0.5);
+        results["model_error"] = json!({
+            "voxels": {"spin": 0.3, "inclination_deg": 0.3, "position_angle_deg": 0.0},
+            "pixels": {"spin": 0.1, "inclination_deg": 0.4, "position_angle_deg": 1.2},
+        });
+        let said = own(&results).join("; ");
+        assert!(
+            said.starts_with("the model leaves the spin open (voxels 0.3000, pixels 0.1000); "),
+            "{said}"
+        );
+        let inclination = "of ± 0.5000° in inclination, 0.5000° is the model's own (pixels 0.4000°, voxels 0.3000°)";
+        assert!(said.contains(inclination), "{said}");
+        assert!(
+            said.contains("of ± 1.5000° in position angle of the spin, 1.2000° is the model's own"),
+            "{said}"
+        );
+        // They are part of the interval, which then needs no model that is right.
+        assert!(sentences(&results)[1].starts_with("The inclination is between"));
+        assert!(lines(&results).iter().any(|line| line.contains("errors have grown by")));
+    }
+
+    #[test]
     fn exact_what_stopped_and_what_lies_at_an_edge_is_told() {
         let mut results = found();
         let note = |results: &Value, part: &str| {
             [lines(results), sentences(results)].map(|all| all.iter().any(|s| s.contains(part)))
         };
         results["trials"] = json!([{"converged": false}, {"converged": true}]);
-        assert_eq!(note(&results, "1 of 2 searches were stopped by"), [true; 2]);
+        assert_eq!(note(&results, "1 of 2 searches ended before"), [true; 2]);
         results["trials"][0]["converged"] = json!(true);
-        assert_eq!(note(&results, "were stopped by"), [false; 2]);
+        assert_eq!(note(&results, "ended before"), [false; 2]);
         assert_eq!(note(&results, "edge of its prior"), [false; 2]);
         results["open"]["spin"] = json!(false);
         results["world"]["spin"] = json!(0.94);

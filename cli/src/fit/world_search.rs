@@ -7,7 +7,7 @@ use crate::output;
 use anyhow::{Context, bail};
 use kerrlight_tomo::fit::settings::{FitFile, Region, UnknownWorld};
 use kerrlight_tomo::fit::setup::{self, FoundWorld, Measured, Trial};
-use kerrlight_tomo::fit::world::{Free, Parameter, Span, Spread, World};
+use kerrlight_tomo::fit::world::{Free, ModelError, Parameter, Span, Spread, World};
 use kerrlight_tomo::recovery::{Choice, Problem, settled};
 use serde_json::{Map, Value, json};
 
@@ -108,7 +108,7 @@ fn results(
         json!({
             "start": world(&trial.start), "end": world(&trial.end), "above_best": trial.value - least,
             "worlds": trial.worlds, "converged": trial.converged,
-            "same": is_same(&free, trial, &found.trials),
+            "same": is_same(&free, trial, (&found.trials, &sigma)),
         })
     };
     let trials: Vec<Value> = found.trials.iter().map(trial).collect();
@@ -128,6 +128,7 @@ fn results(
             .collect::<Map<String, Value>>(),
         "interval_68": intervals(&free, &found.world, &sigma, Span::ONE_SIGMA),
         "interval_95": intervals(&free, &found.world, &sigma, Span::NEARLY_ALL),
+        "model_error": spread.map(|spread| own(&free, spread)),
         "correlation": spread.map(|spread| spread.correlation.clone()),
         "ripple": spread.map(|spread| spread.ripple),
         "bounds": priors.collect::<Map<String, Value>>(),
@@ -173,18 +174,35 @@ fn true_world(file: &FitFile, measured: &Measured) -> anyhow::Result<Option<Worl
     Ok(measured.truth.as_ref().map(|_| setup::true_world(file)).transpose()?)
 }
 
-/// Whether a search ended where the best one did: within 1.5 of each parameter's scale, the width of a first population,
-/// and with χ²/2 above the best by no more than its scatter by chance, √(N/2) for N data.
-fn is_same(free: &[Free], trial: &Trial, trials: &[Trial]) -> bool {
+/// By what the model itself may have moved each free parameter, part by part, in its unit.
+fn own(free: &[Free], spread: &Spread) -> Map<String, Value> {
+    let part = |error: &ModelError| {
+        let moved = values(free, |k, _| error.step.get(k).map(|step| step.abs()));
+        (error.source.to_owned(), Value::Object(moved))
+    };
+    spread.own.iter().map(part).collect()
+}
+
+/// Whether a search ended where the best one did: within the 95 % interval about it, or at a world that is as probable and
+/// nearer than 1.5 of each parameter's scale, the width of a first population.
+fn is_same(
+    free: &[Free],
+    trial: &Trial,
+    (trials, sigma): (&[Trial], &dyn Fn(usize) -> Option<f64>),
+) -> bool {
     let best = trials.iter().min_by(|a, b| a.value.total_cmp(&b.value));
     best.is_some_and(|best| {
-        let data = 2.0 * best.value / best.reduced_chi2;
+        // What chance makes of χ²/2 of as many data.
+        let chance = (best.value / best.reduced_chi2).sqrt().max(world_results::ALIKE);
         let above = trial.value - best.value;
-        let is_near = |Free { parameter, .. }: &Free| {
+        let is_near = |(k, Free { parameter, .. }): (usize, &Free)| {
             let apart = parameter.difference(trial.end.get(*parameter), best.end.get(*parameter));
-            apart.abs() < 1.5 * parameter.scale()
+            let interval = sigma(k).map_or(0.0, |sigma| Span::NEARLY_ALL.deviations * sigma);
+            let is_as_probable = above < world_results::ALIKE;
+            let far = if is_as_probable { 1.5 * parameter.scale() } else { 0.0 };
+            apart.abs() <= interval.max(far)
         };
-        above <= (0.5 * data).sqrt().max(world_results::ALIKE) && free.iter().all(is_near)
+        above <= chance && free.iter().enumerate().all(is_near)
     })
 }
 
@@ -215,7 +233,7 @@ pub fn spread_of(free: &[Free], world: World, results: &Value) -> anyhow::Result
     if correlation.len() != free.len() * free.len() {
         bail!("the search for the world has no correlations");
     }
-    Ok(Spread { world, sigma, open, correlation, ripple: 0.0, worlds: 0 })
+    Ok(Spread { world, sigma, open, correlation, ripple: 0.0, worlds: 0, own: Vec::new() })
 }
 
 /// The world that a run has found.
@@ -225,4 +243,29 @@ pub fn world_of(file: &FitFile, free: &[Free], results: &Value) -> anyhow::Resul
         let value = value.with_context(|| format!("there is no {}", parameter.name()))?;
         Ok(world.with(*parameter, value * parameter.unit()))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kerrlight_tomo::fit::world::Prior;
+
+    #[test]
+    fn exact_a_search_ends_at_the_best_world_within_its_interval() {
+        let prior = Prior::Uniform { low: -0.9, high: 0.9 };
+        let free = [Free { parameter: Parameter::Spin, prior }];
+        let trial = |spin: f64, value: f64| {
+            let end = World::new(spin, 1.0, 2.0);
+            Trial { start: end, end, reduced_chi2: 1.0, value, worlds: 1, converged: true }
+        };
+        // Of 200 data, whose χ²/2 scatters by 10; the interval reaches 0.0196 to each side.
+        for (spin, above, expected) in
+            [(0.51, 5.0, true), (0.53, 5.0, false), (0.53, 1.0, true), (0.51, 50.0, false)]
+        {
+            let trials = [trial(0.5, 100.0), trial(spin, 100.0 + above)];
+            let same = is_same(&free, &trials[1], (&trials, &|_| Some(0.01)));
+            assert_eq!(same, expected, "{spin} {above}");
+            assert!(is_same(&free, &trials[0], (&trials, &|_| None)));
+        }
+    }
 }

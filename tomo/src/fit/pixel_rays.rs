@@ -77,6 +77,23 @@ impl PixelRays {
         all
     }
 
+    /// With a ray in the middle of each quarter of the pixels (M wide) that have one ray.
+    pub fn quartered(self, spacing: f64) -> Self {
+        let mut all = Self { places: Vec::new(), starts: vec![0] };
+        for range in self.starts.windows(2) {
+            match self.places[range[0]..range[1]] {
+                [[x, y]] => {
+                    let (near, far) = (-0.25 * spacing, 0.25 * spacing);
+                    let quarters = [[near, near], [near, far], [far, near], [far, far]];
+                    all.places.extend(quarters.map(|[u, v]| [x + u, y + v]));
+                }
+                ref several => all.places.extend_from_slice(several),
+            }
+            all.starts.push(all.places.len());
+        }
+        all
+    }
+
     /// The pixel of a ray.
     pub fn pixel_of(&self, ray: usize) -> usize {
         self.starts.partition_point(|start| *start <= ray) - 1
@@ -140,6 +157,13 @@ mod tests {
         assert_eq!((rays.places[8], rays.places[9]), ([0.0, 0.0], [8.0, 0.0]));
         let inside = |place: &[f64; 2]| (place[0] - 5.3).abs() < 0.25 && place[1].abs() < 0.25;
         assert!(rays.places[..8].iter().all(inside));
+    }
+
+    #[test]
+    fn exact_quarters_are_those_of_pixels_with_one_ray() {
+        let rays = rays(8).quartered(0.5);
+        assert_eq!(rays.starts, [0, 8, 12, 16, 24]);
+        assert_eq!(rays.places[8..12], [[-0.125; 2], [-0.125, 0.125], [0.125, -0.125], [0.125; 2]]);
     }
 
     /// No line through the pixel meets more than a few of the places: seen along any direction they are spread.

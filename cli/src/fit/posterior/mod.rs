@@ -201,18 +201,13 @@ fn worlds<'a>(
     let free = unknown.free()?;
     let best = world_search::world_of(&prepared.settings, &free, world)?;
     let noise = world["noise_factor"].as_f64().unwrap_or(1.0);
-    let is_finer = unknown.search.finest.is_some();
-    if prepared.settings.change.is_some() || is_finer {
-        let spread = world_search::spread_of(&free, best, world)?;
-        let about = (&prepared.settings, &prepared.measured);
-        // Residuals at the end of the finer steps, but no less than the errors that these assumed.
-        let left = world["chi2_per_datum"].as_f64().unwrap_or(1.0);
-        let factor = if is_finer { noise.max(left.sqrt()) } else { noise_of(folder)? };
-        return Ok(WorldPosterior::around(about, unknown, (best, &spread), factor)?);
-    }
-    eprintln!("the best world, once more");
-    let (file, measured) = (&prepared.settings, &prepared.measured);
-    Ok(WorldPosterior::new(file, measured, unknown, (best, noise))?)
+    let spread = world_search::spread_of(&free, best, world)?;
+    // Residuals of the best world, but no less than the errors that the search assumed.
+    let left = world["chi2_per_datum"].as_f64().unwrap_or(1.0);
+    let is_changing = prepared.settings.change.is_some();
+    let factor = if is_changing { noise_of(folder)? } else { noise.max(left.sqrt()) };
+    let about = (&prepared.settings, &prepared.measured);
+    Ok(WorldPosterior::new(about, unknown, (best, &spread), factor)?)
 }
 
 /// Noise of a draw over the errors of the data: these are too small where the model does not explain them.

@@ -27,7 +27,8 @@ pub struct Explored {
     pub best: Estimate,
     /// All worlds that were evaluated.
     pub samples: Vec<Sample>,
-    /// Whether populations had shrunk, rather than the limit on worlds been reached.
+    /// Whether populations had shrunk to worlds or values that are alike: not where they reached the limit on worlds, or could
+    /// not go on.
     pub converged: bool,
 }
 
@@ -106,7 +107,11 @@ impl<T: Float + Default> WorldProblem<'_, T> {
                 return Ok(None);
             }
         };
-        let converged = !ended.reasons.contains(&TerminationReason::MaxFunctionEvals);
+        let shrunk = |reason: &TerminationReason| {
+            use TerminationReason::{TolFun, TolFunHist, TolX};
+            matches!(reason, TolFun | TolFunHist | TolX)
+        };
+        let converged = ended.reasons.iter().any(shrunk);
         drop(search);
         let log = log.into_inner().unwrap_or_else(PoisonError::into_inner);
         let Log { mut samples, error, best } = log;

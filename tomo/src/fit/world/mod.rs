@@ -5,6 +5,7 @@
 
 mod covariance;
 mod derivative;
+mod discretisation;
 mod envelope;
 mod explore;
 mod fall;
@@ -25,6 +26,7 @@ mod twin;
 mod tests;
 
 pub use derivative::WorldBuffers;
+pub use discretisation::{ModelError, Refined, Refinement, Standing};
 pub use envelope::Envelope;
 pub use explore::{Exploration, Explored, Sample, WorldWatch};
 pub use model::{Law, WorldModel};

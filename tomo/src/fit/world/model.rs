@@ -96,6 +96,8 @@ pub struct WorldModel {
     pub y: Vec<f64>,
     /// More rays for pixels near the critical curve, where they are wanted.
     pub ring: Option<RingRays>,
+    /// Width of pixels, M, where each is the mean over its quarters; none where it is what its middle shows.
+    pub quartered: Option<f64>,
     /// Distance of the observer, M; infinity without one.
     pub observer_radius: Option<f64>,
     /// Where emission may be.
@@ -267,10 +269,16 @@ impl WorldModel {
 
     /// The rays of all pixels of a world.
     fn rays(&self, world: &World, seen: (&Kerr, &Observer)) -> PixelRays {
-        let Some(ring) = self.ring else { return PixelRays::single(&self.x, &self.y) };
         let numbers = world.numbers();
         let screen = |place| self.place(&numbers, place).map(|number| number.value);
-        PixelRays::new(ring, seen, [&self.x, &self.y], screen)
+        let rays = match self.ring {
+            Some(ring) => PixelRays::new(ring, seen, [&self.x, &self.y], screen),
+            None => PixelRays::single(&self.x, &self.y),
+        };
+        match self.quartered {
+            Some(spacing) => rays.quartered(spacing),
+            None => rays,
+        }
     }
 
     /// α and β of a place on the screen (M to the right and upwards), M: α across the spin's projection, β along it.

@@ -51,11 +51,11 @@ const PARTS: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
 const ENOUGH: f64 = 0.005;
 
 /// Slope and second derivatives of the value with respect to the free parameters in units of their scales.
-struct Bowl {
-    slopes: DVector<f64>,
-    bends: DMatrix<f64>,
+pub(super) struct Bowl {
+    pub slopes: DVector<f64>,
+    pub bends: DMatrix<f64>,
     /// Of the best volume.
-    responses: Vec<Vec<f64>>,
+    pub responses: Vec<Vec<f64>>,
 }
 
 impl<T: Float + Default> WorldProblem<'_, T> {
@@ -144,7 +144,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     }
 
     /// Slope and second derivatives at a world with its best volume.
-    fn bowl(&self, at: &Estimate, following: usize) -> Result<Bowl, Error> {
+    pub(super) fn bowl(&self, at: &Estimate, following: usize) -> Result<Bowl, Error> {
         let forward: ForwardModel<T> = self.model.forward(&at.world)?;
         let moved = self.image_differences(at)?;
         let Profile { slopes, bends, responses } =

@@ -1,7 +1,7 @@
 //! How sure a world is: a quadratic form through the values of worlds near the best one.
 
 use super::covariance::covariance;
-use super::{Free, Sample, World};
+use super::{Free, ModelError, Sample, World};
 use nalgebra::{DMatrix, DVector};
 
 /// What the values near the best world say.
@@ -19,6 +19,8 @@ pub struct Spread {
     pub ripple: f64,
     /// Worlds that the form was fitted to.
     pub worlds: usize,
+    /// What of `sigma` the model makes itself.
+    pub own: Vec<ModelError>,
 }
 
 /// Worlds for each coefficient of the form, at least.
@@ -47,13 +49,22 @@ impl Spread {
     /// About another world near by: how far it is from this one is part of its error.
     #[must_use]
     pub fn moved(&self, free: &[Free], world: World) -> Self {
+        let step = free.iter().map(|Free { parameter, .. }| {
+            parameter.difference(world.get(*parameter), self.world.get(*parameter))
+        });
+        Self { world, ..self.stepped(free, &step.collect::<Vec<_>>()) }
+    }
+
+    /// With errors that the model has of itself.
+    #[must_use]
+    pub fn beside(self, free: &[Free], own: Vec<ModelError>) -> Self {
+        let whole = own.iter().fold(self, |spread, error| spread.stepped(free, &error.step));
+        Self { own, ..whole }
+    }
+
+    /// With a step, in the parameters' own units, that is as likely to be one way as the other.
+    fn stepped(&self, free: &[Free], step: &[f64]) -> Self {
         let n = free.len();
-        let step: Vec<f64> = free
-            .iter()
-            .map(|Free { parameter, .. }| {
-                parameter.difference(world.get(*parameter), self.world.get(*parameter))
-            })
-            .collect();
         let covariance = |a: usize, b: usize| {
             self.correlation[a * n + b] * self.sigma[a] * self.sigma[b] + step[a] * step[b]
         };
@@ -63,7 +74,7 @@ impl Spread {
         let sigma: Vec<f64> =
             free.iter().zip(&whole).map(|(free, x)| x.min(free.prior.deviation())).collect();
         let open = free.iter().zip(&sigma).map(|(free, sigma)| free.is_open(*sigma)).collect();
-        Self { world, sigma, open, correlation, ..*self }
+        Self { sigma, open, correlation, ..self.clone() }
     }
 
     fn through(free: &[Free], best: &Sample, taken: &[Sample], reduced_chi2: f64) -> Option<Self> {
@@ -97,6 +108,7 @@ impl Spread {
             correlation: correlation.collect(),
             ripple: form.ripple,
             worlds: taken.len(),
+            own: Vec::new(),
         })
     }
 }
@@ -171,6 +183,7 @@ mod tests {
             correlation: vec![1.0, 0.5, 0.5, 1.0],
             ripple: 0.0,
             worlds: 1,
+            own: Vec::new(),
         };
         let names = free.map(|free| free.parameter);
         let first = spread.moved(&free, world.with(names[0], world.get(names[0]) + 0.04));

@@ -1,12 +1,13 @@
 //! The search about the best end of the coarse ones, steps from its best world, and how sure that one is.
 
+use super::discretisation;
 use super::posterior::{Resampled, polished, surely};
 use super::seen::{BESIDE_THE_RING, Seen};
 use super::tangent::Anchor;
 use crate::fit::journal::Memory;
 use crate::fit::linear::{Patience, refined};
 use crate::fit::settings::{FitFile, UnknownWorld, WorldView};
-use crate::fit::setup::{Measured, Result};
+use crate::fit::setup::{Measured, Result, spacing};
 use crate::fit::world::{
     Effort, Exploration, Explored, Polished, Spread, World, WorldProblem, WorldWatch,
 };
@@ -44,18 +45,36 @@ impl Detail<'_> {
         let found = self.through((&seen, &search.fine), errors, |fine, problem| {
             fine.search(problem, start, how, watch)
         })?;
-        let (Some((spread, reduced, world)), Some(finest)) = (&found, search.finest()) else {
-            return Ok(found.map(|found| (found, errors)));
+        let Some((spread, reduced, world)) = found else { return Ok(None) };
+        let Some(finest) = search.finest() else {
+            let spread = self.beside_its_own((&seen, &search.fine), errors, spread)?;
+            return Ok(Some(((spread, reduced, world), errors)));
         };
         let errors = (self.scale)(reduced / errors);
         let seen = Seen::closely(self.file, self.measured, &finest)?;
         let (polished, reduced) =
-            self.through((&seen, &finest), errors, |fine, problem| fine.finest(problem, *world))?;
+            self.through((&seen, &finest), errors, |fine, problem| fine.finest(problem, world))?;
         let world = polished.best.world;
         let free = self.unknown.free()?;
         // What finer voxels and pixels moved the world by is what finer ones still might.
-        let spread = spread.as_ref().map(|spread| spread.moved(&free, world));
+        let spread = spread.map(|spread| spread.moved(&free, world));
+        let spread = self.beside_its_own((&seen, &finest), errors, spread)?;
         Ok(Some(((spread, reduced, world), errors)))
+    }
+
+    /// With the errors that the model has of itself.
+    fn beside_its_own(
+        &self,
+        (seen, view): (&Seen, &WorldView),
+        scale: f64,
+        spread: Option<Spread>,
+    ) -> Result<Option<Spread>> {
+        let Some(spread) = spread else { return Ok(None) };
+        let about = (self.unknown, spacing(&self.file.screen)?);
+        let own = self.through((seen, view), scale, |_, problem| {
+            discretisation::errors((seen, view), about, problem, spread.world)
+        })?;
+        Ok(Some(spread.beside(&self.unknown.free()?, own)))
     }
 
     fn through<R>(

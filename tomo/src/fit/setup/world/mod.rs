@@ -1,5 +1,6 @@
 //! From settings to a world that is not known: its model, its parameters, the search for them and how sure they are.
 
+mod discretisation;
 mod fine;
 mod posterior;
 mod search;
@@ -165,6 +166,7 @@ fn model(
         x,
         y,
         ring: ring(file)?,
+        quartered: None,
         observer_radius: file.observer.radius,
         region: file.region.limits(),
         order,

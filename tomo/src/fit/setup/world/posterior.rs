@@ -1,8 +1,7 @@
 //! How sure a world is: the bowl beneath the ripples, along other rays and with other voxels; and draws of worlds.
 
-use super::seen::{BESIDE_THE_RING, Seen};
-use crate::fit::journal::Memory;
-use crate::fit::settings::{FitFile, UnknownWorld, refuse};
+use super::seen::Seen;
+use crate::fit::settings::{FitFile, UnknownWorld};
 use crate::fit::setup::{Measured, Result};
 use crate::fit::world::{
     Effort, Envelope, Estimate, Free, Polish, Polished, Spread, World, WorldProblem,
@@ -67,7 +66,7 @@ pub(super) fn surely(
     let sigma = problem.free.iter().zip(whole).map(|(free, x)| x.min(free.prior.deviation()));
     let sigma: Vec<f64> = sigma.collect();
     let open = problem.free.iter().zip(&sigma).map(|(free, sigma)| free.is_open(*sigma)).collect();
-    Ok(Some(Spread { world, sigma, open, correlation, ripple, worlds }))
+    Ok(Some(Spread { world, sigma, open, correlation, ripple, worlds, own: Vec::new() }))
 }
 
 /// Data through other pixels, and what of the world is not known; none where pixels are those of the data.
@@ -104,10 +103,6 @@ fn enveloped(
     Ok(surroundings.envelope(problem, inflation))
 }
 
-/// Why there are no worlds to draw.
-const NO_BEST: &str =
-    "the data leave a parameter of the world open: there is no best world to draw others around";
-
 /// Worlds that the data leave possible: the volume of each is the best one of data with noise once more, in that world
 /// (its marginal distribution, then what is left of the volume: Rue & Held 2005, section 2.3).
 pub struct WorldPosterior<'a> {
@@ -123,37 +118,11 @@ pub struct WorldPosterior<'a> {
 }
 
 impl<'a> WorldPosterior<'a> {
-    /// About a world that was found, with errors of the data that are `noise_factor` of what they say.
-    ///
-    /// # Errors
-    /// If a setting is missing or out of range, the problem has no solution, or the data leave a parameter open.
-    pub fn new(
-        file: &'a FitFile,
-        measured: &'a Measured,
-        unknown: &UnknownWorld,
-        (world, noise_factor): (World, f64),
-    ) -> Result<Self> {
-        let scale = noise_factor.powi(-2);
-        let seen = Seen::finely(file, measured, &unknown.search.fine)?;
-        let (spread, reduced) =
-            seen.with(unknown, &unknown.search.fine, (scale, Memory::default()), |problem| {
-                seen.smoothly(problem, (world, BESIDE_THE_RING[1]), |problem| {
-                    let (polished, reduced) = polished(problem, &problem.solve(world)?)?;
-                    let resampled = Some((&seen, unknown));
-                    Ok((surely(problem, resampled, &polished, reduced)?, reduced))
-                })
-            })?;
-        let Some(spread) = spread else { refuse!("{NO_BEST}") };
-        let factor = noise_factor * reduced.max(1.0).sqrt();
-        Self::around((file, measured), unknown, (world, &spread), factor)
-    }
-
-    /// About a world whose errors a search has found, in data whose noise is `factor` times their errors: for emission that
-    /// changes, whose best volume is another one in each world, and after finer steps.
+    /// About a world whose errors a search has found, in data whose noise is `factor` times their errors.
     ///
     /// # Errors
     /// If a prior is out of its range.
-    pub fn around(
+    pub fn new(
         (file, measured): (&'a FitFile, &'a Measured),
         unknown: &UnknownWorld,
         (world, spread): (World, &Spread),

@@ -53,11 +53,18 @@ impl Seen {
             let pixels = seen.view.file.screen.pixels as f64;
             for share in RESAMPLED {
                 let pixels = (share * pixels).round() as usize;
-                let view = CoarseView::sampled(&seen.view.file, measured, pixels)?;
-                seen.resampled.push(Self { view, resampled: Vec::new(), ..seen });
+                let other = seen.sampled(pixels)?;
+                seen.resampled.push(other);
             }
         }
         Ok(seen)
+    }
+
+    /// The same through other pixels.
+    pub fn sampled(&self, pixels: usize) -> Result<Self> {
+        let CoarseView { file, measured, .. } = &self.view;
+        let view = CoarseView::sampled(file, measured, pixels)?;
+        Ok(Self { view, resampled: Vec::new(), ..*self })
     }
 
     /// Visibilities are seen through as many pixels as are asked for, were they more than those of the fit, with all nodes on

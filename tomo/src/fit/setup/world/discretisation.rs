@@ -1,0 +1,91 @@
+//! Errors of a world that the model of the fit makes: its voxels, its pixels, and its sums along rays.
+
+use super::seen::{BESIDE_THE_RING, Seen};
+use crate::fit::settings::{UnknownWorld, WorldView};
+use crate::fit::setup::{CoarseView, Result};
+use crate::fit::world::{
+    Effort, ModelError, Refined, Refinement, Standing, World, WorldModel, WorldProblem,
+};
+use kerrlight_vlbi::operator::Pulse;
+
+/// Voxels and pixels of a finer model over those of a search, along each side.
+const FINER: f64 = 1.5;
+/// Voxels along each axis, at most.
+const MOST: usize = 128;
+
+fn finer(count: usize) -> usize {
+    (FINER * count as f64).round() as usize
+}
+
+/// What finer models say of a world that is seen through pixels of this width, M; nothing where data are simulated by the
+/// same sums, and where no bowl of the data is known.
+pub(super) fn errors(
+    (seen, view): (&Seen, &WorldView),
+    (unknown, width): (&UnknownWorld, f64),
+    problem: &WorldProblem<'_, f32>,
+    world: World,
+) -> Result<Vec<ModelError>> {
+    let is_read = seen.view.file.data.is_some();
+    if !is_read || !problem.is_convex() || problem.change.is_any() {
+        return Ok(Vec::new());
+    }
+    seen.smoothly(problem, (world, BESIDE_THE_RING[1]), |problem| {
+        let standing = problem.standing(world)?;
+        let voxels = voxels(&standing, problem)?;
+        let sums = sums(&standing, problem)?;
+        let pixels = pixels((seen, view), (unknown, width), &standing, problem)?;
+        let refined: Vec<Refined> = [voxels, sums, pixels].into_iter().flatten().collect();
+        Ok(standing.errors(problem.free, &refined))
+    })
+}
+
+/// None with a [prior](crate::fit::linear::GaussianField) of the voxels, which says what lies between them.
+fn voxels(standing: &Standing, problem: &WorldProblem<'_, f32>) -> Result<Option<Refined>> {
+    let few = problem.effort.nodes;
+    let nodes = finer(few).min(MOST);
+    if problem.gaussian.is_some() || nodes <= few {
+        return Ok(None);
+    }
+    let effort = Effort { nodes, ..problem.effort };
+    let onwards = onwards(effort.degree.taps() as f64, nodes as f64 / few as f64);
+    let kind = Refinement { source: "voxels", onwards };
+    standing.refined(kind, &WorldProblem { effort, ..*problem })
+}
+
+/// Gauss–Legendre panels converge faster than any power of their length.
+fn sums(standing: &Standing, problem: &WorldProblem<'_, f32>) -> Result<Option<Refined>> {
+    let model = WorldModel { split: 2 * problem.model.split, ..problem.model.clone() };
+    let kind = Refinement { source: "sums along rays", onwards: 1.0 };
+    standing.refined(kind, &WorldProblem { model: &model, ..*problem })
+}
+
+/// Images may be samples or means over pixels. Visibilities are those of a smooth image, whose sums converge faster than any
+/// power of the pixel, unless the data are known to have pixels. Polarised light is seen along single rays.
+fn pixels(
+    (seen, view): (&Seen, &WorldView),
+    (unknown, width): (&UnknownWorld, f64),
+    standing: &Standing,
+    problem: &WorldProblem<'_, f32>,
+) -> Result<Option<Refined>> {
+    let kind = Refinement { source: "pixels", onwards: 1.0 };
+    if problem.model.polarization.is_some() {
+        return Ok(None);
+    }
+    if seen.is_images() {
+        let kind = Refinement { onwards: onwards(2.0, 2.0), ..kind };
+        let model = WorldModel { quartered: Some(width), ..problem.model.clone() };
+        return standing.refined(kind, &WorldProblem { model: &model, ..*problem });
+    }
+    let CoarseView { file, measured, .. } = &seen.view;
+    if measured.pulse != Pulse::Delta {
+        return Ok(None);
+    }
+    let other = seen.sampled(finer(file.screen.pixels))?;
+    let how = (problem.scale, problem.memory);
+    other.with(unknown, view, how, |problem| standing.refined(kind, problem))
+}
+
+/// What endless refinement does over what a `finer`-fold one does, where errors go with this power of the size of parts.
+fn onwards(power: f64, finer: f64) -> f64 {
+    1.0 / (1.0 - finer.powf(-power))
+}
