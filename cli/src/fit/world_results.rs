@@ -127,7 +127,7 @@ fn own(results: &Value) -> Vec<String> {
         return Vec::new();
     };
     let of = |parameter: Parameter| {
-        let (words, unit) = labels::parameter(parameter);
+        let (words, unit) = parameter.label();
         let name = parameter.name();
         let sigma = results["sigma"][name].as_f64()?;
         let mut each: Vec<(&str, f64)> = parts
