@@ -32,7 +32,7 @@ use std::borrow::Cow;
 /// "#).unwrap_err();
 /// assert_eq!(error.field(), Some("hole.spin"));
 /// assert_eq!(error.value().as_deref(), Some("1.5"));
-/// assert_eq!(error.allowed(), Some("a number in [-1, 1]"));
+/// assert_eq!(error.allowed(), Some("-1 to 1 (a/M)"));
 /// assert_eq!(error.line(), Some(2));
 /// ```
 #[derive(Debug, thiserror::Error)]
