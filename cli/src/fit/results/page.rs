@@ -64,7 +64,10 @@ impl Estimate<'_> {
             figures: self.figures(found)?,
             drawings: world_scan::drawing(self.folder)?.into_iter().collect(),
             plots,
-            settings: settings(self.file, FitFile::keys(), self.folder)?,
+            settings: settings(self.file, FitFile::keys(), self.folder)?
+                .into_iter()
+                .filter(|setting| self.file.uses(&setting.key))
+                .collect(),
             ..Report::default()
         };
         let names = ["views.png", "lensed.png", "slices.png", "movie.png"];

@@ -1,6 +1,6 @@
 //! What is recovered, and how.
 
-use super::{FieldKind, PriorOfVoxels};
+use super::{FieldKind, FitFile, PriorOfVoxels};
 use crate::fit::BatchSize;
 use crate::representation::Activation;
 use crate::representation::Degree;
@@ -134,6 +134,24 @@ impl Kind {
         let given = table.get("representation").and_then(toml::Value::as_table);
         let given = given.into_iter().flat_map(toml::Table::keys);
         given.filter(|key| *key != "kind" && !own.contains(&key.as_str())).cloned().collect()
+    }
+}
+
+impl FitFile {
+    /// Whether the kind of representation has a use for a key, given as a dotted path.
+    pub fn uses(&self, key: &str) -> bool {
+        let kind = &self.representation.kind;
+        let of_kind = |name: &str| kind.keys().is_none_or(|keys| keys.contains(&name));
+        match key.split_once('.') {
+            Some(("representation", name)) => name == "kind" || of_kind(name),
+            Some(("training", _)) if *kind == Kind::LinearGrid => false,
+            Some(("training", "grid_rate" | "grid_last_rate")) => *kind == Kind::Grid,
+            Some(("training", "feature_rate" | "feature_last_rate")) => *kind == Kind::FeatureGrid,
+            Some(("training", "rate" | "last_rate")) => {
+                !matches!(kind, Kind::Grid | Kind::FeatureGrid)
+            }
+            _ => true,
+        }
     }
 }
 
@@ -414,6 +432,16 @@ mod tests {
                 "{key}"
             );
         }
+    }
+
+    #[test]
+    fn exact_a_report_lists_what_a_kind_uses() {
+        let hole = crate::fit::settings::Hole::new(0.5);
+        let used = |kind, key| FitFile::new(hole.clone(), 60.0, [3.0, 9.0], kind).uses(key);
+        assert!(used(Kind::Grid, "training.grid_rate") && !used(Kind::Grid, "training.rate"));
+        assert!(used(Kind::Bhnerf, "representation.width") && used(Kind::Bhnerf, "hole.spin"));
+        assert!(!used(Kind::LinearGrid, "training.steps"));
+        assert!(!used(Kind::LinearGrid, "representation.width"));
     }
 
     /// What messages list is what settings are read as.
