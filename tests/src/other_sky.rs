@@ -63,7 +63,7 @@ fn found(folder: &Path, sky: &Sky, noise: f64) -> Value {
             "{{worlds={worlds},nodes={nodes},iterations={iterations},pixels={pixels},frames=20}}"
         )
     };
-    let (coarse, fine) = (view(100, 16, 30, 16), view(30, 24, 60, 32));
+    let (coarse, fine) = (view(250, 16, 30, 16), view(48, 24, 60, 32));
     let angle = sky.position_angle_deg;
     let sets = [
         "hole.spin=0.0".to_owned(),
@@ -84,7 +84,7 @@ fn found(folder: &Path, sky: &Sky, noise: f64) -> Value {
         format!(
             "world={{spin={{uniform=[-0.95,0.95]}},inclination_deg={{isotropic=[0.0,90.0]}},\
              position_angle_deg={{uniform=[{},{}]}},\
-             search={{starts=1,drag_is_spin=true,coarse={coarse},fine={fine}}}}}",
+             search={{starts=2,drag_is_spin=true,coarse={coarse},fine={fine}}}}}",
             angle - 60.0,
             angle + 60.0
         ),
