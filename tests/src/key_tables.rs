@@ -53,8 +53,7 @@ impl Page<'_> {
 
     fn rows(&mut self, path: &str, (prefix, is_choice): (&str, bool), out: &mut String) {
         for key in self.keys.table(path) {
-            let below =
-                if path.is_empty() { key.name.clone() } else { format!("{path}.{}", key.name) };
+            let below = below(path, &key.name);
             if self.own.contains(&below) || !self.described.insert(below.clone()) {
                 continue;
             }
@@ -65,6 +64,11 @@ impl Page<'_> {
             }
         }
     }
+}
+
+/// The path of a key in the table at a path, empty for the whole file.
+fn below(path: &str, name: &str) -> String {
+    if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") }
 }
 
 /// A row; keys of which just one is given are not called required.
@@ -126,7 +130,7 @@ fn renewed(text: &str, (keys, kind): (&Keys, &str)) -> (String, BTreeSet<String>
 /// All keys of a type, with those of its tables.
 fn all(keys: &Keys, path: &str, out: &mut BTreeSet<String>) {
     for key in keys.table(path) {
-        let below = if path.is_empty() { key.name.clone() } else { format!("{path}.{}", key.name) };
+        let below = below(path, &key.name);
         out.insert(below.clone());
         if !COPIES.contains(&&*below) && !is_prior(&below) {
             all(keys, &below, out);

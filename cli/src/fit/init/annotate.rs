@@ -21,7 +21,7 @@ pub fn annotate(plain: &str) -> String {
             out += &format!("\n# {}\n{line}\n", keys.about(table));
         } else if let Some(name) = name_of(line) {
             there.push(name);
-            out += &key_line(line, find(keys, table, name));
+            out += &key_line(line, keys.at(&format!("{table}.{name}")));
         } else if !line.trim().is_empty() && table.is_empty() {
             out += &format!("{line}\n");
         }
@@ -37,10 +37,6 @@ fn heading(line: &str) -> Option<&str> {
 fn name_of(line: &str) -> Option<&str> {
     let line = line.strip_prefix("#? ").unwrap_or(line);
     (!line.starts_with('#')).then(|| line.split_once(" = ")).flatten().map(|(name, _)| name)
-}
-
-fn find(keys: &Keys, table: &str, name: &str) -> Option<Key> {
-    keys.table(table).into_iter().find(|key| key.name == name)
 }
 
 fn key_line(line: &str, key: Option<Key>) -> String {
