@@ -16,7 +16,7 @@ pub fn annotate(plain: &str) -> String {
     let keys = if is_image { StaticImageFile::keys() } else { FitFile::keys() };
     for line in plain.lines() {
         if let Some(heading) = heading(line) {
-            out += &left_out(keys, table, &there);
+            out += &left_out(keys, (plain, table), &there);
             (table, there) = (heading, Vec::new());
             out += &format!("\n# {}\n{line}\n", keys.about(table));
         } else if let Some(name) = name_of(line) {
@@ -26,7 +26,7 @@ pub fn annotate(plain: &str) -> String {
             out += &format!("{line}\n");
         }
     }
-    out + &left_out(keys, table, &there)
+    out + &left_out(keys, (plain, table), &there)
 }
 
 fn heading(line: &str) -> Option<&str> {
@@ -54,10 +54,14 @@ fn beside(value: &str, note: &str) -> String {
     if note.is_empty() { format!("{value}\n") } else { format!("{value:COLUMN$} # {note}\n") }
 }
 
-/// Keys of a table that may be added.
-fn left_out(keys: &Keys, table: &str, there: &[&str]) -> String {
-    let more =
-        keys.table(table).into_iter().filter(|key| !there.contains(&&*key.name) && !key.is_table());
+/// Keys of a table that may be added: none that has a heading of its own in the settings.
+fn left_out(keys: &Keys, (plain, table): (&str, &str), there: &[&str]) -> String {
+    let is_headed = |key: &Key| {
+        let mut headings = plain.lines().filter_map(heading);
+        table.is_empty() && headings.any(|heading| heading.split('.').next() == Some(&*key.name))
+    };
+    let is_there = |key: &Key| there.contains(&&*key.name) || key.is_table() || is_headed(key);
+    let more = keys.table(table).into_iter().filter(|key| !is_there(key));
     let line = |key: Key| {
         let value = key.example.as_ref().or(key.default.as_ref())?;
         Some(beside(&format!("# {} = {value}", key.name), &key.note()))
@@ -75,6 +79,8 @@ mod tests {
         let text = annotate(plain);
         let table = |text: &str| text.parse::<toml::Table>().unwrap();
         assert_eq!(table(&text), table(plain));
+        // What has a heading is not offered once more above it.
+        assert!(!text.contains("# axis = ") && !text.contains("# output = "), "{text}");
         for line in text.lines().filter(|line| line.contains(" = ")) {
             assert!(line.contains(" # ") || line.starts_with("# "), "{line} says nothing");
         }
