@@ -103,8 +103,14 @@ mod tests {
         let table = of("data={visibilities={path=\"a/b.txt\", average_s=1.0}}", "a");
         assert!(table.contains("path = \"b.txt\"") && table.contains("average_s"), "{table}");
         // Names of arrays are no paths, other settings are nothing of the kind.
-        assert_eq!(of("observation.array=ngEHT", "a"), "observation.array=ngEHT");
-        assert_eq!(of("observation.array=a/b.txt", "a"), "observation.array=\"b.txt\"");
+        assert_eq!(
+            of("simulation.observation.array=ngEHT", "a"),
+            "simulation.observation.array=ngEHT"
+        );
+        assert_eq!(
+            of("simulation.observation.array=a/b.txt", "a"),
+            "simulation.observation.array=\"b.txt\""
+        );
         assert_eq!(of("hole.spin=0.5", "a"), "hole.spin=0.5");
         assert_eq!(of("sky.image.path=", "a"), "sky.image.path=");
         assert_eq!(of("nonsense", "a"), "nonsense");

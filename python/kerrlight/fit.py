@@ -357,8 +357,7 @@ def _in_memory(data: Data, times: ArrayLike | None) -> tuple[tuple[str, bytes] |
         even = np.linspace(moments[0], moments[-1], frames) if len(moments) == frames else None
         if even is None or not np.allclose(moments, even, rtol=0, atol=1e-6 * (even[-1] - even[0])):
             raise ValueError(f"times are not allowed: {frames} at equal steps, one for each image")
-        ends = {"frames": frames, "from": float(moments[0]), "to": float(moments[-1])}
-        changes = overrides_of({"movie": ends})
+        changes = overrides_of({"data.movie.from": float(moments[0]), "data.movie.to": float(moments[-1])})
     return ("data.npy", _npy(images)), changes
 
 

@@ -21,7 +21,7 @@ screen.pixels = 6
 screen.width = 30.0
 region.r_min = 3.0
 region.r_max = 4.2
-movie.frames = 2
+simulation.movie.frames = 2
 output.nodes = 6
 representation = {{ kind = "grid", nodes = 6 }}
 region.nodes = {{ equal-mino-time = {{ per_ray = 8 }} }}

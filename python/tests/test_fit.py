@@ -19,7 +19,7 @@ QUICK = {
     "training.log_every": 2,
     "output.nodes": 16,
     "screen.pixels": 16,
-    "observation.scans": 16,
+    "simulation.observation.scans": 16,
     "training.start.linear.steps": 20,
 }
 
@@ -297,7 +297,7 @@ def test_exact_images_in_an_array(tmp_path):
         Fit(data=movie, times=times)
     for words in ('set={"hole.spin": 0.5}', "observer.inclination_deg", "region.r_max"):
         assert words in str(refused.value), refused.value
-    assert "movie.from" not in str(refused.value)
+    assert "data.movie.from" not in str(refused.value)
     given = {
         "hole": kerrlight.Hole.sgr_a_star(0.2),
         "observer.inclination_deg": 60.0,

@@ -62,7 +62,7 @@ QUICK = {
     "training": {"steps": 6, "log_every": 1, "start": "drawn", "batch": {"frames": 2}, "rate": 0.01, "last_rate": 0.01},
     "output.nodes": 12,
     "screen.pixels": 16,
-    "observation.scans": 8,
+    "simulation.observation.scans": 8,
 }
 
 

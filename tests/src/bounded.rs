@@ -40,7 +40,7 @@ fn exact_numbers_that_would_take_too_much_are_named() {
     let set = |change: &'static str| ["fit", "-o", "run", "--set", change];
     for (change, said) in [
         ("screen.pixels=4000", "screen.pixels = 4000"),
-        ("observation.scans=1000000", "visibilities of 1000000 scans"),
+        ("simulation.observation.scans=1000000", "visibilities of 1000000 scans"),
         ("region.nodes={gauss={order=16,split=4000000}}", "region.nodes"),
         ("output.nodes=512", "output.nodes = 512"),
         ("training.start={linear={nodes=3000,stride=2,steps=10}}", "nodes = 3000"),
@@ -141,7 +141,6 @@ fn exact_a_movie_in_a_file_gives_the_same_bytes() {
     let scene = crate::support::root().join("scenes/fits/flare_images.toml");
     let set = [
         "screen.pixels=16",
-        "movie.frames=17000",
         "training.steps=4",
         "output.nodes=12",
         "representation=grid",
@@ -150,8 +149,9 @@ fn exact_a_movie_in_a_file_gives_the_same_bytes() {
     ];
     let set: Vec<&str> = set.iter().flat_map(|change| ["--set", *change]).collect();
     let words = ["fit", scene.to_str().unwrap(), "-o"];
+    let frames = ["--set", "simulation.movie.frames=17000"];
     for (run, memory) in [("all", "4GiB"), ("little", "256MiB")] {
-        succeed(at, &[&["--memory", memory][..], &words, &[run], &set].concat());
+        succeed(at, &[&["--memory", memory][..], &words, &[run], &set, &frames].concat());
     }
     let names = ["checkpoint.safetensors", "volume.npz", "movie.npz", "movie.png", "truth.npz"];
     for name in names {
@@ -159,11 +159,11 @@ fn exact_a_movie_in_a_file_gives_the_same_bytes() {
         assert!(a == b, "{name}");
     }
     // The same of its results as data.
-    let data = ["--set", "data.movie.path=all/movie.npz"];
+    let data = ["--set", "data.movie={path=\"all/movie.npz\",from=0.0,to=120.0}"];
     let truth = std::fs::read_to_string(&scene).unwrap();
-    let (head, rest) = truth.split_once("[[truth.spot]]").unwrap();
-    let (_, tail) = rest.split_once("[movie]").unwrap();
-    std::fs::write(at.join("data.toml"), format!("{head}[movie]{tail}")).unwrap();
+    let (head, rest) = truth.split_once("[[simulation.truth.spot]]").unwrap();
+    let (_, tail) = rest.split_once("[[loss]]").unwrap();
+    std::fs::write(at.join("data.toml"), format!("{head}[[loss]]{tail}")).unwrap();
     for (run, memory) in [("read", "4GiB"), ("read_little", "256MiB")] {
         let words = ["--memory", memory, "fit", "data.toml", "-o", run];
         succeed(at, &[&words[..], &set, &data].concat());
@@ -186,7 +186,7 @@ fn exact_the_least_limit_that_is_said_is_enough() {
     let images = ["fit", images.to_str().unwrap()];
     let few = ["training.steps=3", "output.nodes=16", "training.start=drawn"];
     let linear = ["representation=linear-grid", "representation.nodes=20", "output.nodes=16"];
-    let fine = ["screen.pixels=96", "movie.frames=600"];
+    let fine = ["screen.pixels=96", "simulation.movie.frames=600"];
     let grid = ["representation=grid", "representation.nodes=20"];
     let cases: [(&[&str], Vec<&str>, f64); 4] = [
         (&images, few.to_vec(), 120.0),
@@ -216,12 +216,11 @@ fn exact_a_sequence_of_images_is_a_movie() {
     let at = folder.path();
     let scene = crate::support::root().join("scenes/fits/flare_images.toml");
     let text = std::fs::read_to_string(&scene).unwrap();
-    let (head, rest) = text.split_once("[[truth.spot]]").unwrap();
-    let (_, tail) = rest.split_once("[movie]").unwrap();
-    std::fs::write(at.join("data.toml"), format!("{head}[movie]{tail}")).unwrap();
+    let (head, rest) = text.split_once("[[simulation.truth.spot]]").unwrap();
+    let (_, tail) = rest.split_once("[[loss]]").unwrap();
+    std::fs::write(at.join("data.toml"), format!("{head}[[loss]]{tail}")).unwrap();
     let set = [
         "screen.pixels=16",
-        "movie.frames=12",
         "training.steps=4",
         "output.nodes=12",
         "representation=grid",
@@ -229,7 +228,9 @@ fn exact_a_sequence_of_images_is_a_movie() {
         "training.start={linear={nodes=12,stride=2,steps=4}}",
     ];
     let set: Vec<&str> = set.iter().flat_map(|change| ["--set", *change]).collect();
-    succeed(at, &[&["fit", scene.to_str().unwrap(), "-o", "simulated"][..], &set].concat());
+    let frames = ["--set", "simulation.movie.frames=12"];
+    let words = ["fit", scene.to_str().unwrap(), "-o", "simulated"];
+    succeed(at, &[&words[..], &set, &frames].concat());
     let size = ["--set", "screen.width=16", "--set", "screen.height=16"];
     let times = ["--frames", "12", "--from", "0", "--to", "120", "-o", "frames"];
     succeed(at, &[&["movie", "simulated/scene.toml"][..], &times, &size].concat());
@@ -245,7 +246,7 @@ fn exact_a_sequence_of_images_is_a_movie() {
         std::fs::write(at.join(format!("arrays/f_{k}.npy")), bytes).unwrap();
     }
     let read = |path: &str, memory: &str, run: &str| {
-        let path = format!("data.movie.path={path}");
+        let path = format!("data.movie={{path={path:?},from=0.0,to=120.0}}");
         let words = ["--memory", memory, "fit", "data.toml", "-o", run, "--set", &path];
         succeed(at, &[&words[..], &set].concat());
         std::fs::read(at.join(run).join("movie.npz")).unwrap()

@@ -119,10 +119,11 @@ fn exact_held_out_frames_choose_the_price_of_a_network() {
 #[ignore = "long"]
 fn exact_worlds_are_drawn_where_emission_changes() {
     let folder = tempfile::tempdir().unwrap();
-    let world = "world={inclination_deg={uniform=[40.0,80.0]},search={starts=1,drag_is_spin=false,\
-        coarse={worlds=20,nodes=12,iterations=30,pixels=20,frames=15},\
-        fine={worlds=20,nodes=14,iterations=40,pixels=20,frames=15}}}";
-    fit(folder.path(), &[world, "linear.iterations=15", "linear.rounds=1"]);
+    let prior = "observer.inclination_deg={uniform=[40.0,80.0]}";
+    let search = "search={starts=1,coarse={worlds=20,nodes=12,iterations=30,pixels=20,frames=15},\
+        fine={worlds=20,nodes=14,iterations=40,pixels=20,frames=15}}";
+    let truth = "simulation.observer.inclination_deg=60.0";
+    fit(folder.path(), &[prior, truth, search, "linear.iterations=15", "linear.rounds=1"]);
     let run = kerrlight(folder.path(), &["posterior", "run", "--samples", "3"]);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     let read = |name: &str| -> Value {
@@ -149,7 +150,8 @@ fn exact_hard_motion_is_recognised_as_wrong() {
     let soft = fit(folder.path(), &[]);
     std::fs::remove_dir_all(folder.path().join("run")).unwrap();
     let text = settings();
-    let (start, end) = (text.find("\n[change]").unwrap(), text.find("[[truth.spot]]").unwrap());
+    let (start, end) =
+        (text.find("\n[change]").unwrap(), text.find("[[simulation.truth.spot]]").unwrap());
     std::fs::write(
         folder.path().join("hard.toml"),
         format!("{}\n{}", &text[..start], &text[end..]),
@@ -177,7 +179,7 @@ fn exact_what_cannot_change_is_refused_before_anything_is_written() {
         ("change.allowed=deaths", "unknown variant `deaths`"),
         ("representation=mlp4d", "change does not apply to mlp4d"),
         ("change.allowed=births", "representation.kind = \"linear-grid\""),
-        ("truth.spot.0.shines.rise=0.0", "truth.spot.0.shines.rise = 0"),
+        ("simulation.truth.spot.0.shines.rise=0.0", "simulation.truth.spot.0.shines.rise = 0"),
         ("axis={from={start=[0.0,0.0,1.0],rate=0.1,last_rate=0.1}}", "[axis.known]"),
         ("held_out={setting=\"change.weight\",values=[0.1,1.0],folds=2}", "have a linear start"),
     ] {

@@ -15,7 +15,7 @@ fn experiment(folder: &Path, changes: &[(&str, &str)]) {
         fit = {fit:?}
         [set]
         screen.pixels = 16
-        movie.frames = 8
+        simulation.movie.frames = 8
         output.nodes = 16
         representation = {{ kind = "grid", nodes = 16 }}
         region.nodes = {{ equal-mino-time = {{ per_ray = 40 }} }}

@@ -11,7 +11,7 @@ fn small_of(file: &Path) -> Vec<String> {
     for change in [
         "screen.pixels=20",
         "region.nodes={equal-mino-time={per_ray=40}}",
-        "movie.frames=16",
+        "simulation.movie.frames=16",
         "representation.width=32",
         "training.steps=150",
         "training.log_every=50",
@@ -220,9 +220,9 @@ fn bad_input_is_named_and_nothing_is_begun() {
         ("training.batch={frames=0}", "training.batch.frames = 0 is not allowed: at least 1"),
         ("loss.0.sigma=0.0", "loss.0.sigma = 0 is not allowed"),
         ("loss.0.data=visibilities", "pixels work with images only"),
-        ("truth.spot.0.sigma=0.0", "truth.spot.0.sigma = 0 is not allowed"),
+        ("simulation.truth.spot.0.sigma=0.0", "simulation.truth.spot.0.sigma = 0 is not allowed"),
         ("output.nodes=1", "output.nodes = 1"),
-        ("movie.frames=0", "movie.frames = 0"),
+        ("simulation.movie.frames=0", "simulation.movie.frames = 0"),
         ("nonsense=1", "unknown field `nonsense`"),
         ("representation=cubes", "representation.kind = \"cubes\" is not allowed: bhnerf"),
     ] {
@@ -264,7 +264,7 @@ fn exact_visibilities_and_closures_together() {
     std::fs::write(folder.path().join("all.toml"), text).unwrap();
     let set = [
         "screen.pixels=24",
-        "observation.scans=8",
+        "simulation.observation.scans=8",
         "representation.width=24",
         "training.steps=40",
         "training.log_every=20",

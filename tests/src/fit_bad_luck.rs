@@ -79,9 +79,9 @@ fn bad_settings_are_named_with_their_line() {
         ("weight = 1.0", "weight = -1.0", "loss.0.weight = -1 is not allowed: 1e-12 to 1e12"),
         ("weight = 1.0", "weight = nan", "loss.0.weight = NaN"),
         ("sigma = 1.0", "sigma = -0.5", "loss.0.sigma = -0.5 is not allowed"),
-        ("sigma = 0.4", "sigma = inf", "truth.spot.0.sigma = inf"),
+        ("sigma = 0.4", "sigma = inf", "simulation.truth.spot.0.sigma = inf"),
         ("[representation]", tv, "regulariser 0: epsilon is missing"),
-        ("[[truth.spot]]", "[[truth.spots]]", "spot"),
+        ("[[simulation.truth.spot]]", "[[simulation.truth.spots]]", "spot"),
         (
             "kind = \"bhnerf\"",
             "kind = \"feature-grid\"\nactivation = \"linear\"",
@@ -140,13 +140,13 @@ fn movie(folder: &Path, pixel: &str) -> Vec<String> {
         (0..20).map(flux).collect::<Vec<_>>().join(",") + "\n"
     };
     std::fs::write(folder.join("frame.csv"), (0..20).map(row).collect::<String>()).unwrap();
-    let mut words = changed(folder, |text| {
-        let (before, rest) = text.split_once("[[truth.spot]]").unwrap();
+    changed(folder, |text| {
+        let (before, rest) = text.split_once("[[simulation.truth.spot]]").unwrap();
         let (_, after) = rest.split_once("[[loss]]").unwrap();
-        format!("{before}[data.movie]\npath = \"frame.csv\"\n\n[[loss]]{after}")
-    });
-    words.extend(["--set", "movie.frames=1", "--set", "movie.to=0.0"].map(str::to_owned));
-    words
+        format!(
+            "{before}[data.movie]\npath = \"frame.csv\"\nfrom = 0.0\nto = 0.0\n\n[[loss]]{after}"
+        )
+    })
 }
 
 #[test]
@@ -158,12 +158,9 @@ fn bad_movies_are_named() {
     }
     let error = fail(
         folder.path(),
-        &with(
-            &movie(folder.path(), "0.5"),
-            &["-o", "run", "--set", "movie.frames=3", "--set", "movie.to=1.0"],
-        ),
+        &with(&movie(folder.path(), "0.5"), &["-o", "run", "--set", "screen.pixels=24"]),
     );
-    assert!(error.contains("movie.frames"), "{error}");
+    assert!(error.contains("has 20 x 20 pixels, but screen.pixels says 24 x 24"), "{error}");
 }
 
 /// Numbers that are not defined are none and explained, in the results and on the page.
@@ -172,7 +169,7 @@ fn exact_a_dark_truth_is_said_to_be_one() {
     let (small, folder) = (small(), tempfile::tempdir().unwrap());
     for kind in ["representation=bhnerf", "representation=grid", "representation=linear-grid"] {
         let name = kind.split_once('=').unwrap().1;
-        let dark = ["-o", name, "--set", "truth.spot.0.amplitude=0.0", "--set", kind];
+        let dark = ["-o", name, "--set", "simulation.truth.spot.0.amplitude=0.0", "--set", kind];
         succeed(folder.path(), &with(&small, &dark));
         let run = folder.path().join(name);
         let found = results(&run);
@@ -189,7 +186,8 @@ fn exact_a_dark_truth_is_said_to_be_one() {
 #[test]
 fn exact_a_truth_that_nobody_sees_is_refused() {
     let (small, folder) = (small(), tempfile::tempdir().unwrap());
-    for setting in ["truth.spot.0.center=[900.0, 0.0, 0.0]", "motion.injection_time=1e8"] {
+    for setting in ["simulation.truth.spot.0.center=[900.0, 0.0, 0.0]", "motion.injection_time=1e8"]
+    {
         let error = fail(folder.path(), &with(&small, &["-o", "run", "--set", setting]));
         assert!(
             error.contains("the truth is dark in every pixel of every frame"),
@@ -209,7 +207,7 @@ fn exact_frames_without_visibilities_are_left_out() {
             "--set",
             "screen.pixels=24",
             "--set",
-            "observation.scans=8",
+            "simulation.observation.scans=8",
             "--set",
             "representation.width=24",
             "--set",
@@ -224,12 +222,18 @@ fn exact_frames_without_visibilities_are_left_out() {
             gmst,
         ]
     };
-    let day = of("observation.elevation_deg=[60.0,85.0]", "observation.gmst=[0.0,23.9]");
+    let day = of(
+        "simulation.observation.elevation_deg=[60.0,85.0]",
+        "simulation.observation.gmst=[0.0,23.9]",
+    );
     let output = kerrlight(folder.path(), &[&day[..], &["-o", "some"]].concat());
     let said = message(&output);
     assert!(output.status.success() && said.contains("of them with data)"), "{said}");
     assert!(results(&folder.path().join("some"))["loss"].as_f64().unwrap().is_finite());
-    let never = of("observation.elevation_deg=[84.0,85.0]", "observation.gmst=[2.0,2.667]");
+    let never = of(
+        "simulation.observation.elevation_deg=[84.0,85.0]",
+        "simulation.observation.gmst=[2.0,2.667]",
+    );
     let none = [&never[..], &["-o", "none"]].concat();
     let output = kerrlight(folder.path(), &none);
     let said = message(&output);

@@ -14,7 +14,7 @@ fn small(sets: &[&str]) -> Vec<String> {
     let usual = [
         "screen.pixels=20",
         "screen.jy_per_pixel=0.32",
-        "observation.scans=12",
+        "simulation.observation.scans=12",
         "representation.nodes=20",
         // So few cubic splines are wider than the flare.
         "linear.degree=linear",
@@ -109,7 +109,8 @@ fn exact_data_without_light_and_axes_that_are_all_alike_fail() {
         assert!(!folder.path().join(name).join("results.json").exists());
         said
     };
-    let none = [AMPLITUDES, dark, "observation.noise=none", "representation=linear-grid"];
+    let none =
+        [AMPLITUDES, dark, "simulation.observation.noise=none", "representation=linear-grid"];
     let said = failed(&none, "dark");
     assert!(said.contains("contain no signal"), "{said}");
     let images = r#"loss=[{data="image",weight=1.0,sigma=0.01}]"#;
@@ -117,7 +118,7 @@ fn exact_data_without_light_and_axes_that_are_all_alike_fail() {
     assert!(said.contains("axis.scan") && said.contains("do not constrain the axis"), "{said}");
     let error = fail(
         folder.path(),
-        &with(&small(&[images, SCAN, "observation.scans=1"]), &["-o", "single"]),
+        &with(&small(&[images, SCAN, "simulation.observation.scans=1"]), &["-o", "single"]),
     );
     assert!(error.contains("axis.scan needs at least 2 frame times"), "{error}");
     assert!(!folder.path().join("single").exists());

@@ -15,7 +15,7 @@ const SMALL: [&str; 17] = [
     "--set",
     "linear.rounds=2",
     "--set",
-    "observation.scans=24",
+    "simulation.observation.scans=24",
     "--set",
     "output.nodes=24",
     "--set",

@@ -17,20 +17,30 @@ const MARK: &str = "<!-- keys of a ";
 const COPIES: [&str; 9] = [
     "motion.velocity.perturbed.of",
     "volume.rotation.perturbed.of",
-    "world.hole",
-    "world.observer",
-    "world.region",
-    "world.effects",
-    "world.motion",
-    "world.polarization",
+    "simulation.hole",
+    "simulation.observer",
+    "simulation.region",
+    "simulation.effects",
+    "simulation.motion",
+    "simulation.polarization",
     "representation.own",
 ];
 
-/// Parameters that are fitted: each is a prior.
-fn is_prior(path: &str) -> bool {
-    path.strip_prefix("world.").is_some_and(|name| {
-        !name.contains('.') && !COPIES.contains(&path) && !matches!(name, "search" | "drawn")
-    })
+/// Numbers that may have a prior, which is described once, under the first of them.
+const PRIORS: [&str; 6] = [
+    "hole.spin",
+    "observer.inclination_deg",
+    "observer.position_angle_deg",
+    "motion.velocity.infall.xi",
+    "motion.velocity.infall.beta_r",
+    "motion.velocity.infall.beta_phi",
+];
+
+/// What such a number is.
+const PRIOR: &str = "number or [prior](#priors)";
+
+fn is_described_elsewhere(path: &str) -> bool {
+    COPIES.contains(&path) || PRIORS[1..].contains(&path)
 }
 
 /// A page with its tables made anew, and the paths that they have.
@@ -54,11 +64,13 @@ impl Page<'_> {
     fn rows(&mut self, path: &str, (prefix, is_choice): (&str, bool), out: &mut String) {
         for key in self.keys.table(path) {
             let below = below(path, &key.name);
-            if self.own.contains(&below) || !self.described.insert(below.clone()) {
+            let has_prior = PRIORS.contains(&&*below);
+            let is_new = self.described.insert(below.clone());
+            if !has_prior && (self.own.contains(&below) || !is_new) {
                 continue;
             }
             *out += &row(&key, (prefix, is_choice));
-            if !COPIES.contains(&&*below) && !is_prior(&below) {
+            if !has_prior && !is_described_elsewhere(&below) {
                 let is_choice = key.choices.iter().any(|(word, _)| word.starts_with('{'));
                 self.rows(&below, (&format!("{prefix}{}.", key.name), is_choice), out);
             }
@@ -89,6 +101,7 @@ fn row(key: &Key, (prefix, is_choice): (&str, bool)) -> String {
 /// What a value may be, with its range.
 fn value(key: &Key) -> String {
     let kind = match &*key.kind {
+        kind if kind.starts_with("number, { uniform") => PRIOR.to_owned(),
         kind if kind.contains(['"', '{']) => format!("`{kind}`"),
         "table" => return String::new(),
         kind => kind.to_owned(),
@@ -132,7 +145,7 @@ fn all(keys: &Keys, path: &str, out: &mut BTreeSet<String>) {
     for key in keys.table(path) {
         let below = below(path, &key.name);
         out.insert(below.clone());
-        if !COPIES.contains(&&*below) && !is_prior(&below) {
+        if !is_described_elsewhere(&below) {
             all(keys, &below, out);
         }
     }

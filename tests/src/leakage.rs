@@ -40,8 +40,8 @@ fn exact_closure_traces_find_the_flare_behind_leakage() {
     std::fs::write(folder.path().join("traces.toml"), text).unwrap();
     let set = [
         "screen.pixels=24",
-        "truth.spot.0.sigma=1.0",
-        "observation.scans=16",
+        "simulation.truth.spot.0.sigma=1.0",
+        "simulation.observation.scans=16",
         "linear.iterations=200",
     ];
     let mut words = vec!["fit", "traces.toml", "-o", "flare"];

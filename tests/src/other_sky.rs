@@ -66,28 +66,23 @@ fn found(folder: &Path, sky: &Sky, noise: f64) -> Value {
     let (coarse, fine) = (view(250, 16, 30, 16), view(48, 24, 60, 32));
     let angle = sky.position_angle_deg;
     let sets = [
-        "hole.spin=0.0".to_owned(),
-        "observer.inclination_deg=60.0".to_owned(),
+        "hole.spin={uniform=[-0.95,0.95]}".to_owned(),
+        "observer.inclination_deg={isotropic=[0.0,90.0]}".to_owned(),
+        format!("observer.position_angle_deg={{uniform=[{},{}]}}", angle - 60.0, angle + 60.0),
         format!("screen.width={}", SCREEN.width),
         "region.r_min=2.0".to_owned(),
         "region.r_max=13.0".to_owned(),
         "motion.velocity={keplerian={}}".to_owned(),
         "motion.axis=[0.0,0.0,1.0]".to_owned(),
-        "movie.from=0.0".to_owned(),
-        format!("movie.to={LAST}"),
+        "data.movie.from=0.0".to_owned(),
+        format!("data.movie.to={LAST}"),
         format!("loss.0.sigma={sigma}"),
         "representation=linear-grid".to_owned(),
         "representation.nodes=24".to_owned(),
         "linear.iterations=10".to_owned(),
         "linear.rounds=1".to_owned(),
         "output.nodes=24".to_owned(),
-        format!(
-            "world={{spin={{uniform=[-0.95,0.95]}},inclination_deg={{isotropic=[0.0,90.0]}},\
-             position_angle_deg={{uniform=[{},{}]}},\
-             search={{starts=2,drag_is_spin=true,coarse={coarse},fine={fine}}}}}",
-            angle - 60.0,
-            angle + 60.0
-        ),
+        format!("search={{starts=2,coarse={coarse},fine={fine}}}"),
     ];
     let mut words = vec!["fit", "fit.toml", "-o", "run"];
     sets.iter().for_each(|set| words.extend(["--set", set]));

@@ -1,6 +1,7 @@
 //! Draws around a finished fit.
 
 use crate::support::{binary, kerrlight, root};
+use crate::unknown_world::{NEAR, of_unknown_view};
 use serde_json::Value;
 use std::path::Path;
 
@@ -81,7 +82,7 @@ fn exact_draws_of_a_right_model_predict_the_data() {
         format!(
             "truth={{spot=[],field={{{field},negative=\"lifted\",nodes=12,degree=\"linear\"}}}}"
         ),
-        "observation.scans=5".to_owned(),
+        "simulation.observation.scans=5".to_owned(),
         "representation=linear-grid".to_owned(),
         "representation.nodes=12".to_owned(),
         format!(
@@ -202,16 +203,16 @@ fn exact_priors_that_mean_nothing_are_refused() {
             "linear.prior does not work together with [change]",
         ),
         (
-            "truth.field={kind=\"gaussian\",mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"1/2\",negative=\"dark\",nodes=3}",
-            "truth.field.nodes = 3 is not allowed",
+            "simulation.truth.field={kind=\"gaussian\",mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"1/2\",negative=\"dark\",nodes=3}",
+            "simulation.truth.field.nodes = 3 is not allowed",
         ),
         (
-            "truth.field={kind=\"gaussian\",mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"1/2\",nodes=8}",
-            "truth.field.negative is missing",
+            "simulation.truth.field={kind=\"gaussian\",mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"1/2\",nodes=8}",
+            "simulation.truth.field.negative is missing",
         ),
         (
-            "truth.field={kind=\"log-normal\",mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"1/2\",negative=\"dark\",nodes=8}",
-            "truth.field.negative is not allowed with kind = \"log-normal\"",
+            "simulation.truth.field={kind=\"log-normal\",mean=0.1,amplitude=0.2,correlation_length=2.0,matern=\"1/2\",negative=\"dark\",nodes=8}",
+            "simulation.truth.field.negative is not allowed with kind = \"log-normal\"",
         ),
         (
             "linear.prior={kind=\"log-normal\",mean=60.0,amplitude=0.2,correlation_length=2.0,matern=\"5/2\"}",
@@ -237,18 +238,15 @@ fn exact_priors_that_mean_nothing_are_refused() {
 fn exact_draws_of_an_unknown_world_have_worlds() {
     let folder = tempfile::tempdir().unwrap();
     let view = "{ worlds = 60, nodes = 16, iterations = 40, pixels = 20, frames = 12 }";
-    let text = format!(
-        "{}\n[world.inclination_deg]\nuniform = [50.0, 70.0]\n[world.position_angle_deg]\nuniform = [-10.0, 10.0]\n\
-         [world.search]\nstarts = 1\ndrag_is_spin = true\ncoarse = {view}\nfine = {view}\n",
-        settings()
-    );
+    let search = format!("starts = 1\ncoarse = {view}\nfine = {view}\n");
+    let text = of_unknown_view(&settings(), NEAR, &search);
     std::fs::write(folder.path().join("fit.toml"), text).unwrap();
     let kind = ["--set", "representation=linear-grid", "--set", "representation.nodes=20"];
     let told = run(
         folder.path(),
         &[&["fit", "fit.toml", "-o", "run", "--samples", "3"][..], &kind[..]].concat(),
     );
-    assert!(told.contains("world.inclination_deg = "), "{told}");
+    assert!(told.contains("inclination_deg = "), "{told}");
     let world = read(&folder.path().join("run/world.json"));
     assert!(world["sigma"]["inclination_deg"].as_f64().unwrap() > 0.0, "{world}");
     let numbers = read(&folder.path().join("run/posterior/posterior.json"));

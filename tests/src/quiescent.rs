@@ -7,10 +7,9 @@ use std::path::Path;
 /// The scene of docs/method/quiescent-emission.md with a few exact images in place of visibilities.
 fn scene(folder: &Path) -> String {
     let text = std::fs::read_to_string(root().join("scenes/fits/flare_and_ring.toml")).unwrap();
-    let (before, rest) = text.split_once("[observation]").unwrap();
+    let (before, rest) = text.split_once("[simulation.observation]").unwrap();
     let (_, after) = rest.split_once("[[loss]]\ndata = \"visibilities\"").unwrap();
-    let movie =
-        "[movie]\nframes = 12\nfrom = 0.0\nto = 100.0\n\n[[loss]]\ndata = \"image\"\nsigma = 0.001";
+    let movie = "[simulation.movie]\nframes = 12\nfrom = 0.0\nto = 100.0\n\n[[loss]]\ndata = \"image\"\nsigma = 0.001";
     let path = folder.join("scene.toml");
     std::fs::write(&path, format!("{before}{movie}{after}")).unwrap();
     path.display().to_string()
@@ -22,7 +21,7 @@ const SMALL: [&str; 10] = [
     "--set",
     "screen.pixels=20",
     "--set",
-    "truth.spot.0.sigma=1.2",
+    "simulation.truth.spot.0.sigma=1.2",
     "--set",
     "representation.nodes=16",
     "--set",
@@ -66,7 +65,10 @@ fn exact_what_excludes_a_quiescent_image_is_refused() {
         (&["quiescent.smoothness=-1.0"], "quiescent.smoothness = -1"),
         (&["quiescent={upper=1.0,sparsity=0.0}"], "quiescent.smoothness"),
         (&[trained, "training.batch={pixels=9}"], "training.batch: pixels are drawn"),
-        (&["truth.ring.0.radius=900.0"], "truth.ring.0: no pixel of the screen sees it"),
+        (
+            &["simulation.truth.ring.0.radius=900.0"],
+            "simulation.truth.ring.0: no pixel of the screen sees it",
+        ),
         (
             &[
                 "loss=[{data=\"closure-phases\",weight=1.0}]",

@@ -180,7 +180,7 @@ fn exact_fit_ends_with_its_verdict_and_results() {
     let mut words = vec!["fit", fit.to_str().unwrap(), "-o", "run"];
     for change in [
         "screen.pixels=16",
-        "movie.frames=8",
+        "simulation.movie.frames=8",
         "output.nodes=16",
         "representation={kind=\"grid\",nodes=16}",
         "region.nodes={equal-mino-time={per_ray=40}}",

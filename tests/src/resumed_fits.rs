@@ -12,9 +12,9 @@ fn of_a_movie(at: &Path) {
     let text = std::fs::read_to_string(at.join("source/fit.toml")).unwrap();
     // Its paths are this file's own: not those of the run, which the first line names.
     let (_, text) = text.split_once('\n').unwrap();
-    let (before, rest) = text.split_once("[truth]").or(text.split_once("[[truth.spot]]")).unwrap();
+    let (before, rest) = text.split_once("[simulation").unwrap();
     let (_, after) = rest.split_once("[[loss]]").unwrap();
-    let data = "[data.movie]\npath = \"movie.csv\"\n\n[[loss]]";
+    let data = "[data.movie]\npath = \"movie.csv\"\nfrom = 0.0\nto = 0.0\n\n[[loss]]";
     std::fs::write(at.join("movie.toml"), format!("{before}{data}{after}")).unwrap();
 }
 
@@ -28,11 +28,11 @@ fn of_an_array(at: &Path) -> Vec<String> {
     std::fs::write(at.join("array.txt"), sites).unwrap();
     let mut words: Vec<String> = vec!["fit".to_owned()];
     for change in [
-        "observation.array=array.txt",
+        "simulation.observation.array=array.txt",
         "representation=grid",
         "representation.nodes=12",
         "screen.pixels=12",
-        "observation.scans=6",
+        "simulation.observation.scans=6",
         "training.steps=400",
         "training.log_every=10",
         "training.checkpoint_seconds=0.02",
@@ -138,8 +138,8 @@ fn exact_a_changed_movie_is_refused() {
     let row = (0..n).map(|k| format!("{}", k % 3)).collect::<Vec<_>>().join(",");
     let image = format!("{row}\n").repeat(n);
     std::fs::write(at.join("movie.csv"), &image).unwrap();
-    let words = ["fit", "movie.toml", "-o", "run", "--set", "movie.frames=1", "--set"];
-    succeed(at, &[&words[..], &["training.batch={pixels=100}"]].concat());
+    let words = ["fit", "movie.toml", "-o", "run", "--set", "training.batch={pixels=100}"];
+    succeed(at, &words);
     std::fs::write(at.join("movie.csv"), image.replacen('1', "7", 1)).unwrap();
     let message = refused(at);
     assert!(message.contains("movie.csv has changed since run was begun"), "{message}");
@@ -209,8 +209,8 @@ fn exact_comparisons_are_resumed_alone_with_the_same_data() {
         seeds = 1
         fit = {:?}
         [set]
-        observation.array = {array:?}
-        observation.scans = 8
+        simulation.observation.array = {array:?}
+        simulation.observation.scans = 8
         screen.pixels = 12
         output.nodes = 12
         training = {{ steps = 4, log_every = 2, start = "drawn" }}

@@ -6,7 +6,7 @@ use kerrlight_render::volume::VolumeArrays;
 use std::path::Path;
 
 /// Gains of 15 %, of 60 % at the LMT, and random phases, all of them new in every scan.
-const ERRORS: &str = "observation.gains={constant_amplitude=0.0,scan_amplitude=0.15,random_phases=true,stations={LMT=0.6}}";
+const ERRORS: &str = "simulation.observation.gains={constant_amplitude=0.0,scan_amplitude=0.15,random_phases=true,stations={LMT=0.6}}";
 const FREE: &str = "instrument.gains={phases=\"free\",amplitude=0.15,stations={LMT=0.6}}";
 
 /// The built-in experiment with fewer pixels, frames and nodes.
@@ -14,7 +14,7 @@ fn small(sets: &[&str]) -> Vec<String> {
     let usual = [
         "screen.pixels=20",
         "screen.jy_per_pixel=0.32",
-        "observation.scans=16",
+        "simulation.observation.scans=16",
         "representation=linear-grid",
         "representation.nodes=24",
         "linear.smoothness=0.03",
@@ -117,9 +117,9 @@ fn bad_input_of_gains_is_named_and_nothing_is_begun() {
         (vec![FREE, both], "would each have gains of their own"),
         (
             vec![
-                "observation.gains={constant_amplitude=0.0,scan_amplitude=0.1,random_phases=true,stations={XX=0.6}}",
+                "simulation.observation.gains={constant_amplitude=0.0,scan_amplitude=0.1,random_phases=true,stations={XX=0.6}}",
             ],
-            "observation.gains.stations.XX",
+            "simulation.observation.gains.stations.XX",
         ),
     ] {
         let error = fail(folder.path(), &with(&small(&sets), &["-o", "none"]));

@@ -18,7 +18,7 @@ const SMALL: [&str; 14] = [
     "--set",
     "screen.pixels=20",
     "--set",
-    "observation.scans=20",
+    "simulation.observation.scans=20",
     "--set",
     "output.nodes=16",
     "--set",

@@ -306,7 +306,7 @@ fn code_the_page_of_a_fit_has_volume_truth_and_data() {
     let folder = tempfile::tempdir().unwrap();
     let settings = [
         "screen.pixels=12",
-        "movie.frames=6",
+        "simulation.movie.frames=6",
         "representation=bhnerf",
         "representation.width=16",
         "training.steps=20",

@@ -28,7 +28,7 @@ const SMALL: [&str; 14] = [
     "--set",
     "screen.pixels=16",
     "--set",
-    "movie.frames=6",
+    "simulation.movie.frames=6",
     "--set",
     "training.steps=4",
     "--set",
@@ -62,7 +62,7 @@ fn exact_stores_through_the_program() {
     assert!(picture("volume.zarr") == picture("volume.npz"));
     // The movie of the run, once as an array and once as a store.
     let text = std::fs::read_to_string(&fit).unwrap();
-    let (head, rest) = text.split_once("[[truth.spot]]").unwrap();
+    let (head, rest) = text.split_once("[[simulation.truth.spot]]").unwrap();
     let (_, tail) = rest.split_once("[movie]").unwrap();
     std::fs::write(at.join("data.toml"), format!("{head}[movie]{tail}")).unwrap();
     let bytes = std::fs::read(at.join("run/movie.npz")).unwrap();

@@ -16,9 +16,9 @@ use toml::Value;
 const SHOWN: [(&str, &str); 9] = [
     ("training.steps", "steps of the optimiser, at most"),
     ("screen.pixels", "pixels along each side of an image"),
-    ("movie.frames", "frames of the movie"),
-    ("observation.scans", "scans of the observation"),
-    ("observation.noise", "noise"),
+    ("simulation.movie.frames", "frames of the movie"),
+    ("simulation.observation.scans", "scans of the observation"),
+    ("simulation.observation.noise", "noise"),
     ("representation.nodes", "nodes along each side of a grid, where the representation is one"),
     ("linear.rounds", "rounds of the linear problem"),
     ("linear.iterations", "iterations of a round"),
@@ -134,7 +134,7 @@ fn kinds(settings: &toml::Table) -> Vec<String> {
 fn missing(settings: &toml::Table, value: &str) -> Option<String> {
     let kinds = kinds(settings);
     let is_beside_truth = QUALITIES.contains(&value) || value == "nrmse";
-    if is_beside_truth && !settings.contains_key("truth") {
+    if is_beside_truth && !settings.contains_key("simulation") {
         return Some(format!("{value} needs a truth, and data are measured"));
     }
     if value == "chi2" && kinds.len() > 1 {

@@ -358,7 +358,8 @@ fn cost(settings: &Table) -> f64 {
     };
     let side =
         number(&["screen", "pixels"]).or_else(|| number(&["image", "pixels"])).unwrap_or(1.0);
-    let frames = number(&["movie", "frames"]).or_else(|| number(&["observation", "scans"]));
+    let frames = number(&["simulation", "observation", "scans"])
+        .or_else(|| number(&["simulation", "movie", "frames"]));
     let rays = match number(&["training", "batch", "pixels"]) {
         Some(pixels) => pixels,
         None => {

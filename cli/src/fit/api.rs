@@ -33,7 +33,7 @@ pub fn check(changed: &Changed<'_>, registry: &Registry) -> anyhow::Result<()> {
 /// Radius of the horizon, and of the region of recovery, M.
 pub fn sizes(text: &str) -> anyhow::Result<(f64, f64)> {
     let file = parse(text)?;
-    Ok((kerrlight_geodesic::Kerr::new(file.hole.spin)?.horizon(), file.region.r_max))
+    Ok((kerrlight_geodesic::Kerr::new(file.hole.spin.value())?.horizon(), file.region.r_max))
 }
 
 /// Angle (radians) by which matter at a radius (M) has turned since the reference time when the part `later` of the
@@ -41,9 +41,9 @@ pub fn sizes(text: &str) -> anyhow::Result<(f64, f64)> {
 pub fn turned(text: &str, later: f64) -> anyhow::Result<[impl Fn(f64) -> f64; 2]> {
     let file = parse(text)?;
     let angle = |of: &FitFile| -> anyhow::Result<_> {
-        let movie = of.movie.as_ref().context("no [movie] says how long it lasts")?;
+        let [from, to] = of.span_of_images().context("data are no movie")?;
         let motion = setup::motion(of, Vec::new())?;
-        let time = movie.from + later * (movie.to - movie.from) - motion.reference;
+        let time = from + later * (to - from) - motion.reference;
         Ok(move |r| motion.velocity.rate(r) * time)
     };
     Ok([angle(&file)?, angle(&file.simulated()?)?])

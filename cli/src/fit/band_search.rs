@@ -152,8 +152,8 @@ fn results(scan: &BandScan, file: &FitFile) -> anyhow::Result<Value> {
         let ln = world.ln_posterior - best.ln_posterior;
         json!([inclination_deg, rotation_factor, position_angle_deg, ln])
     };
-    let truth = match file.truth {
-        Some(_) => Some(file.simulated()?.observer.inclination_deg),
+    let truth = match file.simulation {
+        Some(_) => Some(file.simulated()?.observer.inclination_deg.value()),
         None => None,
     };
     let band = best.band;

@@ -56,7 +56,7 @@ fn model(file: &FitFile, band: &BandSettings) -> Vec<String> {
         "A hole of spin {}. In each world the emission is a Gaussian random field in a band about a circle; gas carries it round \
          with an angular velocity that is a multiple of the one in motion.velocity. No volume is fitted to compare worlds: \
          the field is integrated out. The volume that is shown is that of the most probable world.",
-        file.hole.spin
+        file.hole.spin.value()
     )];
     text.extend(file.polarization.as_ref().map(law));
     text.push(match &band.background {

@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use kerrlight_common::frames::Frames;
 use kerrlight_common::numpy;
 use kerrlight_tomo::Error;
-use kerrlight_tomo::fit::settings::{DataFiles, FitFile, StaticImageFile};
+use kerrlight_tomo::fit::settings::{DataFiles, FitFile, Simulation, StaticImageFile};
 use kerrlight_tomo::fit::setup::{Instrument, Measured};
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::files::images::{WithSize, npy_frames, npz_frames};
@@ -26,12 +26,12 @@ pub fn measure(
     match &file.data {
         None => {
             let file = &with_times(file, base_dir)?;
-            let array = file.observation.as_ref().map(|seen| {
-                arguments::array_near(&seen.array, base_dir).context("observation.array")
+            let array = file.observation().map(|seen| {
+                arguments::array_near(&seen.array, base_dir).context("simulation.observation.array")
             });
             Ok(Measured::simulated(file, instrument, array.transpose()?.as_ref())?)
         }
-        Some(DataFiles::Movie { path }) => {
+        Some(DataFiles::Movie { path, .. }) => {
             let path = base_dir.join(path);
             let movie = images(file, &path)?;
             Ok(Measured::of_movie(file, movie, &path.display().to_string())?)
@@ -65,10 +65,12 @@ fn light_curve(path: &Path) -> anyhow::Result<LightCurve> {
 /// The settings with the times of a simulated light curve, where these are in a file.
 fn with_times(file: &FitFile, base_dir: &Path) -> anyhow::Result<FitFile> {
     let mut file = file.clone();
-    let Some(curve) = &mut file.light_curve else { return Ok(file) };
+    let Some(Simulation { light_curve: Some(curve), .. }) = &mut file.simulation else {
+        return Ok(file);
+    };
     let Some(path) = curve.times.take() else { return Ok(file) };
     if curve.times_h.is_some() {
-        bail!("light_curve.times and times_h exclude each other");
+        bail!("simulation.light_curve.times and times_h exclude each other");
     }
     let path = base_dir.join(path);
     let times = files::parse_times(&output::read_text(&path)?);

@@ -25,8 +25,8 @@ pub fn lines(results: &Value) -> Vec<String> {
                 _ => format!("{value:.4}, not constrained: the data leave it open"),
             };
             match results["truth"][name].as_f64() {
-                Some(truth) => format!("world.{name} = {sure} (truth {truth:.4})"),
-                None => format!("world.{name} = {sure}"),
+                Some(truth) => format!("{name} = {sure} (truth {truth:.4})"),
+                None => format!("{name} = {sure}"),
             }
         })
         .collect();
@@ -179,7 +179,7 @@ fn unfinished(results: &Value) -> Option<String> {
     let open = trials.iter().filter(|trial| trial["converged"] == false).count();
     (open > 0).then(|| {
         format!(
-            "{open} of {} searches ended before they had converged: with a larger world.search.coarse.worlds more of them may \
+            "{open} of {} searches ended before they had converged: with a larger search.coarse.worlds more of them may \
              end at the same world, or at a better one",
             trials.len()
         )
@@ -229,7 +229,7 @@ fn unexplained(results: &Value) -> Option<String> {
     };
     Some(format!(
         "the volume of the best world leaves χ²/N = {chi2:.2}, {means}: matter may move by another law than \
-         motion.velocity, or emission lie outside of the region; else world.search.finest or linear.degree = \"quadratic\" \
+         motion.velocity, or emission lie outside of the region; else search.finest or linear.degree = \"quadratic\" \
          may help, as may a higher order of region.nodes, and pulse = \"delta\" where data are of finer pixels"
     ))
 }

@@ -117,7 +117,7 @@ fn results(
         (free.parameter.name().to_owned(), json!(free.bounds().map(|x| x / free.parameter.unit())))
     });
     let flow = match true_world(file, measured)? {
-        Some(truth) => flow_error(file, unknown, [&found.world, &truth])?,
+        Some(truth) => flow_error(file, [&found.world, &truth])?,
         None => None,
     };
     Ok(json!({
@@ -147,12 +147,8 @@ const RADII: usize = 64;
 
 /// How far a flow is from the true one: the root mean square difference of (dr/dt, r dφ/dt) over the radii of the region,
 /// over the root mean square of the true velocity.
-fn flow_error(
-    file: &FitFile,
-    unknown: &UnknownWorld,
-    worlds: [&World; 2],
-) -> anyhow::Result<Option<f64>> {
-    let laws = worlds.map(|world| setup::motion(&settled(file, unknown, world), Vec::new()));
+fn flow_error(file: &FitFile, worlds: [&World; 2]) -> anyhow::Result<Option<f64>> {
+    let laws = worlds.map(|world| setup::motion(&settled(file, world), Vec::new()));
     let [found, truth] = laws;
     let (found, truth) = (found?.velocity, truth?.velocity);
     let [by, of] = worlds.map(|world| world.get(Parameter::Rotation));

@@ -69,9 +69,10 @@ fn data(table: &Table) -> String {
         let path = table.get("data")?.get(kind)?.get("path")?;
         Some(format!("{name} of {}", path.as_str().unwrap_or_default()))
     });
-    let simulated = || match table.get("observation").and_then(|seen| seen.get("array")) {
+    let of = |key: &str| table.get("simulation").and_then(|simulation| simulation.get(key));
+    let simulated = || match of("observation").and_then(|seen| seen.get("array")) {
         Some(array) => format!("simulated, seen by {}", array.as_str().unwrap_or_default()),
-        None if table.contains_key("light_curve") => "a simulated light curve".to_owned(),
+        None if of("light_curve").is_some() => "a simulated light curve".to_owned(),
         None => "simulated images".to_owned(),
     };
     file.unwrap_or_else(simulated)

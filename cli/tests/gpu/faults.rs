@@ -37,7 +37,7 @@ fn steps() -> Words {
     let small = [
         "screen.pixels=12",
         "region.nodes={equal-mino-time={per_ray=20}}",
-        "movie.frames=6",
+        "simulation.movie.frames=6",
         "representation.width=16",
         "training.steps=60",
         "training.log_every=20",

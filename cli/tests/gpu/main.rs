@@ -159,7 +159,7 @@ fn scene_1(more: &[&str]) -> Vec<String> {
     let small = [
         "screen.pixels=20",
         "region.nodes={equal-mino-time={per_ray=40}}",
-        "movie.frames=16",
+        "simulation.movie.frames=16",
         "representation.width=32",
         "training.optimiser=adam",
         "training.steps=150",
@@ -250,7 +250,7 @@ fn code_fits_of_visibilities_are_those_of_the_processor() {
             "representation=bhnerf",
             "representation.width=16",
             "screen.pixels=12",
-            "observation.scans=6",
+            "simulation.observation.scans=6",
             "training.optimiser=adam",
             "training.steps=30",
             "training.log_every=10",

@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// How matter moves about an axis, as scenes and fits write it: a law of the angular velocity Ω(r), or one of both Ω and
-/// dr/dt.
+/// dr/dt. Numbers of the type `N` are those that a fit may not know.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
-pub enum Velocity {
+pub enum Velocity<N = f64> {
     /// Ω = 1/(r^{3/2} + drag).
     Keplerian {
         /// Spin of the flow; for circular geodesics that of the hole. Without it, a ξ_z.
@@ -43,18 +43,18 @@ pub enum Velocity {
         rates: Vec<f64>,
     },
     /// Another law plus a Gaussian process in radius.
-    Perturbed(Perturbed),
+    Perturbed(Perturbed<N>),
     /// Between circular orbits and free fall (Cárdenas-Avendaño, Lupsasca & Zhu 2023).
     Infall {
         /// ξ: specific angular momentum over that of circular geodesics.
-        #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "an angular momentum over that of circular orbits"))]
-        xi: f64,
+        #[schemars(extend("minimum" = 0.0, "maximum" = 1.0, "unit" = "an angular momentum over that of circular orbits"))]
+        xi: N,
         /// β_r: 1, radial velocity of circular orbits and their plunge; 0, of free fall.
-        #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "0: free fall, 1: circular"))]
-        beta_r: f64,
+        #[schemars(extend("minimum" = 0.0, "maximum" = 1.0, "unit" = "0: free fall, 1: circular"))]
+        beta_r: N,
         /// β_φ: the same of the angular velocity.
-        #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "0: free fall, 1: circular"))]
-        beta_phi: f64,
+        #[schemars(extend("minimum" = 0.0, "maximum" = 1.0, "unit" = "0: free fall, 1: circular"))]
+        beta_phi: N,
         /// Spin of the flow. Without it, a ξ_z.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = -1.0, max = 1.0), extend("unit" = "a/M"))]
@@ -77,9 +77,9 @@ pub enum Velocity {
 /// A law and a Gaussian process over the radius, which is drawn from a seed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Perturbed {
+pub struct Perturbed<N = f64> {
     /// The law that is perturbed.
-    pub of: Box<Velocity>,
+    pub of: Box<Velocity<N>>,
     /// Standard deviation of the process, rad/M.
     pub deviation: f64,
     /// Its correlation length, M.
@@ -93,6 +93,29 @@ pub struct Perturbed {
 
 /// Radii of the table of a perturbed law.
 const ROWS: usize = 100;
+
+impl<N> Velocity<N> {
+    /// Itself with other numbers in place of those that may not be known.
+    pub fn map<M>(self, f: &impl Fn(N) -> M) -> Velocity<M> {
+        match self {
+            Velocity::Keplerian { drag } => Velocity::Keplerian { drag },
+            Velocity::PowerLaw { radius, rate, exponent } => {
+                Velocity::PowerLaw { radius, rate, exponent }
+            }
+            Velocity::Table { radii, rates } => Velocity::Table { radii, rates },
+            Velocity::Perturbed(Perturbed { of, deviation, correlation_length, radii, seed }) => {
+                let of = Box::new(of.map(f));
+                Velocity::Perturbed(Perturbed { of, deviation, correlation_length, radii, seed })
+            }
+            Velocity::Infall { xi, beta_r, beta_phi, drag } => {
+                Velocity::Infall { xi: f(xi), beta_r: f(beta_r), beta_phi: f(beta_phi), drag }
+            }
+            Velocity::Profile { radii, angular, radial } => {
+                Velocity::Profile { radii, angular, radial }
+            }
+        }
+    }
+}
 
 impl Velocity {
     /// What it is about a hole whose spin as the flow sees it is `drag` (M); perturbations without a seed are drawn from

@@ -39,10 +39,10 @@ fn ordered(losses: &[Loss]) -> impl Iterator<Item = &Loss> {
 /// What σ of a kind of data is.
 fn errors(file: &FitFile, kind: LossKind) -> Errors {
     let of_pixels = matches!(kind, LossKind::Image | LossKind::LightCurve);
-    match (&file.data, &file.observation) {
+    match (&file.data, file.observation()) {
         (Some(DataFiles::Movie { .. }), _) => Errors::Assumed,
         (Some(DataFiles::Visibilities { .. } | DataFiles::LightCurve(_)), _) => Errors::Stated,
-        _ if file.light_curve.as_ref().is_some_and(|curve| curve.noise == Noise::Thermal) => {
+        _ if file.simulated_curve().is_some_and(|curve| curve.noise == Noise::Thermal) => {
             Errors::Known
         }
         (None, Some(seen)) if !of_pixels && seen.noise == Noise::Thermal => match seen.systematic {

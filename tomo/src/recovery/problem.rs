@@ -25,7 +25,7 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Simulates the data: what `settings.truth` shines, seen by `array` where there is an observation.
+    /// Simulates the data: what `settings.simulation` says, seen by `array` where there is an observation.
     ///
     /// # Errors
     /// If settings are missing, out of range or contradict each other.
@@ -50,7 +50,7 @@ impl Problem {
     /// Takes images in Jy/pixel, rows from the top.
     ///
     /// # Errors
-    /// As [`Problem::simulated`], and if there are other frames or pixels than the settings say.
+    /// As [`Problem::simulated`], and if there are other pixels than the settings say.
     pub fn of_movie(settings: FitFile, movie: Movie) -> Result<Self, Error> {
         let measure = |settings: &FitFile, _: &Instrument| {
             let Movie { grid, pixels } = movie;
@@ -100,9 +100,9 @@ impl Problem {
         }
         // Times at which emission may change are those of the rays.
         setup::representation(settings, registry, setup::emission_times(instrument, motion))?;
-        if let Some(unknown) = settings.unknown_world()? {
+        if settings.unknown_world()?.is_some() {
             let world = setup::known_world(settings);
-            setup::in_world(settings, &unknown, instrument, measured, &world, 0)?;
+            setup::in_world(settings, instrument, measured, &world, 0)?;
         }
         let seen = self.objective(instrument, motion, measured)?.observed().len();
         if let Some(held_out) = &settings.held_out {

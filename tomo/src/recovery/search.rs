@@ -7,8 +7,8 @@ use crate::Error;
 use crate::fit::Motion;
 use crate::fit::settings::{FitFile, Kind, UnknownWorld};
 use crate::fit::setup::{self, BandScan, FoundWorld, HeldData, Instrument, Measured};
-use crate::fit::world::{Parameter, World};
-use kerrlight_render::dynamics::{Axis, Velocity};
+use crate::fit::world::World;
+use kerrlight_render::dynamics::Axis;
 use std::sync::{Mutex, PoisonError};
 
 /// Settings, rays, motion and data in the world that was found.
@@ -31,24 +31,17 @@ impl Placed {
     pub fn in_world(
         problem: &Problem,
         file: &FitFile,
-        (unknown, world, rays): (&UnknownWorld, &World, u64),
+        (world, rays): (&World, u64),
     ) -> Result<Self, Error> {
         let Problem { instrument, measured, .. } = problem;
-        let (instrument, motion) =
-            setup::in_world(file, unknown, instrument, measured, world, rays)?;
-        Ok(Self { file: settled(file, unknown, world), instrument, motion, measured: None })
+        let (instrument, motion) = setup::in_world(file, instrument, measured, world, rays)?;
+        Ok(Self { file: settled(file, world), instrument, motion, measured: None })
     }
 
     fn of(problem: &Problem, choice: &Choice) -> Result<Option<Self>, Error> {
         let Problem { settings, measured, .. } = problem;
         let placed = match choice {
-            Choice::World(world) => {
-                let unknown = settings.unknown_world()?;
-                let unknown = unknown
-                    .as_ref()
-                    .map(|unknown| Self::in_world(problem, settings, (unknown, world, 0)));
-                return unknown.transpose();
-            }
+            Choice::World(world) => Self::in_world(problem, settings, (world, 0))?,
             Choice::Band { inclination_deg, position_angle_deg, rotation_factor, background } => {
                 let mut file = setup::in_band_world(settings, *inclination_deg);
                 if let Some(law) = &mut file.polarization {
@@ -103,7 +96,7 @@ fn world(
     };
     let Problem { settings, measured, .. } = problem;
     let found = setup::find_world(settings, measured, unknown, &*journal, &mut watch)
-        .map_err(|error| error.while_in("world.search"))?;
+        .map_err(|error| error.while_in("search"))?;
     Ok(found.ok_or(Stopped::Kept)?)
 }
 
@@ -157,35 +150,14 @@ pub(super) fn weighed_before_steps(
     }
 }
 
-/// The settings with what was found in place of what was assumed.
-pub fn settled(file: &FitFile, unknown: &UnknownWorld, world: &World) -> FitFile {
+/// The settings with what was found in place of priors.
+pub fn settled(file: &FitFile, world: &World) -> FitFile {
     let mut file = file.clone();
-    file.hole.spin = world.get(Parameter::Spin);
-    file.observer.inclination_deg = world.get(Parameter::Inclination).to_degrees();
-    if let Some(power) = &mut file.effects.redshift_power {
-        *power = world.get(Parameter::RedshiftPower);
-    }
-    let follows = unknown.search.drag_is_spin;
-    match &mut file.motion.velocity {
-        // That of the hole that was found.
-        Velocity::Keplerian { drag } if follows => *drag = None,
-        Velocity::Infall { xi, beta_r, beta_phi, drag } => {
-            for (number, parameter) in [xi, beta_r, beta_phi].into_iter().zip(Parameter::FLOW) {
-                *number = world.get(parameter);
-            }
-            if follows {
-                *drag = None;
-            }
+    for (parameter, quantity) in file.quantities_mut() {
+        if quantity.prior().is_some() {
+            *quantity = (world.get(parameter) / parameter.unit()).into();
         }
-        Velocity::Profile { angular, radial, .. } if unknown.knots > 0 => {
-            let times = |values: &mut [f64], of: fn(u8) -> Parameter| {
-                let factors = (0..).map(|knot| world.get(of(knot)));
-                values.iter_mut().zip(factors).for_each(|(value, factor)| *value *= factor);
-            };
-            times(angular, Parameter::Angular);
-            times(radial, Parameter::Radial);
-        }
-        _ => {}
     }
+    file.search = None;
     file
 }

@@ -46,7 +46,7 @@ fn settings() -> String {
     for change in [
         "screen.pixels=8",
         "region.nodes={equal-mino-time={per_ray=10}}",
-        "movie.frames=4",
+        "simulation.movie.frames=4",
         "representation.width=8",
         "training.steps=12",
         "training.batch={pixels=20}",

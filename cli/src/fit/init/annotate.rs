@@ -96,7 +96,7 @@ mod tests {
             "region",
             "effects",
             "motion",
-            "truth.spot",
+            "simulation.truth.spot",
             "observation",
             "training",
             "linear",

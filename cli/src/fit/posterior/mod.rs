@@ -294,7 +294,7 @@ impl<'a> Drawing<'a> {
         let data = worlds.data(noise)?;
         let world = worlds.draw(number);
         let Placed { file, instrument, motion, .. } =
-            Placed::in_world(self.prepared, &file, (unknown, &world, number))?;
+            Placed::in_world(self.prepared, &file, (&world, number))?;
         let through =
             Through { file: &file, instrument: &instrument, motion: &motion, registry, measured };
         let drawn = sample::draw(&through, &data, keeper, told)?;

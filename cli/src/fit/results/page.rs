@@ -157,7 +157,7 @@ impl Estimate<'_> {
             truth: self.true_volume.clone(),
             unit: UNIT.to_owned(),
             // The viewer turns matter about the axis, and knows of no fall.
-            motion: (ends[1] > ends[0] && !self.file.motion.velocity.falls()).then(|| {
+            motion: (ends[1] > ends[0] && !self.file.motion.law().falls()).then(|| {
                 report::Motion {
                     axis: found.state.now.axis.vector(),
                     rates,
@@ -177,8 +177,8 @@ impl Estimate<'_> {
         let number = |key: &str| results[key].as_f64();
         let mut lines = vec![format!(
             "Emission around a black hole of spin {}, seen at {}° from its spin axis, was recovered from {} frames of {}. It is represented by {}.",
-            rounded(file.hole.spin),
-            rounded(file.observer.inclination_deg),
+            rounded(file.hole.spin.value()),
+            rounded(file.observer.inclination_deg.value()),
             self.measured.times.len(),
             data.join(", "),
             file.recovered()

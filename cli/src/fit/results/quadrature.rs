@@ -1,7 +1,6 @@
 //! What the sums along rays are off by, beside the errors of the data.
 
 use super::Estimate;
-use crate::fit::world_search;
 use kerrlight_tomo::fit::setup::Imaged;
 use kerrlight_tomo::fit::{State, Trainer};
 use serde_json::Value;
@@ -26,16 +25,7 @@ impl Estimate<'_> {
         let observed = trainer.objective.observed();
         let every = observed.len().div_ceil(FRAMES).max(1);
         let frames: Vec<usize> = observed.into_iter().skip(every / 2).step_by(every).collect();
-        let unknown = self.file.unknown_world()?;
-        let world = match (&unknown, world_search::found(self.folder)?) {
-            (Some(unknown), Some(found)) => {
-                Some((unknown, world_search::world_of(self.file, &unknown.free()?, &found)?))
-            }
-            _ => None,
-        };
-        let found = world.as_ref().map(|(unknown, world)| (*unknown, world));
-        let Self { file, motion, measured, .. } = *self;
-        let imaged = Imaged { file, measured, motion, found };
+        let imaged = Imaged { file: self.file, motion: self.motion };
         let field = state.now.field(trainer.representation);
         let Some(finer) = imaged.finer(field, &frames)? else { return Ok(None) };
         let plain = trainer.movie(&state.now, &frames, true);

@@ -91,10 +91,11 @@ impl Estimate<'_> {
     fn place(&self, frame: usize) -> anyhow::Result<String> {
         let (hole, observer) = (&self.file.hole, &self.file.observer);
         let time = self.measured.times.get(frame).context("no frame")?;
-        let mut text = format!("[hole]\nspin = {:?}\n", hole.spin);
+        let mut text = format!("[hole]\nspin = {:?}\n", hole.spin.value());
         text += &line("mass_msun", hole.mass_msun);
         text += &line("distance_kpc", hole.distance_kpc);
-        text += &format!("\n[observer]\ninclination_deg = {:?}\n", observer.inclination_deg);
+        text +=
+            &format!("\n[observer]\ninclination_deg = {:?}\n", observer.inclination_deg.value());
         text += &line("radius", observer.radius);
         Ok(format!("{text}time = {time:?}               # of frame {frame}, M\n"))
     }
@@ -131,7 +132,7 @@ impl Estimate<'_> {
 
     fn volume(&self, state: &State<f32>) -> anyhow::Result<String> {
         let (motion, region) = (&self.file.motion, &self.file.region);
-        let law = motion.velocity.clone().seeded(self.file.seed).dragged(setup::drag(self.file)?);
+        let law = motion.law().seeded(self.file.seed).dragged(setup::drag(self.file)?);
         let law = toml_file::inline(&law).context("motion.velocity")?;
         let region =
             VolumeRegion { r_min: region.r_min, r_max: region.r_max, z_width: region.z_width };

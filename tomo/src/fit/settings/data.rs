@@ -44,6 +44,12 @@ pub enum DataFiles {
         /// NPZ, NPY, CSV, FITS or EXR in Jy/pixel, a Zarr store, or a sequence: `frames/*.exr`, `f_%04d.exr`, a
         /// folder of EXR files.
         path: PathBuf,
+        /// Time of the first image, M; the others follow at equal steps.
+        #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
+        from: f64,
+        /// Time of the last image, M.
+        #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
+        to: f64,
     },
 }
 

@@ -121,13 +121,15 @@ impl FieldSettings {
         match (self.kind, self.negative) {
             (FieldKind::Gaussian, None) => {
                 let why = "a Gaussian field has negative parts; give `negative = \"lifted\"` or `\"dark\"`";
-                Err(FitError::missing("truth.field.negative", why))
+                Err(FitError::missing("simulation.truth.field.negative", why))
             }
             (FieldKind::LogNormal, Some(_)) => refuse!(
-                "truth.field.negative is not allowed with kind = \"log-normal\": such a field is positive"
+                "simulation.truth.field.negative is not allowed with kind = \"log-normal\": such a field is positive"
             ),
             (FieldKind::Gaussian, Some(_)) => Ok(()),
-            (FieldKind::LogNormal, None) => logarithms("truth.field", self.mean, self.amplitude),
+            (FieldKind::LogNormal, None) => {
+                logarithms("simulation.truth.field", self.mean, self.amplitude)
+            }
         }
     }
 

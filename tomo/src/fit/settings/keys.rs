@@ -49,7 +49,7 @@ mod tests {
 
     fn refused(assignment: &str) -> String {
         check(&apply_override(BUILT_IN, assignment).unwrap(), FitFile::keys())
-            .unwrap_err()
+            .expect_err(assignment)
             .to_string()
     }
 
@@ -65,9 +65,12 @@ mod tests {
             ("effects.redshift_power=-1e9", "effects.redshift_power = -1e9"),
             ("motion.velocity.keplerian.drag=1e300", "motion.velocity.keplerian.drag = 1e300"),
             ("motion.reference_time=inf", "motion.reference_time = inf"),
-            ("truth.spot.0.sigma=1e-300", "truth.spot.0.sigma = 1e-300"),
-            ("truth.spot.0.center=[0.0, nan, 0.0]", "truth.spot.0.center.1 = NaN"),
-            ("truth.spot.0.amplitude=-1", "truth.spot.0.amplitude = -1"),
+            ("simulation.truth.spot.0.sigma=1e-300", "simulation.truth.spot.0.sigma = 1e-300"),
+            (
+                "simulation.truth.spot.0.center=[0.0, nan, 0.0]",
+                "simulation.truth.spot.0.center.1 = NaN",
+            ),
+            ("simulation.truth.spot.0.amplitude=-1", "simulation.truth.spot.0.amplitude = -1"),
             ("loss.0.weight=1e-300", "loss.0.weight = 1e-300"),
             ("representation.length_scale=nan", "representation.length_scale = NaN"),
             (
@@ -75,7 +78,7 @@ mod tests {
                 "training.rate = -1 is not allowed: 1e-12 to 10 (a learning rate)",
             ),
             ("training.rate=0", "training.rate = 0 is not allowed: 1e-12 to 10 (a learning rate)"),
-            ("world.hole.spin=2", "world.hole.spin = 2"),
+            ("simulation.hole.spin=2", "simulation.hole.spin = 2"),
             ("output.nodes=nan", "output.nodes = NaN is not allowed: 2 to 512"),
             ("observer.radius=nan", "observer.radius = NaN is not allowed: a finite number"),
         ] {

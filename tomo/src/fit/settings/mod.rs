@@ -13,18 +13,19 @@ mod instrument;
 mod keys;
 mod light_curve;
 mod medium;
+mod merge;
 mod penalties;
 mod plain;
+mod quantity;
 mod quiescent;
 mod recovery;
+mod search;
 mod simulation;
 mod static_image;
 mod static_polarization;
 mod unknown_world;
 mod unknowns;
 mod view;
-mod world;
-mod world_search;
 
 pub use band::{BackgroundSettings, BandSettings, Steps};
 pub use change::ChangeSettings;
@@ -36,21 +37,24 @@ pub use held_out::{HeldOutBy, HeldOutSettings, Weight};
 pub use instrument::{GainPhases, GainSettings, InstrumentSettings, LeakageSettings};
 pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedBackground, SimulatedCurve};
 pub use medium::{Scattering, Variability};
+pub use merge::merge;
 pub use penalties::{PenaltyKind, PenaltySettings, ProbeSettings};
+pub use quantity::{PriorSettings, Quantity};
 pub use quiescent::QuiescentSettings;
 pub use recovery::{
     AxisScan, AxisSearch, Kind, Linear, Occupancy, Optimiser, Representation, Start, Training,
 };
-pub use simulation::{GlyphShape, Movie, Noise, Observation, Ring, Shines, Spot, Truth, Tube};
+pub use search::{WorldSearch, WorldSteps, WorldView};
+pub use simulation::{
+    GlyphShape, Movie, Noise, Observation, Ring, Shines, Simulation, Spot, Truth, Tube,
+};
 pub use static_image::{
     EnvelopeSettings, ImageSettings, RingSettings, StartImage, StaticData, StaticImageFile,
     StaticVisibilities, StrengthSettings,
 };
 pub use static_polarization::StaticPolarization;
-pub use unknown_world::{PriorSettings, UnknownWorld};
+pub use unknown_world::UnknownWorld;
 pub use view::{Absorption, Effects, Hole, Motion, Observer, PixelShape, Region, Screen, WidthOf};
-pub use world::merge;
-pub use world_search::{WorldSearch, WorldSteps, WorldView};
 
 use crate::Error;
 use kerrlight_common::toml_file;
@@ -94,26 +98,15 @@ pub struct FitFile {
     /// Stokes parameter of a light curve.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quiescent: Option<QuiescentSettings>,
-    /// Frame times of a movie of images.
+    /// Simulated data, in place of measured ones.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub movie: Option<Movie>,
-    /// The simulated emission.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub truth: Option<Truth>,
-    /// Parameters that are fitted, each with its prior; and what a simulation assumes where it differs from the
-    /// fit.
-    #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
-    #[schemars(with = "unknown_world::WorldKeys")]
-    pub world: toml::Table,
-    /// The array that observes the simulation.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub observation: Option<Observation>,
-    /// The simulated light curve of an unresolved source.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub light_curve: Option<SimulatedCurve>,
-    /// Measured data, in place of a simulation.
+    pub simulation: Option<Simulation>,
+    /// Measured data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub data: Option<DataFiles>,
+    /// The search for numbers that have a prior in place of a value.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub search: Option<WorldSearch>,
     /// Instrumental parameters that are fitted with the emission.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instrument: Option<InstrumentSettings>,
@@ -165,9 +158,18 @@ impl FitFile {
 
     /// Whether the data are visibilities, measured or simulated.
     pub fn has_visibilities(&self) -> bool {
-        let simulated = self.observation.is_some() && self.light_curve.is_none();
-        matches!(self.data, Some(DataFiles::Visibilities { .. }))
-            || (self.data.is_none() && simulated)
+        let simulated = self.observation().is_some() && self.simulated_curve().is_none();
+        matches!(self.data, Some(DataFiles::Visibilities { .. })) || simulated
+    }
+
+    /// Times of the first and the last image of a movie, M; none if data are no movie.
+    pub fn span_of_images(&self) -> Option<[f64; 2]> {
+        let simulated =
+            || self.simulation.as_ref()?.movie.as_ref().map(|movie| [movie.from, movie.to]);
+        match &self.data {
+            Some(DataFiles::Movie { from, to, .. }) => Some([*from, *to]),
+            _ => simulated(),
+        }
     }
 }
 

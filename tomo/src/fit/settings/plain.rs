@@ -2,7 +2,8 @@
 
 use super::{
     AxisSearch, DataFiles, Effects, FitFile, Hole, Kind, Linear, Loss, LossKind, Motion, Movie,
-    Observer, Occupancy, Output, Region, Representation, Screen, Start, Training, Truth, WidthOf,
+    Observer, Occupancy, Output, Quantity, Region, Representation, Screen, Simulation, Start,
+    Training, Truth, WidthOf,
 };
 use crate::fit::{BatchSize, Sampling};
 use crate::representation::{Activation, Degree};
@@ -13,19 +14,19 @@ use std::path::PathBuf;
 const FILLING: f64 = 0.02;
 
 impl Hole {
-    /// A hole of spin a (M), whose mass and distance do not matter: images in M, times in M.
-    pub fn new(spin: f64) -> Self {
-        Self { spin, mass_msun: None, distance_kpc: None }
+    /// A hole of spin a (M) or a prior of it, whose mass and distance do not matter: images in M, times in M.
+    pub fn new(spin: impl Into<Quantity>) -> Self {
+        Self { spin: spin.into(), mass_msun: None, distance_kpc: None }
     }
 
     /// Sgr A* (GRAVITY Collaboration 2019, A&A 625, L10).
-    pub fn sgr_a_star(spin: f64) -> Self {
-        Self { spin, mass_msun: Some(4.154e6), distance_kpc: Some(8.178) }
+    pub fn sgr_a_star(spin: impl Into<Quantity>) -> Self {
+        Self { spin: spin.into(), mass_msun: Some(4.154e6), distance_kpc: Some(8.178) }
     }
 
     /// M87* (Event Horizon Telescope Collaboration 2019, ApJL 875, L6).
-    pub fn m87_star(spin: f64) -> Self {
-        Self { spin, mass_msun: Some(6.5e9), distance_kpc: Some(16_800.0) }
+    pub fn m87_star(spin: impl Into<Quantity>) -> Self {
+        Self { spin: spin.into(), mass_msun: Some(6.5e9), distance_kpc: Some(16_800.0) }
     }
 }
 
@@ -41,12 +42,18 @@ impl FitFile {
     /// between two radii (M), as a representation of this kind. What is compared has yet to be said:
     /// [`simulating`](Self::simulating), [`with_images`](Self::with_images) or
     /// [`with_visibilities`](Self::with_visibilities).
-    pub fn new(hole: Hole, inclination_deg: f64, [r_min, r_max]: [f64; 2], kind: Kind) -> Self {
+    pub fn new(
+        hole: Hole,
+        inclination_deg: impl Into<Quantity>,
+        [r_min, r_max]: [f64; 2],
+        kind: Kind,
+    ) -> Self {
         let start = match kind {
             Kind::LinearGrid => Start::Drawn,
             _ => Start::Linear { nodes: 36, stride: 2, steps: 2500, iterations: Some(80) },
         };
-        let observer = Observer { inclination_deg, radius: None };
+        let inclination_deg = inclination_deg.into();
+        let observer = Observer { inclination_deg, position_angle_deg: 0.0.into(), radius: None };
         let nodes = Sampling::Gauss { order: 12, split: 1 };
         let velocity = Velocity::Keplerian { drag: None };
         Self {
@@ -75,12 +82,9 @@ impl FitFile {
             held_out: None,
             change: None,
             quiescent: None,
-            movie: None,
-            truth: None,
-            world: toml::Table::new(),
-            observation: None,
-            light_curve: None,
+            simulation: None,
             data: None,
+            search: None,
             instrument: None,
             loss: Vec::new(),
             regulariser: Vec::new(),
@@ -104,7 +108,8 @@ impl FitFile {
         sigma: f64,
     ) -> Self {
         let loss = vec![Loss { sigma: Some(sigma), ..Loss::new(LossKind::Image) }];
-        Self { truth: Some(truth), movie: Some(Movie { frames, from, to }), loss, ..self }
+        let simulation = Some(Simulation::movie(truth, Movie { frames, from, to }));
+        Self { simulation, data: None, loss, ..self }
     }
 
     /// The same, compared with images at times from `from` to `to` (M), whose pixels have errors of `sigma` (Jy). The
@@ -113,19 +118,20 @@ impl FitFile {
     pub fn with_images(
         mut self,
         pixels: usize,
-        (frames, from, to): (usize, f64, f64),
+        [from, to]: [f64; 2],
         (flux_jy, sigma): (f64, f64),
     ) -> Self {
         self.screen.pixels = pixels;
-        self.movie = Some(Movie { frames, from, to });
         self.loss = vec![Loss { sigma: Some(sigma), ..Loss::new(LossKind::Image) }];
-        self.data = Some(DataFiles::Movie { path: PathBuf::new() });
+        self.simulation = None;
+        self.data = Some(DataFiles::Movie { path: PathBuf::new(), from, to });
         self.scaled_to(flux_jy)
     }
 
     /// The same, compared with complex visibilities, averaged over `average_s`, of a source of about `flux_jy`.
     #[must_use]
     pub fn with_visibilities(mut self, average_s: f64, flux_jy: f64) -> Self {
+        self.simulation = None;
         self.data = Some(DataFiles::Visibilities {
             path: PathBuf::new(),
             average_s,

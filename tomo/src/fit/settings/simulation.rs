@@ -1,11 +1,147 @@
 //! What is simulated, and the array that sees it.
 
-use super::FieldSettings;
+use super::{
+    Effects, FieldSettings, FitError, FitFile, Hole, Motion, Observer, Region, SimulatedCurve,
+    Within, merge,
+};
+use crate::Error;
+use kerrlight_common::toml_file;
+use kerrlight_render::polarization::PolarizationLaw;
 use kerrlight_vlbi::noise::GainErrors;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
 
-/// Frames of a movie.
+/// Data that are simulated in place of measured ones. All that is not given here is as the fit assumes it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Simulation {
+    /// The simulated emission.
+    pub truth: Truth,
+    /// Times of images.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub movie: Option<Movie>,
+    /// The array that observes it, at times of its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observation: Option<Observation>,
+    /// The light curve that is observed of it, at times of its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light_curve: Option<SimulatedCurve>,
+    /// Draws numbers that have a prior from it, with the seed of the fit, for calibration. With `screen.ring_rays`, along
+    /// 16 times as many rays near the critical curve.
+    #[serde(default)]
+    pub drawn: bool,
+    /// Settings of the hole that differ from the fit's.
+    #[serde(default, skip_serializing_if = "Table::is_empty")]
+    #[schemars(with = "Option<Hole>")]
+    pub hole: Table,
+    /// Settings of the observer that differ from the fit's.
+    #[serde(default, skip_serializing_if = "Table::is_empty")]
+    #[schemars(with = "Option<Observer>")]
+    pub observer: Table,
+    /// Settings of the region that differ from the fit's.
+    #[serde(default, skip_serializing_if = "Table::is_empty")]
+    #[schemars(with = "Option<Region>")]
+    pub region: Table,
+    /// Effects that differ from the fit's.
+    #[serde(default, skip_serializing_if = "Table::is_empty")]
+    #[schemars(with = "Option<Effects>")]
+    pub effects: Table,
+    /// Settings of the motion that differ from the fit's.
+    #[serde(default, skip_serializing_if = "Table::is_empty")]
+    #[schemars(with = "Option<Motion>")]
+    pub motion: Table,
+    /// Settings of the field and its light that differ from the fit's.
+    #[serde(default, skip_serializing_if = "Table::is_empty")]
+    #[schemars(with = "Option<PolarizationLaw>")]
+    pub polarization: Table,
+}
+
+impl Simulation {
+    /// Images of emission, in the geometry that the fit assumes.
+    pub fn movie(truth: Truth, movie: Movie) -> Self {
+        let [hole, observer, region, effects, motion, polarization] =
+            core::array::from_fn(|_| Table::new());
+        let (movie, observation, light_curve) = (Some(movie), None, None);
+        Self {
+            truth,
+            movie,
+            observation,
+            light_curve,
+            drawn: false,
+            hole,
+            observer,
+            region,
+            effects,
+            motion,
+            polarization,
+        }
+    }
+
+    /// Tables that take the place of those of the fit.
+    fn changes(&mut self) -> Table {
+        let Self { hole, observer, region, effects, motion, polarization, .. } = self;
+        let all = [
+            ("hole", hole),
+            ("observer", observer),
+            ("region", region),
+            ("effects", effects),
+            ("motion", motion),
+            ("polarization", polarization),
+        ];
+        let given = all.into_iter().filter(|(_, table)| !table.is_empty());
+        given.map(|(key, table)| (key.to_owned(), Value::Table(core::mem::take(table)))).collect()
+    }
+}
+
+impl FitFile {
+    /// The simulated emission, if data are simulated.
+    pub fn truth(&self) -> Option<&Truth> {
+        self.simulation.as_ref().map(|simulation| &simulation.truth)
+    }
+
+    /// The array that observes the simulation, if there is one.
+    pub fn observation(&self) -> Option<&Observation> {
+        self.simulation.as_ref()?.observation.as_ref()
+    }
+
+    /// The simulated light curve, if there is one.
+    pub fn simulated_curve(&self) -> Option<&SimulatedCurve> {
+        self.simulation.as_ref()?.light_curve.as_ref()
+    }
+
+    /// The settings that data are simulated with: those of the fit with the changes of `simulation`.
+    ///
+    /// # Errors
+    /// If a change is no setting or out of range, or a number that has a prior is not given.
+    pub fn simulated(&self) -> Result<Self, Error> {
+        let mut file = self.clone();
+        let Some(simulation) = &mut file.simulation else { return Ok(file) };
+        let (changes, drawn) = (simulation.changes(), simulation.drawn);
+        let mut file: Self = if changes.is_empty() {
+            file
+        } else {
+            let mut table = toml_file::table_of(&file).within("settings")?;
+            merge(&mut table, &changes);
+            toml_file::read_table(&table).within("simulation")?
+        };
+        file.search = None;
+        if drawn {
+            file.draw()?;
+        }
+        match file.first_prior() {
+            None => Ok(file),
+            Some(key) => {
+                let why = format!(
+                    "{key} has a prior; say what is simulated, or draw it with `drawn = true` in [simulation]"
+                );
+                Err(FitError::missing(&format!("simulation.{key}"), why).into())
+            }
+        }
+    }
+}
+
+/// Frames of a simulated movie.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Movie {
@@ -238,4 +374,54 @@ pub enum Noise {
     None,
     /// Thermal.
     Thermal,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn built_in() -> FitFile {
+        toml_file::read(include_str!("../../../../cli/src/fit/built_in.toml")).unwrap()
+    }
+
+    fn with(changes: &str) -> FitFile {
+        let mut file = built_in();
+        let table = toml_file::table_of(&file).unwrap();
+        let mut table = Table::from_iter(table);
+        merge(&mut table, &changes.parse().unwrap());
+        file = toml_file::read_table(&table).unwrap();
+        file
+    }
+
+    #[test]
+    fn exact_a_simulation_differs_where_it_says_so() {
+        let file = built_in();
+        assert_eq!(file.simulated().unwrap(), file);
+        let file = with("[simulation.hole]\nspin = 0.9\n[simulation.effects]\nslow_light = false");
+        let simulated = file.simulated().unwrap();
+        assert_eq!(simulated.hole.spin.value(), 0.9);
+        assert_eq!(simulated.hole.mass_msun, file.hole.mass_msun);
+        assert!(!simulated.effects.slow_light && simulated.effects.redshift_power == Some(2.0));
+        let file = with("[simulation.hole]\nspn = 0.9\n");
+        let error = format!("{:#}", file.simulated().unwrap_err());
+        assert!(error.contains("unknown field `spn`"), "{error}");
+    }
+
+    #[test]
+    fn exact_what_has_a_prior_is_simulated_with_a_value() {
+        let prior = "hole.spin = { uniform = [0.5, 0.6] }\n";
+        let error = format!("{:#}", with(prior).simulated().unwrap_err());
+        assert!(
+            error.contains("simulation.hole.spin is missing: hole.spin has a prior"),
+            "{error}"
+        );
+        let given = with(&format!("{prior}simulation.hole.spin = 0.1"));
+        assert_eq!(given.simulated().unwrap().hole.spin.value(), 0.1);
+        let drawn = with(&format!("{prior}simulation.drawn = true"));
+        let spin = drawn.simulated().unwrap().hole.spin;
+        assert!(spin.prior().is_none() && (0.5..0.6).contains(&spin.value()), "{spin:?}");
+        assert_eq!(drawn.simulated().unwrap(), drawn.simulated().unwrap());
+        let other = FitFile { seed: 2, ..drawn };
+        assert_ne!(other.simulated().unwrap().hole.spin, spin);
+    }
 }

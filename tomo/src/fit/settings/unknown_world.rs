@@ -1,195 +1,54 @@
-//! What of the world is not known.
+//! Parameters of the geometry that are not known.
 
-use super::world::SIMULATED;
-use super::{
-    Effects, FitError, FitFile, Hole, LossKind, Motion, Observer, Region, Within, WorldSearch,
-};
+use super::{FitError, FitFile, LossKind, PriorSettings, Quantity, Within, WorldSearch};
 use crate::Error;
-use crate::fit::world::{Free, KNOTS, Parameter, Prior, Scanned};
-use kerrlight_common::toml_file;
-use kerrlight_render::dynamics::Velocity;
-use kerrlight_render::polarization::PolarizationLaw;
+use crate::fit::world::{Free, Parameter, Prior, Scanned};
+use kerrlight_render::dynamics::{Perturbed, Velocity};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-use toml::Table;
 
-/// Parameters of the world that are not known, each with its prior.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+/// Parameters of the geometry that have a prior in place of a value, and the search for them.
+#[derive(Debug, Clone, PartialEq)]
 pub struct UnknownWorld {
-    /// Prior of the spin, −0.999 to 0.999.
-    pub spin: Option<PriorSettings>,
-    /// Prior of the inclination, 0 to 180 degrees.
-    pub inclination_deg: Option<PriorSettings>,
-    /// Prior of the position angle of the spin, degrees east of north, −360 to 360.
-    pub position_angle_deg: Option<PriorSettings>,
-    /// Prior of the position of the hole on the screen, to the right (west), −1000 to 1000 M.
-    pub offset_x: Option<PriorSettings>,
-    /// The same upwards (north).
-    pub offset_y: Option<PriorSettings>,
-    /// Prior of the mass over `hole.mass_msun`, 0.001 to 1000: unit of time, and angular size.
-    pub mass_factor: Option<PriorSettings>,
-    /// Prior of the angular velocity over `motion.velocity`, −10 to 10.
-    pub rotation_factor: Option<PriorSettings>,
-    /// Prior of the power of g, −10 to 10; needs `effects.redshift_power`.
-    pub redshift_power: Option<PriorSettings>,
-    /// Prior of ξ of `motion.velocity = { infall = … }`, 0 to 1.
-    pub xi: Option<PriorSettings>,
-    /// Prior of its β_r, 0 to 1.
-    pub beta_r: Option<PriorSettings>,
-    /// Prior of its β_φ, 0 to 1.
-    pub beta_phi: Option<PriorSettings>,
-    /// Prior of Ω at each of the radii (6 at most) of `motion.velocity = { profile = … }` over that of the file,
-    /// 0.001 to 1000.
-    pub angular_factors: Option<PriorSettings>,
-    /// The same of dr/dt.
-    pub radial_factors: Option<PriorSettings>,
-    /// How many knots there are.
-    #[serde(skip)]
-    pub knots: usize,
-    /// Simulates a geometry drawn from the priors by the seed, for calibration: not mass and rotation factor. With
-    /// `screen.ring_rays`, along 16 times as many rays near the critical curve.
-    #[serde(default)]
-    pub drawn: bool,
-    /// How the parameters are searched for.
-    #[serde(default)]
+    priors: Vec<(Parameter, PriorSettings)>,
+    /// How they are searched for.
     pub search: WorldSearch,
-}
-
-/// All that a table `world` may hold.
-#[derive(JsonSchema)]
-#[expect(dead_code, reason = "its schema is all that is needed of it")]
-pub(super) struct WorldKeys {
-    hole: Option<Hole>,
-    observer: Option<Observer>,
-    region: Option<Region>,
-    effects: Option<Effects>,
-    motion: Option<Motion>,
-    polarization: Option<PolarizationLaw>,
-    #[schemars(flatten)]
-    unknown: UnknownWorld,
-}
-
-/// A prior, in the unit of its parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum PriorSettings {
-    /// The same everywhere from the first to the second value.
-    Uniform([f64; 2]),
-    /// A bell curve.
-    Normal {
-        /// The mean.
-        mean: f64,
-        /// Standard deviation, above 0. A small one holds a parameter that is known.
-        sigma: f64,
-    },
-    /// A bell curve of the logarithm.
-    LogNormal {
-        /// The median, above 0.
-        median: f64,
-        /// Standard deviation of the logarithm, above 0.
-        sigma: f64,
-    },
-    /// Of an inclination: any direction in space between two angles.
-    Isotropic([f64; 2]),
-    /// The same everywhere from the first to the last value, and looked at on a grid.
-    Scanned {
-        /// First value.
-        from: f64,
-        /// Last value.
-        to: f64,
-        /// Values of the grid, 2 to 1000.
-        points: usize,
-    },
-}
-
-impl PriorSettings {
-    /// In the unit of [`World`](crate::fit::world::World).
-    fn prior(self, unit: f64) -> Prior {
-        match self {
-            Self::Uniform([low, high]) => Prior::Uniform { low: low * unit, high: high * unit },
-            Self::Isotropic([low, high]) => Prior::Isotropic { low: low * unit, high: high * unit },
-            Self::Normal { mean, sigma } => {
-                Prior::Normal { mean: mean * unit, sigma: sigma * unit }
-            }
-            Self::LogNormal { median, sigma } => Prior::LogNormal { median: median * unit, sigma },
-            Self::Scanned { from, to, .. } => Prior::Uniform { low: from * unit, high: to * unit },
-        }
-    }
 }
 
 /// Parameters of a grid, at most: with more there is no picture of it.
 const MOST_SCANNED: usize = 3;
-/// Worlds of a grid, at most.
+/// Trials of a grid, at most.
 const MOST_POINTS: usize = 100_000;
 
 impl UnknownWorld {
-    fn has(&self, knot: u8) -> bool {
-        usize::from(knot) < self.knots
-    }
-
-    fn prior(&self, parameter: Parameter) -> Option<PriorSettings> {
-        match parameter {
-            Parameter::Spin => self.spin,
-            Parameter::Inclination => self.inclination_deg,
-            Parameter::PositionAngle => self.position_angle_deg,
-            Parameter::OffsetX => self.offset_x,
-            Parameter::OffsetY => self.offset_y,
-            Parameter::Mass => self.mass_factor,
-            Parameter::Rotation => self.rotation_factor,
-            Parameter::RedshiftPower => self.redshift_power,
-            Parameter::Xi => self.xi,
-            Parameter::BetaR => self.beta_r,
-            Parameter::BetaPhi => self.beta_phi,
-            Parameter::Angular(knot) => self.angular_factors.filter(|_| self.has(knot)),
-            Parameter::Radial(knot) => self.radial_factors.filter(|_| self.has(knot)),
-        }
-    }
-
     /// The free parameters.
     ///
     /// # Errors
-    /// If there is none, or a prior is no density on possible values.
+    /// If a prior is no density on possible values.
     pub fn free(&self) -> Result<Vec<Free>, Error> {
-        let given = Parameter::ALL.into_iter().filter_map(|p| Some((p, self.prior(p)?)));
-        let free: Vec<Free> = given.map(|(p, prior)| free(p, prior)).collect::<Result<_, _>>()?;
-        if free.is_empty() {
-            let names = parameter_keys().join(", ");
-            let why = format!(
-                "world.search looks for parameters with a prior, and there is none; give one of {names}"
-            );
-            return Err(FitError::Conflict(why).into());
-        }
-        Ok(free)
+        self.priors.iter().map(|(parameter, prior)| free(*parameter, *prior)).collect()
     }
 
     /// The grid over the parameters that are scanned, empty without any.
     pub fn scanned(&self) -> Vec<Scanned> {
-        let of = |parameter: Parameter| match self.prior(parameter)? {
+        let of = |(parameter, prior): &(Parameter, PriorSettings)| match *prior {
             PriorSettings::Scanned { from, to, points } => {
-                Some(Scanned::even(parameter, [from, to].map(|x| x * parameter.unit()), points))
+                let ends = [from, to].map(|x| x * parameter.unit());
+                Some(Scanned::even(*parameter, ends, points))
             }
             _ => None,
         };
-        Parameter::ALL.into_iter().filter_map(of).collect()
+        self.priors.iter().filter_map(of).collect()
     }
 
     fn check_scan(&self) -> Result<(), Error> {
         let scanned = self.scanned();
-        for Scanned { parameter, values } in &scanned {
-            if !(2..=1000).contains(&values.len()) {
-                let key = format!("world.{}.scanned.points", parameter.name());
-                return Err(FitError::range(key, values.len(), "2 to 1000").into());
-            }
-        }
         let worlds = scanned.iter().map(|scanned| scanned.values.len()).product::<usize>();
         if scanned.len() > MOST_SCANNED || worlds > MOST_POINTS {
-            let names: Vec<_> = scanned.iter().map(|scanned| scanned.parameter.name()).collect();
+            let names: Vec<_> = scanned.iter().map(|scanned| key(scanned.parameter)).collect();
             let why = format!(
-                "a scan of {} parameters ({}) and {worlds} worlds is not allowed: at most {MOST_SCANNED} parameters and \
-                 {MOST_POINTS} worlds",
+                "a scan of {} parameters ({}) and {worlds} points is not allowed: at most {MOST_SCANNED} parameters and \
+                 {MOST_POINTS} points",
                 scanned.len(),
                 names.join(", ")
             );
@@ -197,71 +56,22 @@ impl UnknownWorld {
         }
         Ok(())
     }
-
-    /// Values drawn from the priors with the seed of a fit, in the units of [`World`](crate::fit::world::World).
-    fn drawn_values(&self, seed: u64) -> Result<Vec<(Parameter, f64)>, Error> {
-        let mut random = Pcg64::seed_from_u64(seed ^ DRAWN);
-        let mut drawn = |free: &Free| (free.parameter, free.prior.quantile(random.random()));
-        Ok(self.free()?.iter().map(&mut drawn).collect())
-    }
-
-    /// What is drawn of the view, and is no setting: orientation on the sky and offsets, in the same units. None if nothing
-    /// is drawn.
-    pub(in crate::fit) fn drawn_view(&self, seed: u64) -> Result<Vec<(Parameter, f64)>, Error> {
-        let of_view = [Parameter::PositionAngle, Parameter::OffsetX, Parameter::OffsetY];
-        let mut all = if self.drawn { self.drawn_values(seed)? } else { Vec::new() };
-        all.retain(|(parameter, _)| of_view.contains(parameter));
-        Ok(all)
-    }
-
-    /// Puts values drawn from the priors into settings; mass and rotation factor are no settings and stay what they are.
-    pub(super) fn draw(&self, file: &mut FitFile) -> Result<(), Error> {
-        for (parameter, value) in self.drawn_values(file.seed)? {
-            let value = value / parameter.unit();
-            match (parameter, &mut file.motion.velocity) {
-                (Parameter::Spin, _) => file.hole.spin = value,
-                (Parameter::Inclination, _) => file.observer.inclination_deg = value,
-                (Parameter::RedshiftPower, _) => file.effects.redshift_power = Some(value),
-                (Parameter::Xi, Velocity::Infall { xi, .. }) => *xi = value,
-                (Parameter::BetaR, Velocity::Infall { beta_r, .. }) => *beta_r = value,
-                (Parameter::BetaPhi, Velocity::Infall { beta_phi, .. }) => *beta_phi = value,
-                (Parameter::Angular(knot), Velocity::Profile { angular, .. }) => {
-                    angular[usize::from(knot)] *= value;
-                }
-                (Parameter::Radial(knot), Velocity::Profile { radial, .. }) => {
-                    radial[usize::from(knot)] *= value;
-                }
-                _ => {}
-            }
-        }
-        if let (true, Velocity::Keplerian { drag }) =
-            (self.search.drag_is_spin, &mut file.motion.velocity)
-        {
-            *drag = None;
-        }
-        Ok(())
-    }
-
-    fn check(&self) -> Result<(), Error> {
-        self.free()?;
-        self.check_scan()
-    }
 }
 
 /// Why finer steps are refused.
-const NO_STEPS: &str = "world.search.finest is what the last steps look at, and no steps are taken here: they need \
+const NO_STEPS: &str = "search.finest is what the last steps look at, and no steps are taken here: they need \
                         screen.ring_rays or images, data in which the volume is a convex problem, and emission that \
                         does not change";
 
-/// Sets draws of the world apart from those of the noise.
+/// Sets draws of the geometry apart from those of the noise.
 const DRAWN: u64 = 0x77a1_d5ee_d000_0001;
 
 fn free(parameter: Parameter, settings: PriorSettings) -> Result<Free, Error> {
-    let name = parameter.name();
-    let prior = settings.prior(parameter.unit()).checked().within(format!("world.{name}"))?;
+    let key = key(parameter);
+    let prior = settings.prior(parameter.unit()).checked().within(key)?;
     if matches!(prior, Prior::Isotropic { .. }) && parameter != Parameter::Inclination {
         let why = format!(
-            "world.{name}: isotropic is a prior of inclinations; take uniform, normal or log-normal"
+            "{key}: isotropic is a prior of inclinations; take uniform, normal or log-normal"
         );
         return Err(FitError::Conflict(why).into());
     }
@@ -271,67 +81,84 @@ fn free(parameter: Parameter, settings: PriorSettings) -> Result<Free, Error> {
         .find(|x| x.is_finite() && !(low - 1e-9..=high + 1e-9).contains(x));
     if let Some(bad) = outside.filter(|_| !matches!(prior, Prior::LogNormal { .. })) {
         let allowed = format!("{} to {}", low / unit, high / unit);
-        return Err(FitError::range(format!("world.{name}"), bad / unit, &allowed).into());
+        return Err(FitError::range(key, bad / unit, &allowed).into());
     }
     Ok(Free { parameter, prior })
 }
 
-/// What settings call the parameters: those of all knots together have one prior.
-fn parameter_keys() -> Vec<&'static str> {
-    let single = Parameter::ALL.into_iter().filter(|parameter| !parameter.is_of_knots());
-    single.map(Parameter::name).chain(["angular_factors", "radial_factors"]).collect()
-}
-
-/// Refuses keys that are neither simulated nor parameters.
-fn check_keys(world: &Table) -> Result<(), Error> {
-    let names = parameter_keys();
-    let known = || SIMULATED.iter().chain(&names).chain(&["search", "drawn"]);
-    let Some(key) = world.keys().find(|key| !known().any(|name| name == key)) else {
-        return Ok(());
-    };
-    let list: Vec<String> = known().map(|name| format!("`{name}`")).collect();
-    let why = format!("world: unknown field `{key}`, expected one of {}", list.join(", "));
-    Err(FitError::Conflict(why).into())
-}
-
 impl FitFile {
-    /// What of the world is not known; none if all is.
+    /// Parameters of the geometry that are not known; none if all are.
     ///
     /// # Errors
-    /// If a key of `world` is unknown, or a number out of range.
+    /// If a prior is out of range, or settings of the search contradict the data.
     pub fn unknown_world(&self) -> Result<Option<UnknownWorld>, Error> {
-        check_keys(&self.world)?;
-        let keys = self.world.iter().filter(|(key, _)| !SIMULATED.contains(&key.as_str()));
-        let table: Table = keys.map(|(key, value)| (key.clone(), value.clone())).collect();
-        if table.is_empty() {
-            return Ok(None);
-        }
-        let mut world: UnknownWorld = toml_file::read_table(&table).within("world")?;
-        world.knots = self.knots_of(&world)?;
-        world.check()?;
-        let is_free = |parameter: &Parameter| world.prior(*parameter).is_some();
-        let flow = Parameter::FLOW.into_iter().find(is_free);
-        if let (Some(parameter), false) =
-            (flow, matches!(self.motion.velocity, Velocity::Infall { .. }))
+        let priors: Vec<_> = self
+            .quantities()
+            .into_iter()
+            .filter_map(|(parameter, quantity)| Some((parameter, quantity.prior()?)))
+            .collect();
+        if let Velocity::Perturbed(Perturbed { of, .. }) = &self.motion.velocity
+            && flow(of).into_iter().flatten().any(|quantity| quantity.prior().is_some())
         {
-            let why = format!(
-                "world.{} is a parameter of `velocity = {{ infall = {{ xi, beta_r, beta_phi }} }}` in [motion], which \
-                 is another law here",
-                parameter.name()
-            );
-            return Err(FitError::Conflict(why).into());
+            let why =
+                "motion.velocity.perturbed.of: a prior is not allowed in a law that is perturbed";
+            return Err(FitError::Conflict(why.to_owned()).into());
         }
-        if is_free(&Parameter::RedshiftPower) && self.effects.redshift_power.is_none() {
-            let why = "world.redshift_power: no data depend on it without effects.redshift_power, which lets emission \
-                       shift"
-                .to_owned();
-            return Err(FitError::Conflict(why).into());
+        let given = self.search.clone();
+        if priors.is_empty() {
+            return match given {
+                None => Ok(None),
+                Some(_) => Err(FitError::Conflict(NOTHING.to_owned()).into()),
+            };
         }
-        if world.search.finest.is_some() && !self.is_stepped() {
+        let unknown = UnknownWorld { priors, search: given.unwrap_or_default() };
+        unknown.free()?;
+        unknown.check_scan()?;
+        if unknown.search.finest.is_some() && !self.is_stepped() {
             return Err(FitError::Conflict(NO_STEPS.to_owned()).into());
         }
-        self.check_drag(&world)?;
-        Ok(Some(world))
+        Ok(Some(unknown))
+    }
+
+    /// Numbers of the geometry that may have a prior.
+    fn quantities(&self) -> Vec<(Parameter, Quantity)> {
+        let view = [
+            (Parameter::Spin, self.hole.spin),
+            (Parameter::Inclination, self.observer.inclination_deg),
+            (Parameter::PositionAngle, self.observer.position_angle_deg),
+        ];
+        let flow = flow(&self.motion.velocity).into_iter().flatten().copied();
+        view.into_iter().chain(Parameter::FLOW.into_iter().zip(flow)).collect()
+    }
+
+    /// The same, to be changed.
+    pub(crate) fn quantities_mut(&mut self) -> Vec<(Parameter, &mut Quantity)> {
+        let mut all = vec![
+            (Parameter::Spin, &mut self.hole.spin),
+            (Parameter::Inclination, &mut self.observer.inclination_deg),
+            (Parameter::PositionAngle, &mut self.observer.position_angle_deg),
+        ];
+        if let Velocity::Infall { xi, beta_r, beta_phi, .. } = &mut self.motion.velocity {
+            all.extend(Parameter::FLOW.into_iter().zip([xi, beta_r, beta_phi]));
+        }
+        all
+    }
+
+    /// Puts values drawn from the priors in their places, with the seed of the fit.
+    pub(super) fn draw(&mut self) -> Result<(), Error> {
+        let mut random = Pcg64::seed_from_u64(self.seed ^ DRAWN);
+        for (parameter, quantity) in self.quantities_mut() {
+            let Some(prior) = quantity.prior() else { continue };
+            let drawn = free(parameter, prior)?.prior.quantile(random.random());
+            *quantity = Quantity::Value(drawn / parameter.unit());
+        }
+        Ok(())
+    }
+
+    /// The key of the first number that has a prior.
+    pub(super) fn first_prior(&self) -> Option<&'static str> {
+        let mut all = self.quantities().into_iter();
+        all.find(|(_, quantity)| quantity.prior().is_some()).map(|(parameter, _)| key(parameter))
     }
 
     /// Whether steps along differences of images follow a search.
@@ -340,42 +167,30 @@ impl FitFile {
             || self.loss.iter().all(|loss| loss.data == LossKind::Image);
         are_smooth && self.is_convex() && self.change.is_none()
     }
+}
 
-    /// Knots of the profile that the factors of a world are those of.
-    fn knots_of(&self, world: &UnknownWorld) -> Result<usize, Error> {
-        let (turns, falls) = (world.angular_factors.is_some(), world.radial_factors.is_some());
-        let key = if turns { "angular_factors" } else { "radial_factors" };
-        let velocity = &self.motion.velocity;
-        let why = match velocity {
-            _ if !turns && !falls => return Ok(0),
-            Velocity::Profile { radii, .. } if radii.len() > KNOTS => {
-                let allowed = format!("{KNOTS} at most beside world.{key}");
-                let key = "length of motion.velocity.profile.radii";
-                return Err(FitError::range(key, radii.len(), &allowed).into());
-            }
-            Velocity::Profile { .. } if falls && !velocity.falls() => {
-                "world.radial_factors: motion.velocity.profile.radial is 0 everywhere, times any factor".to_owned()
-            }
-            Velocity::Profile { radii, .. } => return Ok(radii.len()),
-            _ => format!(
-                "world.{key} is for `velocity = {{ profile = {{ radii, angular, radial }} }}` in [motion], which is \
-                 another law here"
-            ),
-        };
-        Err(FitError::Conflict(why).into())
-    }
-
-    /// Where the flow follows the hole, it does so in the file as well: a simulation would have another flow otherwise.
-    fn check_drag(&self, world: &UnknownWorld) -> Result<(), Error> {
-        let Velocity::Keplerian { drag: Some(drag) } = self.motion.velocity else { return Ok(()) };
-        let spin = self.hole.spin * self.motion.axis.map_or(1.0, |[.., z]| z);
-        if !world.search.drag_is_spin || drag == spin {
-            return Ok(());
-        }
-        let why = format!(
-            "motion.velocity.keplerian.drag = {drag} and world.search.drag_is_spin exclude each other where the spin \
-             along the axis is {spin}: leave the drag out, `velocity = {{ keplerian = {{}} }}`"
-        );
-        Err(FitError::Conflict(why).into())
+/// ξ, β_r and β_φ of a law that has them.
+fn flow(law: &Velocity<Quantity>) -> Option<[&Quantity; 3]> {
+    match law {
+        Velocity::Infall { xi, beta_r, beta_phi, .. } => Some([xi, beta_r, beta_phi]),
+        _ => None,
     }
 }
+
+/// What settings call a parameter.
+pub(super) fn key(parameter: Parameter) -> &'static str {
+    match parameter {
+        Parameter::Spin => "hole.spin",
+        Parameter::Inclination => "observer.inclination_deg",
+        Parameter::PositionAngle => "observer.position_angle_deg",
+        Parameter::Xi => "motion.velocity.infall.xi",
+        Parameter::BetaR => "motion.velocity.infall.beta_r",
+        Parameter::BetaPhi => "motion.velocity.infall.beta_phi",
+        _ => parameter.name(),
+    }
+}
+
+/// Why a search without anything to look for is refused.
+const NOTHING: &str = "search looks for parameters that have a prior in place of a value, such as \
+     `spin = { uniform = [-0.9, 0.9] }` in [hole], and there is none; hole.spin, observer.inclination_deg, \
+     observer.position_angle_deg and xi, beta_r and beta_phi of motion.velocity.infall may have one";

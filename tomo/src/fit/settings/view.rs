@@ -1,5 +1,6 @@
 //! The hole, the view of it, what happens to light, and how matter turns.
 
+use super::Quantity;
 use crate::fit::{Region as Limits, Sampling};
 use kerrlight_render::dynamics::Velocity;
 use kerrlight_vlbi::operator::Pulse;
@@ -10,9 +11,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hole {
-    /// Spin a along +z.
-    #[schemars(range(min = -1.0, max = 1.0), extend("unit" = "a/M"))]
-    pub spin: f64,
+    /// Spin a along +z: a value or a prior.
+    #[schemars(extend("minimum" = -1.0, "maximum" = 1.0, "unit" = "a/M"))]
+    pub spin: Quantity,
     /// Mass, solar masses; needed for hours and microarcseconds.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-20, max = 1e15), extend("unit" = "solar masses"))]
@@ -29,13 +30,25 @@ pub struct Hole {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Observer {
-    /// Angle between +z and the line of sight, degrees.
-    #[schemars(range(min = 0.0, max = 180.0), extend("unit" = "degrees"))]
-    pub inclination_deg: f64,
+    /// Angle between +z and the line of sight: a value or a prior.
+    #[schemars(extend("minimum" = 0.0, "maximum" = 180.0, "unit" = "degrees"))]
+    pub inclination_deg: Quantity,
+    /// Position angle of +z on the sky: a value or a prior. At 0 it points north.
+    #[serde(default = "north", skip_serializing_if = "is_north")]
+    #[schemars(extend("minimum" = -360.0, "maximum" = 360.0, "unit" = "degrees east of north"))]
+    pub position_angle_deg: Quantity,
     /// Boyer–Lindquist radius of the observer, above 2 M; infinity without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = 1000.0)]
     pub radius: Option<f64>,
+}
+
+fn north() -> Quantity {
+    Quantity::Value(0.0)
+}
+
+fn is_north(angle: &Quantity) -> bool {
+    angle.is(&0.0)
 }
 
 /// Pixels of the model.
@@ -169,8 +182,8 @@ pub struct Absorption {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Motion {
-    /// Law of motion; positive Ω is right-handed about the axis.
-    pub velocity: Velocity,
+    /// Law of motion; positive Ω is right-handed about the axis. Numbers of `infall` are values or priors.
+    pub velocity: Velocity<Quantity>,
     /// Rotation axis, a vector of any length; needed with `[axis.known]` and for simulations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<[f64; 3]>,
@@ -183,4 +196,11 @@ pub struct Motion {
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     #[schemars(example = 0.0)]
     pub injection_time: Option<f64>,
+}
+
+impl Motion {
+    /// The law of motion; of what is not known, with the median of its prior.
+    pub fn law(&self) -> Velocity {
+        self.velocity.clone().map(&|quantity: Quantity| quantity.value())
+    }
 }

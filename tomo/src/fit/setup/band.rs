@@ -283,7 +283,7 @@ fn weighed(
 /// The settings of a world.
 pub fn in_band_world(file: &FitFile, inclination_deg: f64) -> FitFile {
     let mut file = file.clone();
-    file.observer.inclination_deg = inclination_deg;
+    file.observer.inclination_deg = inclination_deg.into();
     file
 }
 

@@ -25,20 +25,15 @@ impl Measured {
     /// # Errors
     /// Says what to write.
     pub fn check_origin(file: &FitFile) -> Result<()> {
-        match (&file.data, &file.truth) {
+        match (&file.data, &file.simulation) {
             (Some(_), Some(_)) => {
-                refuse!("truth and data exclude each other: give one of them")
+                refuse!("simulation and data exclude each other: give one of them")
             }
-            (None, None) => refuse!(
-                "there is neither truth (to simulate) nor data (to read): {SPOT}; or {FILE}"
-            ),
-            (Some(_), None) if file.is_simulated_elsewhere() => {
-                refuse!(
-                    "world.hole, observer, region, effects and motion need simulated data: add a truth"
-                )
+            (None, None) => {
+                refuse!("there is neither a simulation nor data (to read): {SPOT}; or {FILE}")
             }
             _ if file.instrument.is_some() && !file.has_visibilities() => refuse!(
-                "instrument needs visibilities: [data.visibilities], or an [observation] of the truth"
+                "instrument needs visibilities: [data.visibilities] or [simulation.observation]"
             ),
             _ => Ok(()),
         }
@@ -47,19 +42,15 @@ impl Measured {
     /// Takes images of this width and height as the data. `name` is what the movie is called in messages.
     ///
     /// # Errors
-    /// If it has other frames or pixels than the settings.
+    /// If it has other pixels than the settings, or its times are not those of images.
     pub fn of_movie(
         file: &FitFile,
         (movie, [width, height]): (Frames<f64>, [usize; 2]),
         name: &str,
     ) -> Result<Self> {
-        let (times, n) = (frames(file)?, file.screen.pixels);
-        if [width, height] != [n, n] || movie.count() != times.len() {
-            refuse!(
-                "{name} has {} frames of {width} x {height} pixels, but movie.frames and screen.pixels say {} of {n} x {n}",
-                movie.count(),
-                times.len()
-            );
+        let (times, n) = (times_of_images(file, movie.count())?, file.screen.pixels);
+        if [width, height] != [n, n] {
+            refuse!("{name} has {width} x {height} pixels, but screen.pixels says {n} x {n}");
         }
         let (movie, sky) = (Some(movie), sky(file).ok());
         Ok(Measured { times, movie, sky, ..Measured::empty() })
@@ -201,23 +192,19 @@ fn check_folds(table: &str, strength: Option<&StrengthSettings>, frames: usize) 
     Err(FitError::range(key, strength.folds, &allowed).into())
 }
 
-pub(super) fn frames(file: &FitFile) -> Result<Vec<f64>> {
-    let missing = || {
-        FitError::missing(
-            "movie",
-            "frames of images need times; add a table [movie] with `frames = …`, their number, and `from = …` and \
-             `to = …`, the times of the first and the last in M",
-        )
+/// Times of images that are read, M.
+fn times_of_images(file: &FitFile, frames: usize) -> Result<Vec<f64>> {
+    let Some(DataFiles::Movie { from, to, .. }) = file.data else {
+        refuse!("images are read, and there is no [data.movie]")
     };
-    let movie = file.movie.as_ref().ok_or_else(missing)?;
-    let n = movie.frames;
-    if !(movie.from.is_finite() && movie.to.is_finite() && (n == 1 || movie.to > movie.from)) {
-        refuse!(
-            "movie: from = {}, to = {} are not allowed: from must be below to",
-            movie.from,
-            movie.to
-        );
+    even_times("data.movie", frames, [from, to])
+}
+
+/// Times of frames at equal steps, M; `key` is the table that says the first and the last.
+pub(super) fn even_times(key: &str, frames: usize, [from, to]: [f64; 2]) -> Result<Vec<f64>> {
+    if !(from.is_finite() && to.is_finite() && (frames == 1 || to > from)) {
+        refuse!("{key}: from = {from}, to = {to} are not allowed: from must be below to");
     }
-    let step = (movie.to - movie.from) / (n.max(2) - 1) as f64;
-    Ok((0..n).map(|k| movie.from + step * k as f64).collect())
+    let step = (to - from) / (frames.max(2) - 1) as f64;
+    Ok((0..frames).map(|k| from + step * k as f64).collect())
 }

@@ -82,7 +82,7 @@ impl Instrument {
     /// # Errors
     /// As [`Instrument::new`].
     pub fn of(file: &FitFile, chosen: &[usize]) -> Result<Self> {
-        let hole = Kerr::new(file.hole.spin).within("hole")?;
+        let hole = Kerr::new(file.hole.spin.value()).within("hole")?;
         let region = file.region.limits();
         let request = SightlineRequest {
             region,
@@ -92,11 +92,12 @@ impl Instrument {
         };
         let (alpha, beta) = pixels(&file.screen, chosen)?;
         let observer = observer(&file.observer)?;
+        let turned = upright(file);
         let rays = match ring(file)? {
             None => PixelRays::single(&alpha, &beta),
-            Some(ring) => PixelRays::new(ring, (&hole, &observer), [&alpha, &beta], |place| place),
+            Some(ring) => PixelRays::new(ring, (&hole, &observer), [&alpha, &beta], &turned),
         };
-        let mut lines = Sightlines::of_pixels((&hole, &observer), &rays, |place| place, &request)
+        let mut lines = Sightlines::of_pixels((&hole, &observer), &rays, &turned, &request)
             .within("region and screen")?;
         if lines.rays() == 0 {
             refuse!(
@@ -190,13 +191,22 @@ fn polarized(file: &FitFile, screen: &[Vec<f64>; 2]) -> Result<Option<PolarizedV
         refuse!("polarization needs region.nodes = {{ gauss = {{ order, split }} }}");
     }
     let missing = || FitError::missing("motion.axis", format!("polarization needs it; {AXIS}"));
+    let turned = upright(file);
+    let [x, y] = screen;
+    let (alpha, beta) = x.iter().zip(y).map(|(x, y)| turned([*x, *y]).into()).unzip();
     Ok(Some(PolarizedView {
         law,
         axis: known_axis(file)?.ok_or_else(missing)?,
         sin_inclination: observer(&file.observer)?.inclination().sin(),
-        screen: screen.clone(),
-        position_angle: 0.0,
+        screen: [alpha, beta],
+        position_angle: file.observer.position_angle_deg.value().to_radians(),
     }))
+}
+
+/// (α, β) of a place on the screen (to the right and upwards): β along the projection of the spin.
+pub(super) fn upright(file: &FitFile) -> impl Fn([f64; 2]) -> [f64; 2] + use<> {
+    let (sin, cos) = file.observer.position_angle_deg.value().to_radians().sin_cos();
+    move |[x, y]| [x * cos + y * sin, y * cos - x * sin]
 }
 
 /// More rays for pixels of the photon ring, where they are wanted.

@@ -261,7 +261,7 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
         held_out.check(file)?;
     }
     if file.band.is_some() && file.unknown_world()?.is_some() {
-        refuse!("band does not work together with unknown parameters in [world]");
+        refuse!("band and numbers with a prior exclude each other");
     }
     let images_only = file.loss.iter().all(|loss| loss.data == LossKind::Image);
     if matches!(training.batch, BatchSize::Pixels(_)) && !images_only {
@@ -271,7 +271,7 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
         linear(file)?;
     }
     if file.unknown_world()?.is_some() {
-        linear(file).within("world.search")?;
+        linear(file).within("search")?;
     }
     check_prior(file)?;
     enough_nodes_and_iterations(file)?;
@@ -322,9 +322,9 @@ fn enough_nodes_and_iterations(file: &FitFile) -> Result<()> {
         grids.push(("training.start.linear.nodes", nodes));
     }
     if let Some(unknown) = file.unknown_world()? {
-        grids.push(("world.search.coarse.nodes", unknown.search.coarse.nodes));
-        grids.push(("world.search.fine.nodes", unknown.search.fine.nodes));
-        let finest = unknown.search.finest.map(|view| ("world.search.finest.nodes", view.nodes));
+        grids.push(("search.coarse.nodes", unknown.search.coarse.nodes));
+        grids.push(("search.fine.nodes", unknown.search.fine.nodes));
+        let finest = unknown.search.finest.map(|view| ("search.finest.nodes", view.nodes));
         grids.extend(finest);
     }
     match grids.into_iter().find(|(_, nodes)| *nodes < least) {

@@ -82,7 +82,7 @@ fn nodes(file: &FitFile, few: &Instrument, of_all: f64) -> Result<Part> {
         (bytes_of(&few.forward::<f32>(&motion)?), bytes_of(&few.pictured::<f64>(&motion)?));
     let images = file.loss.iter().all(|loss| loss.data == LossKind::Image);
     let models = if images { seen } else { 2 * seen };
-    let simulated = if file.truth.is_some() { simulated } else { 0 };
+    let simulated = if file.simulation.is_some() { simulated } else { 0 };
     // While they are traced, columns grow by doubling.
     let points = few.lines.points() as f64;
     let each = (lines + models.max(simulated) as f64 + OF_BATCH * points).max(2.0 * lines);
@@ -129,10 +129,10 @@ fn volumes(file: &FitFile) -> Part {
 /// Bytes of what takes no more than a share of the limit, and that share, with so many nodes on rays.
 fn shares(file: &FitFile, nodes: f64) -> Vec<[f64; 2]> {
     let pixels = (file.screen.pixels as f64).powi(2);
-    let seen = file.observation.as_ref().map(|observation| f64::from(observation.scans));
-    // Of measured visibilities it is not known yet: they take what they are given.
-    let frames = file.movie.as_ref().map(|movie| movie.frames as f64).or(seen);
-    let frames = frames.unwrap_or(f64::INFINITY);
+    let seen = file.observation().map(|observation| f64::from(observation.scans));
+    let movie = file.simulation.as_ref().and_then(|simulation| simulation.movie.as_ref());
+    // Of measured data it is not known yet: they take what they are given.
+    let frames = seen.or(movie.map(|movie| movie.frames as f64)).unwrap_or(f64::INFINITY);
     let stride = match (&file.representation.kind, file.training.start) {
         (Kind::LinearGrid, _) => Some(1.0),
         (_, Start::Linear { stride, .. }) => Some(stride.max(1) as f64),

@@ -143,12 +143,12 @@ pub(super) fn simulate(
     let mut truth = Truth::new(file)?;
     let motion = motion(file, times.clone())?;
     if let Some(mean) = settings.mean_flux {
-        check_positive("light_curve.mean_flux.jy", Some(mean.jy))?;
+        check_positive("simulation.light_curve.mean_flux.jy", Some(mean.jy))?;
         let fluxes = truth.movie_through(&mut instrument.summed(&motion, &[StokesParameter::I])?);
         let first = hours.iter().take_while(|h| (*h - hours[0]) * 60.0 <= mean.minutes).count();
         let now = fluxes[..first].iter().sum::<f64>() / first.max(1) as f64;
         if !(now > 0.0 && first > 0) {
-            refuse!("light_curve.mean_flux: the truth is dark in these {first} samples");
+            refuse!("simulation.light_curve.mean_flux: the truth is dark in these {first} samples");
         }
         truth.scale(mean.jy / now);
     }

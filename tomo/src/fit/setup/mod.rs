@@ -76,7 +76,8 @@ type Result<T> = std::result::Result<T, crate::Error>;
 /// # Errors
 /// If an angle or a radius is out of range.
 pub fn observer(observer: &ObserverSettings) -> Result<Observer> {
-    let inclination = Inclination::from_degrees(observer.inclination_deg).within("observer")?;
+    let inclination =
+        Inclination::from_degrees(observer.inclination_deg.value()).within("observer")?;
     match observer.radius {
         None => Ok(Observer::at_infinity(inclination)),
         Some(radius) => Observer::at_radius(inclination, radius).within("observer"),
@@ -178,7 +179,7 @@ pub fn priors(linear: &Linear) -> Vec<Prior> {
 /// # Errors
 /// If the velocity is out of range.
 pub fn motion(file: &FitFile, times: Vec<f64>) -> Result<Motion> {
-    let law = &file.motion.velocity;
+    let law = file.motion.law();
     let velocity = law.angular(file.seed, drag(file)?).within("motion.velocity")?;
     Ok(Motion {
         velocity,
@@ -193,7 +194,7 @@ pub fn motion(file: &FitFile, times: Vec<f64>) -> Result<Motion> {
 /// # Errors
 /// If the axis has no direction.
 pub fn drag(file: &FitFile) -> Result<f64> {
-    Ok(file.hole.spin * known_axis(file)?.map_or(1.0, |axis| axis.vector()[2]))
+    Ok(file.hole.spin.value() * known_axis(file)?.map_or(1.0, |axis| axis.vector()[2]))
 }
 
 /// The true or known axis.

@@ -26,11 +26,11 @@ pub(super) fn images(losses: &[Loss]) -> usize {
 pub(super) fn check(file: &FitFile) -> Result<()> {
     if is_polarized(&file.loss) && file.unknown_world()?.is_some() {
         refuse!(
-            "parameters of [world] are not searched with polarized-visibilities, polarimetric-ratios or closure-traces"
+            "numbers with a prior are not searched with polarized-visibilities, polarimetric-ratios or closure-traces"
         );
     }
     let solves = file.instrument.as_ref().is_some_and(|instrument| instrument.leakage.is_some());
-    let draws = file.observation.as_ref().is_some_and(|seen| seen.leakage.is_some());
+    let draws = file.observation().is_some_and(|seen| seen.leakage.is_some());
     let has = |kind| file.loss.iter().any(|loss| loss.data == kind);
     let products = has(LossKind::PolarizedVisibilities);
     if solves && !products {
@@ -38,7 +38,7 @@ pub(super) fn check(file: &FitFile) -> Result<()> {
     }
     if draws && !products && !has(LossKind::ClosureTraces) {
         refuse!(
-            "observation.leakage needs a loss with data = \"polarized-visibilities\" or \"closure-traces\""
+            "simulation.observation.leakage needs a loss with data = \"polarized-visibilities\" or \"closure-traces\""
         );
     }
     if solves && has(LossKind::PolarimetricRatios) {

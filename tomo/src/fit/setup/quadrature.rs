@@ -1,9 +1,8 @@
 //! The images of a fit with twice the nodes on rays: what its sums along rays are off by.
 
 use super::seen::seen;
-use super::{Instrument, Measured, Result, in_world};
-use crate::fit::settings::{FitFile, Region, UnknownWorld};
-use crate::fit::world::World;
+use super::{Instrument, Result};
+use crate::fit::settings::{FitFile, Region};
 use crate::fit::{Batch, Field, Motion, Sampling, Seen};
 use crate::representation::Workspace;
 
@@ -13,14 +12,10 @@ const BLOCK: usize = 2048;
 /// What images are made of.
 #[derive(Clone, Copy)]
 pub struct Imaged<'a> {
-    /// Settings.
+    /// Settings, in the geometry that was found.
     pub file: &'a FitFile,
-    /// Data.
-    pub measured: &'a Measured,
-    /// Motion in the world that was found.
+    /// Motion.
     pub motion: &'a Motion,
-    /// The world that was found, where it was not known.
-    pub found: Option<(&'a UnknownWorld, &'a World)>,
 }
 
 impl Imaged<'_> {
@@ -45,7 +40,7 @@ impl Imaged<'_> {
         let blocks = pixels.div_ceil(BLOCK);
         for first in 0..blocks {
             let block: Vec<usize> = (first..pixels).step_by(blocks).collect();
-            let instrument = self.looking(&file, &block)?;
+            let instrument = Instrument::of(&file, &block)?;
             let mut model = instrument.forward::<f32>(self.motion)?;
             model.weigh(field.axis);
             let mut part = vec![0.0; frames.len() * block.len()];
@@ -56,12 +51,5 @@ impl Imaged<'_> {
             }
         }
         Ok(Some(movie))
-    }
-
-    /// The rays of some pixels.
-    fn looking(&self, file: &FitFile, block: &[usize]) -> Result<Instrument> {
-        let instrument = Instrument::of(file, block)?;
-        let Some((unknown, world)) = self.found else { return Ok(instrument) };
-        Ok(in_world(file, unknown, &instrument, self.measured, world, 0)?.0)
     }
 }

@@ -66,7 +66,7 @@ pub(super) fn check(file: &FitFile) -> Result<()> {
     }
     if file.unknown_world()?.is_some() {
         refuse!(
-            "quiescent and unknown parameters of [world] exclude each other: worlds are compared without what does not move"
+            "quiescent and numbers with a prior exclude each other: geometries are compared without what does not move"
         );
     }
     if file.representation.kind == Kind::LinearGrid {

@@ -17,13 +17,13 @@ impl Rings {
     /// # Errors
     /// If one lies outside of the screen.
     pub fn new(file: &FitFile) -> Result<Self> {
-        let rings = file.truth.as_ref().map_or(&[][..], |truth| &truth.ring);
+        let rings = file.truth().map_or(&[][..], |truth| &truth.ring);
         let mut all = Self::default();
         for (k, ring) in rings.iter().enumerate() {
             let shape = shape(ring, &file.screen)?;
             let total: f64 = shape.iter().sum();
             if !(total > 0.0 && total.is_finite()) {
-                refuse!("truth.ring.{k}: no pixel of the screen sees it");
+                refuse!("simulation.truth.ring.{k}: no pixel of the screen sees it");
             }
             let fluxes = [ring.flux_jy, ring.q_jy, ring.u_jy];
             for (image, flux) in all.images.iter_mut().zip(fluxes) {

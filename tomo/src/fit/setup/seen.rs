@@ -12,12 +12,12 @@ use kerrlight_render::polarization::StokesParameter;
 /// If other losses stand beside it, a Stokes parameter has no model, or settings are missing.
 pub(super) fn seen(file: &FitFile) -> Result<Seen> {
     let is_curve =
-        file.light_curve.is_some() || matches!(file.data, Some(DataFiles::LightCurve(_)));
+        file.simulated_curve().is_some() || matches!(file.data, Some(DataFiles::LightCurve(_)));
     let named = file.loss.iter().position(|loss| loss.stokes.is_some());
     if !is_curve {
         return match named {
             Some(k) => refuse!(
-                "loss.{k}.stokes needs a light curve of its own: a table [light_curve] (to simulate) or [data.light-curve] (to read)"
+                "loss.{k}.stokes needs a light curve of its own: [simulation.light_curve] or [data.light-curve]"
             ),
             None => Ok(polarized(file)?.unwrap_or(Seen::Images)),
         };
@@ -44,11 +44,11 @@ fn check(file: &FitFile, parameters: &[StokesParameter]) -> Result<()> {
         let why = "Q and U need the field of the gas: add a table [polarization]";
         return Err(FitError::missing("polarization", why).into());
     }
+    if file.observation().is_some() {
+        refuse!("simulation.light_curve and simulation.observation exclude each other");
+    }
     if file.loss[0].sigma.is_some() {
         refuse!("loss.0.sigma is not allowed: the light curve has errors of its own");
-    }
-    if file.observation.is_some() || file.movie.is_some() {
-        refuse!("a light curve has times of its own: [observation] and [movie] are not allowed");
     }
     Ok(())
 }
@@ -66,9 +66,9 @@ fn polarized(file: &FitFile) -> Result<Option<Seen>> {
         return Err(FitError::missing("polarization", why).into());
     }
     let image = file.loss.iter().any(|loss| loss.data == LossKind::Image);
-    if image || file.movie.is_some() {
+    if image || !file.has_visibilities() {
         refuse!(
-            "a loss of polarized-visibilities, polarimetric-ratios or closure-traces stands with other visibilities alone: [movie] and a loss of images are not allowed"
+            "a loss of polarized-visibilities, polarimetric-ratios or closure-traces stands with other visibilities alone: images are not allowed"
         );
     }
     Ok(Some(Seen::StokesImages(PARAMETERS.to_vec())))

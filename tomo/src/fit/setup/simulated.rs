@@ -1,14 +1,13 @@
 //! Data that are simulated from a truth.
 
 use super::gains;
-use super::imported::frames;
+use super::imported::even_times;
 use super::leakage;
 use super::light_curve;
 use super::observed::{Spoiled, schedule_of, spoil};
 use super::polarized::{self, is_polarized};
-use super::world::seen_in_truth;
 use super::{Instrument, Measured, Result, Truth, hours_per_m, motion, sky};
-use crate::fit::settings::{FitFile, PixelShape, Within, refuse};
+use crate::fit::settings::{FitError, FitFile, PixelShape, Simulation, Within, refuse};
 use kerrlight_common::frames::Frames;
 use kerrlight_vlbi::array::Array;
 use kerrlight_vlbi::observation::Observation;
@@ -25,13 +24,13 @@ impl Measured {
         instrument: &Instrument,
         array: Option<&Array>,
     ) -> Result<Self> {
-        if !file.is_simulated_elsewhere() {
+        let simulated = file.simulated()?;
+        if simulated == *file {
             return simulate(file, file, instrument, array);
         }
-        let world = file.simulated()?;
-        let instrument = Instrument::new(&world).within("world")?;
-        let instrument = seen_in_truth(file, &world, instrument)?;
-        simulate(&world, file, &instrument, array)
+        let seen = if is_drawn(file) { densely(&simulated) } else { simulated.clone() };
+        let instrument = Instrument::new(&seen).within("simulation")?;
+        simulate(&simulated, file, &instrument, array)
     }
 }
 
@@ -41,12 +40,12 @@ fn simulate(
     instrument: &Instrument,
     array: Option<&Array>,
 ) -> Result<Measured> {
-    if let Some(settings) = &file.light_curve {
+    if let Some(settings) = file.simulated_curve() {
         return light_curve::simulate(file, fit, instrument, settings);
     }
     let truth = Truth::new(file)?;
-    let Some(seen) = &file.observation else {
-        let times = frames(file)?;
+    let Some(seen) = file.observation() else {
+        let times = times_of_images(file)?;
         let movie = Some(lit(&truth, truth.movie(file, instrument, &times)?)?);
         let sky = sky(file).ok();
         return Ok(Measured { times, movie, sky, truth: Some(truth), ..Measured::empty() });
@@ -77,6 +76,37 @@ fn simulate(
         true_leakage,
         ..Measured::empty()
     })
+}
+
+/// Times of simulated images, M.
+fn times_of_images(file: &FitFile) -> Result<Vec<f64>> {
+    let missing = || {
+        FitError::missing(
+            "simulation.movie",
+            "images need times; add a table [simulation.movie] with `frames = …`, their number, and `from = …` and \
+             `to = …`, the times of the first and the last in M; or [simulation.observation]",
+        )
+    };
+    let movie = file.simulation.as_ref().and_then(|simulation| simulation.movie.as_ref());
+    let movie = movie.ok_or_else(missing)?;
+    even_times("simulation.movie", movie.frames, [movie.from, movie.to])
+}
+
+/// So many times the rays near the critical curve of a fit are those of a simulation whose geometry is drawn, up to
+/// [`MOST_RAYS`]: data do not know rays.
+const DENSER: usize = 16;
+/// Of a pixel.
+const MOST_RAYS: usize = 1024;
+
+/// Settings with more rays near the critical curve than a fit has.
+fn densely(file: &FitFile) -> FitFile {
+    let mut dense = file.clone();
+    dense.screen.ring_rays = dense.screen.ring_rays.map(|rays| (DENSER * rays).min(MOST_RAYS));
+    dense
+}
+
+fn is_drawn(file: &FitFile) -> bool {
+    file.simulation.as_ref().is_some_and(|Simulation { drawn, .. }| *drawn)
 }
 
 /// What the pixels of a simulation are to its visibilities.

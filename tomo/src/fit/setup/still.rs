@@ -1,6 +1,7 @@
 //! One sharp image of the volume as the observer sees it, with more rays than the data have pixels and as many
 //! along photon rings as these take.
 
+use super::instrument::upright;
 use super::{Instrument, Result, Truth, observer, spacing};
 use crate::fit::settings::FitFile;
 use crate::fit::{
@@ -77,6 +78,7 @@ impl StillView<'_> {
         let step = spacing(screen)? * screen.pixels as f64 / side as f64;
         let at = |k: usize| (k as f64 - 0.5 * (side as f64 - 1.0)) * step;
         let view = View::Screen(observer(&self.file.observer)?);
+        let turned = upright(self.file);
         let strata = RingStrata::new(&self.instrument.hole, &view, SPACING);
         let mut rays = Rays::default();
         let mut ring = Vec::new();
@@ -84,7 +86,7 @@ impl StillView<'_> {
             if rays.alpha.len() >= AT_A_TIME {
                 break;
             }
-            let (x, y) = (at(k % side), -at(k / side));
+            let [x, y] = turned([at(k % side), -at(k / side)]);
             ring.clear();
             strata.place((x, y), step, &mut ring);
             if ring.is_empty() {

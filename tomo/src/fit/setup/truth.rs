@@ -13,7 +13,7 @@ use kerrlight_render::dynamics::{AngularVelocity, Axis};
 use kerrlight_render::polarization::StokesParameter;
 
 /// What to write where there is no truth.
-pub(super) const SPOT: &str = "add a table [[truth.spot]] with `center = [x, y, z]` and `sigma = …` in M and `amplitude = 1.0`";
+pub(super) const SPOT: &str = "add a table [[simulation.truth.spot]] with `center = [x, y, z]` and `sigma = …` in M and `amplitude = 1.0`";
 
 /// The emission that is simulated.
 #[derive(Clone)]
@@ -39,19 +39,21 @@ impl Truth {
     /// # Errors
     /// If there is none, or a number is out of range.
     pub fn new(file: &FitFile) -> Result<Self> {
-        let missing =
-            || FitError::missing("truth", format!("there is nothing to simulate; {SPOT}"));
-        let truth = file.truth.as_ref().ok_or_else(missing)?;
+        let missing = || {
+            FitError::missing("simulation.truth", format!("there is nothing to simulate; {SPOT}"))
+        };
+        let truth = file.truth().ok_or_else(missing)?;
         let moves = [truth.spot.len(), truth.glyph.len(), truth.tube.len()];
         if moves == [0; 3] && truth.field.is_none() && truth.ring.is_empty() {
-            refuse!("truth is empty; {SPOT}");
+            refuse!("simulation.truth is empty; {SPOT}");
         }
         let mut spots = truth.spot.clone();
         spots.extend(truth.tube.iter().flat_map(Tube::spots));
         let missing = || FitError::missing("motion.axis", format!("a simulation needs it; {AXIS}"));
         let axis = known_axis(file)?.ok_or_else(missing)?;
-        let glyph =
-            |(k, shape)| Glyph::new(shape, axis.vector()).within(format!("truth.glyph {k}"));
+        let glyph = |(k, shape)| {
+            Glyph::new(shape, axis.vector()).within(format!("simulation.truth.glyph {k}"))
+        };
         Ok(Self {
             spots,
             glyphs: truth.glyph.iter().enumerate().map(glyph).collect::<Result<_>>()?,

@@ -12,9 +12,9 @@ fn file(set: &[&str]) -> FitFile {
         "screen.pixels=16",
         "representation.nodes=16",
         "linear.iterations=25",
-        "observation.scans=24",
-        "observation.bandwidth_ghz=8.0",
-        "truth.spot.0.sigma=1.0",
+        "simulation.observation.scans=24",
+        "simulation.observation.bandwidth_ghz=8.0",
+        "simulation.truth.spot.0.sigma=1.0",
         "instrument.leakage.rounds=5",
     ];
     let text = small
@@ -26,7 +26,7 @@ fn file(set: &[&str]) -> FitFile {
 
 fn simulated(file: &FitFile) -> (Instrument, Measured) {
     let instrument = Instrument::new(file).unwrap();
-    let array = built_in(&file.observation.as_ref().unwrap().array).unwrap();
+    let array = built_in(&file.observation().unwrap().array).unwrap();
     let measured = Measured::simulated(file, &instrument, Some(&array)).unwrap();
     (instrument, measured)
 }
@@ -34,7 +34,7 @@ fn simulated(file: &FitFile) -> (Instrument, Measured) {
 /// Gradients of the loss with respect to parameters, against central differences.
 #[test]
 fn exact_gradients_with_respect_to_emission() {
-    let file = file(&["observation.scans=3", "screen.pixels=12"]);
+    let file = file(&["simulation.observation.scans=3", "screen.pixels=12"]);
     let (instrument, measured) = simulated(&file);
     let motion = setup::motion(&file, measured.times.clone()).unwrap();
     let model = instrument.forward::<f64>(&motion).unwrap();

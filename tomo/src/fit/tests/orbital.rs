@@ -32,7 +32,7 @@ fn exact_simulated_light_curves() {
         let set = [
             "screen.pixels=24",
             "loss.0.stokes=[\"I\", \"Q\", \"U\"]",
-            "light_curve.noise=\"none\"",
+            "simulation.light_curve.noise=\"none\"",
         ];
         let (instrument, measured) = simulated(&file(text, &set));
         assert!(matches!(&instrument.seen, Seen::Fluxes(parameters) if parameters.len() == 3));
@@ -111,7 +111,7 @@ fn exact_position_angles_of_the_spin() {
 }
 
 fn measured_file(more: &str) -> FitFile {
-    let start = PUBLISHED.find("[[truth.tube]]").unwrap();
+    let start = PUBLISHED.find("[[simulation.truth.tube]]").unwrap();
     let end = PUBLISHED.find("[[loss]]").unwrap();
     let data = format!("[data.light-curve]\npath = \"curve.csv\"\nfirst_time = 5.0\n{more}\n\n");
     FitFile::parse(&format!("{}{data}{}", &PUBLISHED[..start], &PUBLISHED[end..])).unwrap()
@@ -185,12 +185,12 @@ fn exact_a_flare_before_a_background() {
         "band.nodes=24",
         "band.widths=[2.0]",
         "band.lengths=[4.0]",
-        "light_curve.sigma={I=0.15, Q=0.004, U=0.004}",
-        "light_curve.background={constant_jy=0.2, variation_jy=0.02, correlation_min=60.0, matern=\"1/2\"}",
+        "simulation.light_curve.sigma={I=0.15, Q=0.004, U=0.004}",
+        "simulation.light_curve.background={constant_jy=0.2, variation_jy=0.02, correlation_min=60.0, matern=\"1/2\"}",
         "band.background={constant_jy=0.2, variation_jy=[0.0, 0.02, 0.05], correlation_min=[20.0, 60.0], matern=[\"1/2\", \"5/2\"]}",
     ];
     let scan = |jy: f64| {
-        let flux = format!("light_curve.mean_flux.jy={jy}");
+        let flux = format!("simulation.light_curve.mean_flux.jy={jy}");
         let mut file = file(PUBLISHED, &[&set[..], &[&flux]].concat());
         let band = file.band.as_mut().unwrap();
         band.inclinations_deg = Steps { from: 12.0, to: 52.0, step: 20.0 };
@@ -255,9 +255,9 @@ fn regress_backgrounds_that_mean_nothing_are_refused() {
         (of("0.1", "[]", "[20.0]"), "one value or more"),
         (
             says(
-                "light_curve.background={constant_jy=0.1, variation_jy=0.1, correlation_min=-1.0, matern=\"1/2\"}",
+                "simulation.light_curve.background={constant_jy=0.1, variation_jy=0.1, correlation_min=-1.0, matern=\"1/2\"}",
             ),
-            "light_curve.background",
+            "simulation.light_curve.background",
         ),
     ] {
         assert!(message.contains(key), "{key}: {message}");

@@ -8,7 +8,7 @@ use std::path::Path;
 
 /// The verdict of the simulated movie times `scale`, of the built-in experiment with changes.
 fn of_truth(changes: &[&str], scale: f32) -> Judged {
-    let small = ["screen.pixels=20", "observation.scans=24"];
+    let small = ["screen.pixels=20", "simulation.observation.scans=24"];
     let text = small
         .iter()
         .chain(changes)
@@ -28,7 +28,7 @@ fn of_truth(changes: &[&str], scale: f32) -> Judged {
 
 fn assert_explained(kind: &str, array: &str, flux: f64) {
     let loss = format!("loss=[{{data={kind:?},weight=1.0,least_snr=3.0}}]");
-    let array_of = format!("observation.array={array}");
+    let array_of = format!("simulation.observation.array={array}");
     let flux_of = format!("screen.jy_per_pixel={flux}");
     let judged = of_truth(&[&loss, &array_of, &flux_of], 1.0);
     let name = format!("{kind}, {array}, {flux}: {}", judged.headline());
@@ -69,10 +69,10 @@ fn exact_another_flux_does_not_explain_visibilities() {
 
 #[test]
 fn exact_noise_free_data_are_said_to_be_so() {
-    let judged = of_truth(&["observation.noise=none"], 1.001);
+    let judged = of_truth(&["simulation.observation.noise=none"], 1.001);
     assert_eq!(judged.verdict.outcome, Outcome::Reproduced);
     assert!(judged.headline().contains("to 0.1 %: σ is only a weight"), "{}", judged.headline());
-    let dark = of_truth(&["observation.noise=none"], 0.0);
+    let dark = of_truth(&["simulation.observation.noise=none"], 0.0);
     assert_eq!(dark.verdict.outcome, Outcome::Unexplained);
     assert!(dark.headline().contains("are 100 % of the data"), "{}", dark.headline());
 }

@@ -1,4 +1,4 @@
-//! From settings to a world that is not known: its model, its parameters, the search for them and how sure they are.
+//! From settings to a geometry that is not known: its model, its parameters, the search for them and their errors.
 
 mod discretisation;
 mod fine;
@@ -11,86 +11,31 @@ pub use posterior::WorldPosterior;
 pub use search::{FoundWorld, SearchWatch, Trial, find_world};
 
 use super::instrument::ring;
-use super::{Instrument, Measured, Result, axis, drag, motion};
-use crate::fit::settings::{AxisSearch, FitError, FitFile, UnknownWorld};
-use crate::fit::world::{KNOTS, Law, Parameter, World, WorldModel};
+use super::{Instrument, Measured, Result, axis, motion};
+use crate::fit::settings::{AxisSearch, FitError, FitFile};
+use crate::fit::world::{Law, Parameter, World, WorldModel};
 use crate::fit::{Motion, Redshift, Sampling};
 use kerrlight_geodesic::Kerr;
 use kerrlight_render::dynamics::Velocity;
-use kerrlight_render::dynamics::infall::Profile;
 
-/// The world that the settings say, for parameters that are known, and for data that are simulated.
+/// The geometry that the settings say, with the medians of priors in place of what is not known.
 pub fn known_world(file: &FitFile) -> World {
-    let inclination = file.observer.inclination_deg.to_radians();
+    let inclination = file.observer.inclination_deg.value().to_radians();
     let power = file.effects.redshift_power.unwrap_or(0.0);
-    let world = World::new(file.hole.spin, inclination, power);
-    let Velocity::Infall { xi, beta_r, beta_phi, .. } = file.motion.velocity else { return world };
+    let world = World::new(file.hole.spin.value(), inclination, power)
+        .with(Parameter::PositionAngle, file.observer.position_angle_deg.value().to_radians());
+    let Velocity::Infall { xi, beta_r, beta_phi, .. } = file.motion.law() else { return world };
     let flow = Parameter::FLOW.into_iter().zip([xi, beta_r, beta_phi]);
     flow.fold(world, |world, (parameter, value)| world.with(parameter, value))
 }
 
-/// The world that data are simulated in.
+/// The geometry that data are simulated in.
 ///
 /// # Errors
 /// If a setting is missing or out of range.
 pub fn true_world(file: &FitFile) -> Result<World> {
-    let simulated = file.simulated()?;
-    let (world, view) = (known_world(&simulated), drawn_view(file)?);
-    let world = relative(world, &simulated.motion.velocity, &file.motion.velocity);
-    Ok(view.into_iter().fold(world, |world, (parameter, value)| world.with(parameter, value)))
+    Ok(known_world(&file.simulated()?))
 }
-
-/// With the factors by which a profile differs from the one that a fit knows.
-fn relative(world: World, truth: &Velocity, known: &Velocity) -> World {
-    let (
-        Velocity::Profile { radii, angular, radial },
-        Velocity::Profile { radii: known_radii, angular: known_angular, radial: known_radial },
-    ) = (truth, known)
-    else {
-        return world;
-    };
-    if radii != known_radii {
-        return world;
-    }
-    let pairs = |truth: &[f64], known: &[f64], of: fn(u8) -> Parameter| -> Vec<(Parameter, f64)> {
-        let ratios = truth.iter().zip(known).map(|(x, y)| if *y == 0.0 { 1.0 } else { x / y });
-        ratios.take(KNOTS).enumerate().map(|(k, ratio)| (of(k as u8), ratio)).collect()
-    };
-    let factors = [
-        pairs(angular, known_angular, Parameter::Angular),
-        pairs(radial, known_radial, Parameter::Radial),
-    ];
-    factors.concat().into_iter().fold(world, |world, (p, value)| world.with(p, value))
-}
-
-fn drawn_view(file: &FitFile) -> Result<Vec<(Parameter, f64)>> {
-    let view = file.unknown_world()?.map(|unknown| unknown.drawn_view(file.seed));
-    Ok(view.transpose()?.unwrap_or_default())
-}
-
-/// What the settings of a simulation look through, turned and shifted as the world that is drawn says, with more rays near
-/// the critical curve than a fit has.
-///
-/// # Errors
-/// As [`in_world`].
-pub(super) fn seen_in_truth(
-    file: &FitFile,
-    simulated: &FitFile,
-    instrument: Instrument,
-) -> Result<Instrument> {
-    let unknown = file.unknown_world()?.filter(|unknown| unknown.drawn);
-    let Some(unknown) = unknown else { return Ok(instrument) };
-    let plain = motion(simulated, Vec::new())?;
-    let mut dense = simulated.clone();
-    dense.screen.ring_rays = dense.screen.ring_rays.map(|rays| (DENSER * rays).min(MOST_RAYS));
-    Ok(through(&dense, &unknown, &instrument, &plain, &true_world(file)?, 0)?.0)
-}
-
-/// So many times the rays near the critical curve of a fit are those of a simulation of a drawn world, up to
-/// [`MOST_RAYS`]: data do not know rays.
-const DENSER: usize = 16;
-/// Of a pixel.
-const MOST_RAYS: usize = 1024;
 
 /// What a fit looks through in a world, along the rays near the critical curve of this number, and how matter moves there.
 /// Rays of number 0 are the usual ones.
@@ -99,24 +44,13 @@ const MOST_RAYS: usize = 1024;
 /// If a setting is missing or out of range.
 pub fn in_world(
     file: &FitFile,
-    unknown: &UnknownWorld,
     instrument: &Instrument,
     measured: &Measured,
     world: &World,
     rays: u64,
 ) -> Result<(Instrument, Motion)> {
-    through(file, unknown, instrument, &motion(file, measured.times.clone())?, world, rays)
-}
-
-fn through(
-    file: &FitFile,
-    unknown: &UnknownWorld,
-    instrument: &Instrument,
-    plain: &Motion,
-    world: &World,
-    rays: u64,
-) -> Result<(Instrument, Motion)> {
-    let model = model(file, unknown, instrument, plain)?.seen_along(rays);
+    let plain = motion(file, measured.times.clone())?;
+    let model = model(file, instrument, &plain)?.seen_along(rays);
     let power = world.get(Parameter::RedshiftPower);
     let hole = Kerr::new(world.get(Parameter::Spin))?;
     let found = Instrument {
@@ -132,33 +66,23 @@ fn through(
 }
 
 /// What all worlds share.
-fn model(
-    file: &FitFile,
-    unknown: &UnknownWorld,
-    instrument: &Instrument,
-    motion: &Motion,
-) -> Result<WorldModel> {
+fn model(file: &FitFile, instrument: &Instrument, motion: &Motion) -> Result<WorldModel> {
     let Sampling::Gauss { order, split } = file.region.nodes else {
-        let why = "an unknown world needs region.nodes = { gauss = { order, split } }: nodes equidistant in Mino time \
+        let why = "a number with a prior needs region.nodes = { gauss = { order, split } }: nodes equidistant in Mino time \
                    have no derivatives";
         return Err(FitError::Conflict(why.to_owned()).into());
     };
     if file.effects.absorption.is_some() {
-        let why = "an unknown world and effects.absorption exclude each other".to_owned();
+        let why = "a number with a prior and effects.absorption exclude each other".to_owned();
         return Err(FitError::Conflict(why).into());
     }
     if !matches!(file.axis, AxisSearch::Known {}) {
-        let why = "an unknown world needs [axis.known]: matter turns about motion.axis, in the frame of the hole";
+        let why = "a number with a prior needs [axis.known]: matter turns about motion.axis, in the frame of the hole";
         return Err(FitError::Conflict(why.to_owned()).into());
     }
-    let follows = unknown.search.drag_is_spin;
     let law = match file.motion.velocity {
-        Velocity::Keplerian { .. } if follows => Law::CircularOrbits,
-        Velocity::Infall { .. } if follows => Law::Infall(None),
-        Velocity::Infall { drag: own, .. } => Law::Infall(Some(own.unwrap_or(drag(file)?))),
-        Velocity::Profile { ref radii, ref angular, ref radial } if unknown.knots > 0 => {
-            Law::Profile(Profile::new(radii.clone(), angular.clone(), radial.clone())?)
-        }
+        Velocity::Keplerian { drag: None } => Law::CircularOrbits,
+        Velocity::Infall { drag, .. } => Law::Infall(drag),
         _ => Law::Fixed(motion.velocity.clone()),
     };
     let [x, y] = instrument.pixels.clone();
@@ -185,26 +109,26 @@ fn model(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::settings::{PriorSettings, Quantity};
+    use core::f64::consts::PI;
     use kerrlight_common::toml_file;
     use kerrlight_vlbi::array::built_in;
 
     const SIDE: usize = 12;
 
-    /// The built-in flare as a movie, with what is not known of its world.
-    fn settings(world: &str) -> FitFile {
+    /// The built-in flare, seen from directions that are drawn.
+    fn settings(inclination: Quantity, position_angle: Quantity) -> FitFile {
         let text = include_str!("../../../../../cli/src/fit/built_in.toml");
         let mut file: FitFile = toml_file::read(text).unwrap();
-        let view = "{ worlds = 1, nodes = 8, iterations = 1, pixels = 12, frames = 2 }";
-        let text = format!(
-            "drawn = true\n{world}[search]\nstarts = 1\ndrag_is_spin = false\ncoarse = {view}\nfine = {view}\n"
-        );
-        file.world = text.parse().unwrap();
+        file.observer.inclination_deg = inclination;
+        file.observer.position_angle_deg = position_angle;
+        file.simulation.as_mut().unwrap().drawn = true;
         file.screen.pixels = SIDE;
         file
     }
 
-    fn simulated(world: &str) -> (World, Vec<f64>) {
-        let file = settings(world);
+    fn simulated(position_angle: Quantity) -> (World, Vec<f64>) {
+        let file = settings(60.0.into(), position_angle);
         let instrument = Instrument::new(&file).unwrap();
         let array = built_in("ngEHT");
         let measured = Measured::simulated(&file, &instrument, array.as_ref()).unwrap();
@@ -219,9 +143,10 @@ mod tests {
     /// A position angle of 90 degrees turns images from north to east, anticlockwise.
     #[test]
     fn exact_drawn_views_turn_what_is_simulated() {
-        let (upright, images) = simulated("position_angle_deg = { uniform = [0.0, 1e-9] }\n");
-        let (turned, other) =
-            simulated("position_angle_deg = { uniform = [90.0, 90.000000001] }\n");
+        let (upright, images) = simulated(0.0.into());
+        let (turned, other) = simulated(PriorSettings::Uniform([90.0, 90.000000001]).into());
+        let (known, same) = simulated(90.0.into());
+        assert!((known.get(Parameter::PositionAngle) - PI / 2.0).abs() < 1e-15);
         let angle = |world: &World| world.get(Parameter::PositionAngle).to_degrees();
         assert!(angle(&upright).abs() < 1e-8 && (angle(&turned) - 90.0).abs() < 1e-8);
         let brightest = images.iter().fold(0.0f64, |most, x| most.max(*x));
@@ -231,13 +156,15 @@ mod tests {
             // What is in the last column comes to the first row.
             let from = images[(frame * SIDE + column) * SIDE + SIDE - 1 - row];
             assert!((x - from).abs() < 1e-6 * brightest, "{frame} {row} {column}: {x} {from}");
+            assert!((same[k] - from).abs() < 1e-6 * brightest, "{frame} {row} {column}");
         }
     }
 
     #[test]
     fn exact_other_seeds_draw_other_worlds() {
         let mut file = settings(
-            "inclination_deg = { uniform = [20.0, 70.0] }\nposition_angle_deg = { uniform = [-180.0, 180.0] }\n",
+            PriorSettings::Uniform([20.0, 70.0]).into(),
+            PriorSettings::Uniform([-180.0, 180.0]).into(),
         );
         let first = true_world(&file).unwrap();
         file.seed += 1;

@@ -118,7 +118,7 @@ impl Seen {
         // Knots are the same in all worlds.
         let change = change(file, emission_times(instrument, &plain))?;
         search(&WorldProblem {
-            model: &model(file, unknown, instrument, &plain)?,
+            model: &model(file, instrument, &plain)?,
             known: known_world(file),
             free: &unknown.free()?,
             frames: &frames,

@@ -1,9 +1,9 @@
-//! How a world that is not known is looked for.
+//! How a geometry that is not known is searched for.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How the world is looked for.
+/// How parameters that have a prior are searched for.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct WorldSearch {
@@ -18,16 +18,13 @@ pub struct WorldSearch {
     /// data in which the volume is a convex problem.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub finest: Option<WorldSteps>,
-    /// Whether the drag of a Keplerian velocity and of `infall` is the spin of each trial along the axis; a drag in
-    /// the file must then be that of `hole.spin`.
-    pub drag_is_spin: bool,
 }
 
 impl Default for WorldSearch {
     fn default() -> Self {
         let coarse = WorldView { worlds: 400, nodes: 16, iterations: 30, pixels: 20, frames: 16 };
         let fine = WorldView { worlds: 60, nodes: 36, iterations: 80, pixels: 40, frames: 20 };
-        Self { starts: 8, coarse, fine, finest: None, drag_is_spin: true }
+        Self { starts: 8, coarse, fine, finest: None }
     }
 }
 
