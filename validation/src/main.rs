@@ -12,13 +12,11 @@ fn main() -> anyhow::Result<()> {
     let mut file = tempfile::NamedTempFile::new_in(&folder).context("docs/measurements")?;
     file.write_all(text.as_bytes())?;
     file.persist(folder.join("validation.md"))?;
-    let failed: Vec<_> = cases.iter().filter(|case| !case.passed()).collect();
-    for case in &failed {
-        eprintln!("failed: {} ({}): error {:.1e}", case.name, case.authority, case.error);
-    }
-    println!("{} passed, {} failed", cases.len() - failed.len(), failed.len());
-    if !failed.is_empty() {
-        bail!("{} cases failed", failed.len());
+    print!("{}", report::lines(&cases));
+    let passed = report::passed(&cases);
+    println!("{passed} of {} passed", cases.len());
+    if passed < cases.len() {
+        bail!("{} cases failed", cases.len() - passed);
     }
     Ok(())
 }
