@@ -217,45 +217,6 @@ fn exact_same_bytes_after_kills_of_an_unknown_world() {
 }
 
 /// Two flares in a flow that turns slower inside and faster outside than the profile of the settings says.
-#[test]
-#[ignore = "long"]
-fn exact_factors_of_a_profile_are_found() {
-    let folder = tempfile::tempdir().unwrap();
-    let settings = settings(60);
-    let start = settings.find("\n[world.inclination_deg]").unwrap();
-    std::fs::write(folder.path().join("fit.toml"), &settings[..start]).unwrap();
-    let profile = |angular: &str| {
-        format!("{{profile={{radii=[4.5,8.0],angular={angular},radial=[-0.02,-0.02]}}}}")
-    };
-    let coarse = "{worlds=40,nodes=12,iterations=30,pixels=20,frames=12}";
-    let fine = "{worlds=20,nodes=20,iterations=40,pixels=20,frames=12}";
-    let sets = [
-        "screen.ring_rays=4".to_owned(),
-        format!("motion.velocity={}", profile("[0.09,0.04]")),
-        "truth.spot=[{center=[5.0,0.0,0.0],sigma=0.8,amplitude=1.0},\
-         {center=[-7.5,0.0,0.0],sigma=0.8,amplitude=1.0}]"
-            .to_owned(),
-        format!(
-            "world={{motion={{velocity={}}},angular_factors={{log-normal={{median=1.0,sigma=0.3}}}},\
-             search={{starts=1,drag_is_spin=false,coarse={coarse},fine={fine}}}}}",
-            profile("[0.072,0.046]")
-        ),
-    ];
-    let mut words = vec!["fit", "fit.toml", "-o", "run"];
-    words.extend(sets.iter().flat_map(|set| ["--set", set]));
-    succeed(folder.path(), &words);
-    let world = read(&folder.path().join("run/world.json"));
-    for (name, truth) in [("angular_factor_0", 0.8), ("angular_factor_1", 1.15)] {
-        let [found, sigma, known] =
-            ["world", "sigma", "truth"].map(|of| world[of][name].as_f64().unwrap());
-        assert!((known - truth).abs() < 1e-9, "{world}");
-        assert!((found - truth).abs() < 0.03 && sigma < 0.05, "{name}: {found} {sigma}");
-    }
-    // What is written is the flow that was found.
-    let scene = std::fs::read_to_string(folder.path().join("run/scene.toml")).unwrap();
-    assert!(scene.contains("profile") && !scene.contains("0.09"), "{scene}");
-}
-
 /// Beside the grid over the inclination the position angle is searched for in each of its worlds.
 #[test]
 #[ignore = "long"]
@@ -309,11 +270,7 @@ fn exact_impossible_priors_are_refused_before_anything_is_written() {
         ("world.position_angle_deg={isotropic=[0.0,1.0]}", "isotropic is a prior of inclinations"),
         ("world.xi={uniform=[0.5,1.0]}", "velocity = { infall = { xi, beta_r, beta_phi } }"),
         ("world.beta_r={uniform=[0.5,1.5]}", "world.beta_r = 1.5 is not allowed: 0 to 1"),
-        (
-            "world.angular_factors={uniform=[0.5,1.5]}",
-            "velocity = { profile = { radii, angular, radial } }",
-        ),
-        ("world.angular_factor_0={uniform=[0.5,1.5]}", "unknown field `angular_factor_0`"),
+        ("world.mass_factor={uniform=[0.5,1.5]}", "unknown field `mass_factor`"),
         ("world.search.starts=0", "world.search.starts = 0 is not allowed"),
         (
             "world.search.finest={nodes=24,iterations=40,pixels=20,frames=12}",
@@ -333,11 +290,6 @@ fn exact_impossible_priors_are_refused_before_anything_is_written() {
         (
             "linear= representation.kind=grid training.start=drawn",
             "world.search: linear is missing",
-        ),
-        // Without a shift of frequencies its power is no parameter.
-        (
-            "world.redshift_power={uniform=[1.0,3.0]} effects.redshift_power=",
-            "world.redshift_power: no data depend on it",
         ),
     ] {
         let mut words = vec!["fit", "fit.toml", "-o", "run"];

@@ -162,9 +162,6 @@ pub fn settled(file: &FitFile, unknown: &UnknownWorld, world: &World) -> FitFile
     let mut file = file.clone();
     file.hole.spin = world.get(Parameter::Spin);
     file.observer.inclination_deg = world.get(Parameter::Inclination).to_degrees();
-    if let Some(power) = &mut file.effects.redshift_power {
-        *power = world.get(Parameter::RedshiftPower);
-    }
     let follows = unknown.search.drag_is_spin;
     match &mut file.motion.velocity {
         // That of the hole that was found.
@@ -176,14 +173,6 @@ pub fn settled(file: &FitFile, unknown: &UnknownWorld, world: &World) -> FitFile
             if follows {
                 *drag = None;
             }
-        }
-        Velocity::Profile { angular, radial, .. } if unknown.knots > 0 => {
-            let times = |values: &mut [f64], of: fn(u8) -> Parameter| {
-                let factors = (0..).map(|knot| world.get(of(knot)));
-                values.iter_mut().zip(factors).for_each(|(value, factor)| *value *= factor);
-            };
-            times(angular, Parameter::Angular);
-            times(radial, Parameter::Radial);
         }
         _ => {}
     }

@@ -5,7 +5,7 @@ use super::{
     Effects, FitError, FitFile, Hole, LossKind, Motion, Observer, Region, Within, WorldSearch,
 };
 use crate::Error;
-use crate::fit::world::{Free, KNOTS, Parameter, Prior, Scanned};
+use crate::fit::world::{Free, Parameter, Prior, Scanned};
 use kerrlight_common::toml_file;
 use kerrlight_render::dynamics::Velocity;
 use kerrlight_render::polarization::PolarizationLaw;
@@ -25,32 +25,14 @@ pub struct UnknownWorld {
     pub inclination_deg: Option<PriorSettings>,
     /// Prior of the position angle of the spin, degrees east of north, −360 to 360.
     pub position_angle_deg: Option<PriorSettings>,
-    /// Prior of the position of the hole on the screen, to the right (west), −1000 to 1000 M.
-    pub offset_x: Option<PriorSettings>,
-    /// The same upwards (north).
-    pub offset_y: Option<PriorSettings>,
-    /// Prior of the mass over `hole.mass_msun`, 0.001 to 1000: unit of time, and angular size.
-    pub mass_factor: Option<PriorSettings>,
-    /// Prior of the angular velocity over `motion.velocity`, −10 to 10.
-    pub rotation_factor: Option<PriorSettings>,
-    /// Prior of the power of g, −10 to 10; needs `effects.redshift_power`.
-    pub redshift_power: Option<PriorSettings>,
     /// Prior of ξ of `motion.velocity = { infall = … }`, 0 to 1.
     pub xi: Option<PriorSettings>,
     /// Prior of its β_r, 0 to 1.
     pub beta_r: Option<PriorSettings>,
     /// Prior of its β_φ, 0 to 1.
     pub beta_phi: Option<PriorSettings>,
-    /// Prior of Ω at each of the radii (6 at most) of `motion.velocity = { profile = … }` over that of the file,
-    /// 0.001 to 1000.
-    pub angular_factors: Option<PriorSettings>,
-    /// The same of dr/dt.
-    pub radial_factors: Option<PriorSettings>,
-    /// How many knots there are.
-    #[serde(skip)]
-    pub knots: usize,
-    /// Simulates a geometry drawn from the priors by the seed, for calibration: not mass and rotation factor. With
-    /// `screen.ring_rays`, along 16 times as many rays near the critical curve.
+    /// Simulates a geometry drawn from the priors by the seed, for calibration. With `screen.ring_rays`, along 16 times as
+    /// many rays near the critical curve.
     #[serde(default)]
     pub drawn: bool,
     /// How the parameters are searched for.
@@ -126,25 +108,14 @@ const MOST_SCANNED: usize = 3;
 const MOST_POINTS: usize = 100_000;
 
 impl UnknownWorld {
-    fn has(&self, knot: u8) -> bool {
-        usize::from(knot) < self.knots
-    }
-
     fn prior(&self, parameter: Parameter) -> Option<PriorSettings> {
         match parameter {
             Parameter::Spin => self.spin,
             Parameter::Inclination => self.inclination_deg,
             Parameter::PositionAngle => self.position_angle_deg,
-            Parameter::OffsetX => self.offset_x,
-            Parameter::OffsetY => self.offset_y,
-            Parameter::Mass => self.mass_factor,
-            Parameter::Rotation => self.rotation_factor,
-            Parameter::RedshiftPower => self.redshift_power,
             Parameter::Xi => self.xi,
             Parameter::BetaR => self.beta_r,
             Parameter::BetaPhi => self.beta_phi,
-            Parameter::Angular(knot) => self.angular_factors.filter(|_| self.has(knot)),
-            Parameter::Radial(knot) => self.radial_factors.filter(|_| self.has(knot)),
         }
     }
 
@@ -156,7 +127,7 @@ impl UnknownWorld {
         let given = Parameter::ALL.into_iter().filter_map(|p| Some((p, self.prior(p)?)));
         let free: Vec<Free> = given.map(|(p, prior)| free(p, prior)).collect::<Result<_, _>>()?;
         if free.is_empty() {
-            let names = parameter_keys().join(", ");
+            let names = Parameter::ALL.map(Parameter::name).join(", ");
             let why = format!(
                 "world.search looks for parameters with a prior, and there is none; give one of {names}"
             );
@@ -205,32 +176,23 @@ impl UnknownWorld {
         Ok(self.free()?.iter().map(&mut drawn).collect())
     }
 
-    /// What is drawn of the view, and is no setting: orientation on the sky and offsets, in the same units. None if nothing
-    /// is drawn.
-    pub(in crate::fit) fn drawn_view(&self, seed: u64) -> Result<Vec<(Parameter, f64)>, Error> {
-        let of_view = [Parameter::PositionAngle, Parameter::OffsetX, Parameter::OffsetY];
-        let mut all = if self.drawn { self.drawn_values(seed)? } else { Vec::new() };
-        all.retain(|(parameter, _)| of_view.contains(parameter));
-        Ok(all)
+    /// The orientation on the sky that is drawn and is no setting, radians. None if nothing is drawn.
+    pub(in crate::fit) fn drawn_view(&self, seed: u64) -> Result<Option<f64>, Error> {
+        let all = if self.drawn { self.drawn_values(seed)? } else { Vec::new() };
+        let of_view = all.iter().find(|(parameter, _)| *parameter == Parameter::PositionAngle);
+        Ok(of_view.map(|(_, value)| *value))
     }
 
-    /// Puts values drawn from the priors into settings; mass and rotation factor are no settings and stay what they are.
+    /// Puts values drawn from the priors into settings.
     pub(super) fn draw(&self, file: &mut FitFile) -> Result<(), Error> {
         for (parameter, value) in self.drawn_values(file.seed)? {
             let value = value / parameter.unit();
             match (parameter, &mut file.motion.velocity) {
                 (Parameter::Spin, _) => file.hole.spin = value,
                 (Parameter::Inclination, _) => file.observer.inclination_deg = value,
-                (Parameter::RedshiftPower, _) => file.effects.redshift_power = Some(value),
                 (Parameter::Xi, Velocity::Infall { xi, .. }) => *xi = value,
                 (Parameter::BetaR, Velocity::Infall { beta_r, .. }) => *beta_r = value,
                 (Parameter::BetaPhi, Velocity::Infall { beta_phi, .. }) => *beta_phi = value,
-                (Parameter::Angular(knot), Velocity::Profile { angular, .. }) => {
-                    angular[usize::from(knot)] *= value;
-                }
-                (Parameter::Radial(knot), Velocity::Profile { radial, .. }) => {
-                    radial[usize::from(knot)] *= value;
-                }
                 _ => {}
             }
         }
@@ -276,15 +238,9 @@ fn free(parameter: Parameter, settings: PriorSettings) -> Result<Free, Error> {
     Ok(Free { parameter, prior })
 }
 
-/// What settings call the parameters: those of all knots together have one prior.
-fn parameter_keys() -> Vec<&'static str> {
-    let single = Parameter::ALL.into_iter().filter(|parameter| !parameter.is_of_knots());
-    single.map(Parameter::name).chain(["angular_factors", "radial_factors"]).collect()
-}
-
 /// Refuses keys that are neither simulated nor parameters.
 fn check_keys(world: &Table) -> Result<(), Error> {
-    let names = parameter_keys();
+    let names = Parameter::ALL.map(Parameter::name);
     let known = || SIMULATED.iter().chain(&names).chain(&["search", "drawn"]);
     let Some(key) = world.keys().find(|key| !known().any(|name| name == key)) else {
         return Ok(());
@@ -306,8 +262,7 @@ impl FitFile {
         if table.is_empty() {
             return Ok(None);
         }
-        let mut world: UnknownWorld = toml_file::read_table(&table).within("world")?;
-        world.knots = self.knots_of(&world)?;
+        let world: UnknownWorld = toml_file::read_table(&table).within("world")?;
         world.check()?;
         let is_free = |parameter: &Parameter| world.prior(*parameter).is_some();
         let flow = Parameter::FLOW.into_iter().find(is_free);
@@ -319,12 +274,6 @@ impl FitFile {
                  is another law here",
                 parameter.name()
             );
-            return Err(FitError::Conflict(why).into());
-        }
-        if is_free(&Parameter::RedshiftPower) && self.effects.redshift_power.is_none() {
-            let why = "world.redshift_power: no data depend on it without effects.redshift_power, which lets emission \
-                       shift"
-                .to_owned();
             return Err(FitError::Conflict(why).into());
         }
         if world.search.finest.is_some() && !self.is_stepped() {
@@ -339,30 +288,6 @@ impl FitFile {
         let are_smooth = self.screen.ring_rays.is_some()
             || self.loss.iter().all(|loss| loss.data == LossKind::Image);
         are_smooth && self.is_convex() && self.change.is_none()
-    }
-
-    /// Knots of the profile that the factors of a world are those of.
-    fn knots_of(&self, world: &UnknownWorld) -> Result<usize, Error> {
-        let (turns, falls) = (world.angular_factors.is_some(), world.radial_factors.is_some());
-        let key = if turns { "angular_factors" } else { "radial_factors" };
-        let velocity = &self.motion.velocity;
-        let why = match velocity {
-            _ if !turns && !falls => return Ok(0),
-            Velocity::Profile { radii, .. } if radii.len() > KNOTS => {
-                let allowed = format!("{KNOTS} at most beside world.{key}");
-                let key = "length of motion.velocity.profile.radii";
-                return Err(FitError::range(key, radii.len(), &allowed).into());
-            }
-            Velocity::Profile { .. } if falls && !velocity.falls() => {
-                "world.radial_factors: motion.velocity.profile.radial is 0 everywhere, times any factor".to_owned()
-            }
-            Velocity::Profile { radii, .. } => return Ok(radii.len()),
-            _ => format!(
-                "world.{key} is for `velocity = {{ profile = {{ radii, angular, radial }} }}` in [motion], which is \
-                 another law here"
-            ),
-        };
-        Err(FitError::Conflict(why).into())
     }
 
     /// Where the flow follows the hole, it does so in the file as well: a simulation would have another flow otherwise.

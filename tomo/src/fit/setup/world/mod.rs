@@ -13,17 +13,15 @@ pub use search::{FoundWorld, SearchWatch, Trial, find_world};
 use super::instrument::ring;
 use super::{Instrument, Measured, Result, axis, drag, motion};
 use crate::fit::settings::{AxisSearch, FitError, FitFile, UnknownWorld};
-use crate::fit::world::{KNOTS, Law, Parameter, World, WorldModel};
-use crate::fit::{Motion, Redshift, Sampling};
+use crate::fit::world::{Law, Parameter, World, WorldModel};
+use crate::fit::{Motion, Sampling};
 use kerrlight_geodesic::Kerr;
 use kerrlight_render::dynamics::Velocity;
-use kerrlight_render::dynamics::infall::Profile;
 
 /// The world that the settings say, for parameters that are known, and for data that are simulated.
 pub fn known_world(file: &FitFile) -> World {
     let inclination = file.observer.inclination_deg.to_radians();
-    let power = file.effects.redshift_power.unwrap_or(0.0);
-    let world = World::new(file.hole.spin, inclination, power);
+    let world = World::new(file.hole.spin, inclination);
     let Velocity::Infall { xi, beta_r, beta_phi, .. } = file.motion.velocity else { return world };
     let flow = Parameter::FLOW.into_iter().zip([xi, beta_r, beta_phi]);
     flow.fold(world, |world, (parameter, value)| world.with(parameter, value))
@@ -36,39 +34,15 @@ pub fn known_world(file: &FitFile) -> World {
 pub fn true_world(file: &FitFile) -> Result<World> {
     let simulated = file.simulated()?;
     let (world, view) = (known_world(&simulated), drawn_view(file)?);
-    let world = relative(world, &simulated.motion.velocity, &file.motion.velocity);
-    Ok(view.into_iter().fold(world, |world, (parameter, value)| world.with(parameter, value)))
+    Ok(view.map_or(world, |angle| world.with(Parameter::PositionAngle, angle)))
 }
 
-/// With the factors by which a profile differs from the one that a fit knows.
-fn relative(world: World, truth: &Velocity, known: &Velocity) -> World {
-    let (
-        Velocity::Profile { radii, angular, radial },
-        Velocity::Profile { radii: known_radii, angular: known_angular, radial: known_radial },
-    ) = (truth, known)
-    else {
-        return world;
-    };
-    if radii != known_radii {
-        return world;
-    }
-    let pairs = |truth: &[f64], known: &[f64], of: fn(u8) -> Parameter| -> Vec<(Parameter, f64)> {
-        let ratios = truth.iter().zip(known).map(|(x, y)| if *y == 0.0 { 1.0 } else { x / y });
-        ratios.take(KNOTS).enumerate().map(|(k, ratio)| (of(k as u8), ratio)).collect()
-    };
-    let factors = [
-        pairs(angular, known_angular, Parameter::Angular),
-        pairs(radial, known_radial, Parameter::Radial),
-    ];
-    factors.concat().into_iter().fold(world, |world, (p, value)| world.with(p, value))
-}
-
-fn drawn_view(file: &FitFile) -> Result<Vec<(Parameter, f64)>> {
+fn drawn_view(file: &FitFile) -> Result<Option<f64>> {
     let view = file.unknown_world()?.map(|unknown| unknown.drawn_view(file.seed));
-    Ok(view.transpose()?.unwrap_or_default())
+    Ok(view.transpose()?.flatten())
 }
 
-/// What the settings of a simulation look through, turned and shifted as the world that is drawn says, with more rays near
+/// What the settings of a simulation look through, turned as the world that is drawn says, with more rays near
 /// the critical curve than a fit has.
 ///
 /// # Errors
@@ -117,13 +91,12 @@ fn through(
     rays: u64,
 ) -> Result<(Instrument, Motion)> {
     let model = model(file, unknown, instrument, plain)?.seen_along(rays);
-    let power = world.get(Parameter::RedshiftPower);
     let hole = Kerr::new(world.get(Parameter::Spin))?;
     let found = Instrument {
         pixels: instrument.pixels.clone(),
         hole,
         lines: model.sightlines(world)?,
-        redshift: instrument.redshift.map(|_| Redshift { power }),
+        redshift: instrument.redshift,
         polarized: model.polarized(world),
         seen: instrument.seen.clone(),
         quiescent: instrument.quiescent.clone(),
@@ -156,9 +129,6 @@ fn model(
         Velocity::Keplerian { .. } if follows => Law::CircularOrbits,
         Velocity::Infall { .. } if follows => Law::Infall(None),
         Velocity::Infall { drag: own, .. } => Law::Infall(Some(own.unwrap_or(drag(file)?))),
-        Velocity::Profile { ref radii, ref angular, ref radial } if unknown.knots > 0 => {
-            Law::Profile(Profile::new(radii.clone(), angular.clone(), radial.clone())?)
-        }
         _ => Law::Fixed(motion.velocity.clone()),
     };
     let [x, y] = instrument.pixels.clone();
@@ -172,7 +142,7 @@ fn model(
         order,
         split,
         slow_light: file.effects.slow_light,
-        redshift: instrument.redshift.is_some(),
+        redshift: instrument.redshift,
         law,
         axis: axis(file)?.0,
         motion: motion.clone(),
