@@ -68,7 +68,6 @@ mod progress;
 mod record;
 mod render;
 mod report;
-mod reproduce;
 mod session;
 pub mod threads;
 mod trace;
@@ -76,7 +75,6 @@ mod usage;
 mod uv;
 mod view;
 mod volume_files;
-mod zarr;
 
 pub use call::Call;
 pub use memory::Bounded;
@@ -86,10 +84,7 @@ pub use session::Said;
 use answer::{Answer, Form};
 use anyhow::{anyhow, bail};
 use clap::{FromArgMatches, Parser, Subcommand};
-use output::Output;
-use record::Recorder;
 use std::ffi::OsString;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Black holes: lensed images, simulated interferometry, 3D emission tomography
@@ -107,9 +102,6 @@ struct Arguments {
     /// Print the result as one JSON object
     #[arg(long, global = true)]
     json: bool,
-    /// Write a record: command, version, host, and checksums of all files that are read and written
-    #[arg(long, global = true, hide = true, value_name = "FILE.json")]
-    record: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -140,8 +132,6 @@ enum Verb {
     Compare(compare::Compare),
     /// Show what a file or the folder of a fit contains
     Inspect(inspect::Inspect),
-    /// Print the command that made a result, check its inputs
-    Reproduce(reproduce::Reproduce),
     /// List the graphics devices that can trace rays
     Devices(devices::Devices),
     /// Print a completion script for a shell
@@ -227,13 +217,7 @@ fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
         (false, true) => Form::Aside,
         (false, false) => Form::Text,
     };
-    let to = arguments.record.as_deref().map(|path| Output::new(path, "json")).transpose()?;
-    let Some(to) = to else { return arguments.verb.run(arguments, program)?.print(form) };
-    output::follow();
-    let recorder = Recorder::of_process();
-    let answer = arguments.verb.run(arguments, program)?;
-    recorder.write(&to)?;
-    answer.print(form)
+    arguments.verb.run(arguments, program)?.print(form)
 }
 
 impl Verb {
@@ -265,7 +249,6 @@ impl Verb {
             Verb::Posterior(posterior) => among_workers(|| posterior.run(&program.registry)),
             Verb::Compare(compare) => compare.run((arguments.threads, arguments.memory), program),
             Verb::Inspect(inspect) => inspect.run(),
-            Verb::Reproduce(reproduce) => reproduce.run(),
             Verb::Devices(devices) => devices.run(),
             Verb::Completions(completions) => completions.run(),
             Verb::Man(pages) => pages.run(),
