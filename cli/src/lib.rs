@@ -59,7 +59,6 @@ mod memory;
 mod movie;
 mod observe;
 mod output;
-mod overlay;
 mod paths;
 pub mod pictures;
 mod plain;
@@ -108,7 +107,7 @@ struct Arguments {
 enum Verb {
     /// Render a scene to EXR and PNG
     Render(render::Render),
-    /// Render a sequence of EXR frames, a GIF or an APNG
+    /// Render a sequence of EXR frames, or a GIF
     Movie(movie::Movie),
     /// Fly around a scene or a recovered volume in a browser
     View(view::View),
