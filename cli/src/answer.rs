@@ -53,16 +53,6 @@ impl Answer {
         Answer { text: Body::Text(text.into()), ..Self::default() }
     }
 
-    /// With more text below.
-    #[cfg(feature = "zarr")]
-    #[must_use]
-    pub fn and_text(mut self, more: &str) -> Self {
-        if let Body::Text(text) = &mut self.text {
-            text.push_str(more);
-        }
-        self
-    }
-
     /// Lines with their line ends that are printed as they are made, each with its entry of a list in the JSON object.
     pub fn lines_of(
         name: &'static str,

@@ -59,7 +59,6 @@ mod memory;
 mod movie;
 mod observe;
 mod output;
-mod overlay;
 mod paths;
 pub mod pictures;
 mod plain;
@@ -68,7 +67,6 @@ mod progress;
 mod record;
 mod render;
 mod report;
-mod reproduce;
 mod session;
 pub mod threads;
 mod trace;
@@ -76,7 +74,6 @@ mod usage;
 mod uv;
 mod view;
 mod volume_files;
-mod zarr;
 
 pub use call::Call;
 pub use memory::Bounded;
@@ -86,10 +83,7 @@ pub use session::Said;
 use answer::{Answer, Form};
 use anyhow::{anyhow, bail};
 use clap::{FromArgMatches, Parser, Subcommand};
-use output::Output;
-use record::Recorder;
 use std::ffi::OsString;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Black holes: lensed images, simulated interferometry, 3D emission tomography
@@ -107,16 +101,13 @@ struct Arguments {
     /// Print the result as one JSON object
     #[arg(long, global = true)]
     json: bool,
-    /// Write a record: command, version, host, and checksums of all files that are read and written
-    #[arg(long, global = true, hide = true, value_name = "FILE.json")]
-    record: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
 enum Verb {
     /// Render a scene to EXR and PNG
     Render(render::Render),
-    /// Render a sequence of EXR frames, a GIF or an APNG
+    /// Render a sequence of EXR frames, or a GIF
     Movie(movie::Movie),
     /// Fly around a scene or a recovered volume in a browser
     View(view::View),
@@ -140,8 +131,6 @@ enum Verb {
     Compare(compare::Compare),
     /// Show what a file or the folder of a fit contains
     Inspect(inspect::Inspect),
-    /// Print the command that made a result, check its inputs
-    Reproduce(reproduce::Reproduce),
     /// List the graphics devices that can trace rays
     Devices(devices::Devices),
     /// Print a completion script for a shell
@@ -227,13 +216,7 @@ fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
         (false, true) => Form::Aside,
         (false, false) => Form::Text,
     };
-    let to = arguments.record.as_deref().map(|path| Output::new(path, "json")).transpose()?;
-    let Some(to) = to else { return arguments.verb.run(arguments, program)?.print(form) };
-    output::follow();
-    let recorder = Recorder::of_process();
-    let answer = arguments.verb.run(arguments, program)?;
-    recorder.write(&to)?;
-    answer.print(form)
+    arguments.verb.run(arguments, program)?.print(form)
 }
 
 impl Verb {
@@ -265,7 +248,6 @@ impl Verb {
             Verb::Posterior(posterior) => among_workers(|| posterior.run(&program.registry)),
             Verb::Compare(compare) => compare.run((arguments.threads, arguments.memory), program),
             Verb::Inspect(inspect) => inspect.run(),
-            Verb::Reproduce(reproduce) => reproduce.run(),
             Verb::Devices(devices) => devices.run(),
             Verb::Completions(completions) => completions.run(),
             Verb::Man(pages) => pages.run(),

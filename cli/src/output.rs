@@ -1,7 +1,5 @@
 //! Files that appear whole or not at all.
 
-#[cfg(feature = "zarr")]
-pub mod folder;
 mod leftovers;
 mod standard;
 
@@ -14,7 +12,6 @@ use crate::plain;
 use anyhow::{Context, bail};
 use kerrlight_common::memory;
 use std::cell::RefCell;
-use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -174,7 +171,6 @@ impl Output {
         drop(buffer);
         file.as_file().sync_all().with_context(name)?;
         file.persist(&self.path).with_context(name)?;
-        note(&self.path, |followed| &mut followed.1);
         Ok(())
     }
 
@@ -240,32 +236,7 @@ fn open_any(path: &Path) -> anyhow::Result<File> {
     if !metadata.is_file() {
         bail!("{shown} is not a regular file");
     }
-    let file = File::open(path).with_context(|| format!("cannot read {shown}"))?;
-    note(path, |followed| &mut followed.0);
-    Ok(file)
-}
-
-/// Files that were read, and those that were written, since somebody wants to know.
-type Followed = (BTreeSet<PathBuf>, BTreeSet<PathBuf>);
-
-static FOLLOWED: Mutex<Option<Followed>> = Mutex::new(None);
-
-/// From now on, notes which files are read and written.
-pub fn follow() {
-    *FOLLOWED.lock().unwrap_or_else(PoisonError::into_inner) = Some(Followed::default());
-}
-
-/// The files that were read, and those that were written.
-pub fn followed() -> (Vec<PathBuf>, Vec<PathBuf>) {
-    let followed = FOLLOWED.lock().unwrap_or_else(PoisonError::into_inner);
-    let (read, written) = followed.clone().unwrap_or_default();
-    (read.into_iter().collect(), written.into_iter().collect())
-}
-
-fn note(path: &Path, which: impl Fn(&mut Followed) -> &mut BTreeSet<PathBuf>) {
-    if let Some(followed) = FOLLOWED.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
-        which(followed).insert(path.canonicalize().unwrap_or_else(|_| path.to_owned()));
-    }
+    File::open(path).with_context(|| format!("cannot read {shown}"))
 }
 
 /// The bytes of a file that is not empty, with an error that names it.

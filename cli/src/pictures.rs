@@ -56,7 +56,7 @@ impl Shot {
     pub fn new(text: Option<&str>, folder: &Path, overrides: &[String]) -> anyhow::Result<Self> {
         let name = if text.is_some() { "scene" } else { "built-in scene" }.to_owned();
         let text = text.unwrap_or(BUILT_IN).to_owned();
-        let source = Source { text, name, folder: folder.to_owned(), files: None, version: None };
+        let source = Source { text, name, folder: folder.to_owned(), files: None };
         let (text, scene) = source.scene(overrides)?;
         Ok(Shot { scene, source, text })
     }

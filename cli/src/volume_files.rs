@@ -1,6 +1,6 @@
-//! Volumes of emission in files: NPZ or NPY, by the name's ending, or a store of Zarr.
+//! Volumes of emission in files: NPZ or NPY, by the name's ending.
 
-use crate::{output, zarr};
+use crate::output;
 use anyhow::{Context, bail};
 use kerrlight_render::scene::VolumeSource;
 use kerrlight_render::volume::{VolumeArrays, VolumeFile};
@@ -11,7 +11,7 @@ fn decode(path: &Path, bytes: &[u8]) -> anyhow::Result<VolumeArrays> {
     match extension.to_ascii_lowercase().as_str() {
         "npy" => Ok(VolumeArrays::from_npy(bytes)?),
         "npz" => Ok(VolumeArrays::from_npz(bytes)?),
-        _ => bail!("a volume ends in .npz, .npy or .zarr"),
+        _ => bail!("a volume ends in .npz or .npy"),
     }
 }
 
@@ -21,16 +21,8 @@ pub fn read(
     source: &VolumeSource,
     read: impl Fn(&Path) -> anyhow::Result<Vec<u8>>,
 ) -> anyhow::Result<VolumeFile> {
-    if !zarr::is_store(path) {
-        let bytes = read(path)?;
-        let arrays = decode(path, &bytes).with_context(|| path.display().to_string())?;
-        return arrays.placed(source).with_context(|| path.display().to_string());
-    }
-    // For their sums; chunks are read when they are decoded.
-    for file in zarr::files(path)? {
-        read(&file)?;
-    }
-    zarr::volume(path)?.placed(source).with_context(|| path.display().to_string())
+    let name = || path.display().to_string();
+    decode(path, &read(path)?).with_context(name)?.placed(source).with_context(name)
 }
 
 /// Reads a volume that says itself where it is.
@@ -47,7 +39,7 @@ mod tests {
     #[test]
     fn exact_names_tell_the_format() {
         let error = decode(Path::new("v.txt"), &[]).unwrap_err();
-        assert_eq!(error.to_string(), "a volume ends in .npz, .npy or .zarr");
+        assert_eq!(error.to_string(), "a volume ends in .npz or .npy");
         assert!(decode(Path::new("v.NPZ"), b"PK").unwrap_err().to_string().contains("npz archive"));
     }
 }

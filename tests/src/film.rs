@@ -134,33 +134,6 @@ fn exact_refined_frames_are_renderings() {
     frames_are_renderings(SPOT, &refined);
 }
 
-/// The contact sheet is drawn from the same run and leaves EXR and PNG as they are; what cannot be
-/// drawn is refused before anything is rendered.
-#[test]
-fn exact_sheets_and_marks_of_renderings() {
-    let folder = folder();
-    let f = folder.path();
-    let read = |name: &str| std::fs::read(f.join(name)).unwrap();
-    let both = ["render", "spot.toml", "-o", "a.exr", "--preview", "a.png"];
-    succeed(f, &both);
-    let (exr, png) = (read("a.exr"), read("a.png"));
-    succeed(f, &[&both[..], &["--sheet", "sheet.png"]].concat());
-    assert!(read("a.exr") == exr && read("a.png") == png);
-    let with_exr = read("sheet.png");
-    assert!(with_exr.starts_with(b"\x89PNG"));
-    succeed(f, &["render", "spot.toml", "--sheet", "sheet.png"]);
-    assert!(read("sheet.png") == with_exr);
-    succeed(f, &[&both[..], &["--scale-bar", "--critical-curve"]].concat());
-    assert!(read("a.exr") == exr && read("a.png") != png);
-    let large = ["--set", "screen.width=8192", "--set", "screen.height=4096"];
-    let sheet = ["render", "spot.toml", "--sheet", "b.png"];
-    assert!(fail(f, &[&sheet[..], &large].concat()).contains("4096 x 4096"));
-    let message = fail(f, &["render", "spot.toml", "--preview", "b.png", "--ticks"]);
-    assert!(message.contains("no channels Q and U"), "{message}");
-    assert!(fail(f, &["render", "spot.toml", "-o", "b.exr", "--scale-bar"]).contains("--preview"));
-    assert!(fail(f, &[&MOVIE[..], &["--scale-bar"]].concat()).contains("--gif"));
-}
-
 /// A second run renders what is missing and nothing else; other settings are refused.
 #[test]
 fn exact_second_run_goes_on() {

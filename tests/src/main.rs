@@ -43,7 +43,6 @@ mod quiescent;
 mod radiative_transfer;
 mod readme;
 mod reference;
-mod reproduce;
 mod results;
 mod resume;
 mod resumed_fits;
@@ -61,5 +60,3 @@ mod unknown_world;
 mod verdict;
 mod view;
 mod view_input;
-#[cfg(feature = "zarr")]
-mod zarr;

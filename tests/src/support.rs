@@ -30,9 +30,6 @@ pub fn binary() -> &'static Path {
                 cargo.args(["--package", package, "--features", &format!("{package}/wgpu")]);
             }
         }
-        if cfg!(feature = "zarr") {
-            cargo.args(["--features", "kerrlight/zarr"]);
-        }
         if !cfg!(debug_assertions) {
             cargo.arg("--release");
         }

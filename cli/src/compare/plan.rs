@@ -78,11 +78,6 @@ impl Plan {
         Output::new(&folder.join(FILE), "")?.write(text.as_bytes())
     }
 
-    /// Version of the program that has begun it.
-    pub fn version(&self) -> &str {
-        &self.version
-    }
-
     /// Begun anew by this program.
     pub fn again(self) -> Self {
         Self { version: env!("CARGO_PKG_VERSION").to_owned(), ..self }

@@ -2,7 +2,7 @@
 
 use crate::interferometry::{self, arguments, movie_files};
 use crate::output;
-use crate::{paths, zarr};
+use crate::paths;
 use anyhow::{Context, bail};
 use kerrlight_common::frames::Frames;
 use kerrlight_common::numpy;
@@ -80,9 +80,6 @@ fn with_times(file: &FitFile, base_dir: &Path) -> anyhow::Result<FitFile> {
 
 /// The images of a file or of a sequence of files, none of which need to be in memory together, with width and height.
 fn images(file: &FitFile, path: &Path) -> anyhow::Result<WithSize> {
-    if zarr::is_store(path) {
-        return zarr::movie(path);
-    }
     let files = movie_files::files(path)?;
     if files.len() > 1 {
         return sequence(file, &files);

@@ -3,7 +3,6 @@
 use crate::checksum::Sum;
 use crate::file_sums::FileSums;
 use crate::output;
-use crate::record::Entry;
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -32,13 +31,6 @@ pub struct InputFile {
     path: PathBuf,
     #[serde(flatten)]
     sum: Sum,
-}
-
-impl InputFile {
-    fn fault(&self) -> Option<String> {
-        let entry = Entry { path: self.path.clone(), sum: self.sum.clone() };
-        entry.fault()
-    }
 }
 
 impl Inputs {
@@ -90,18 +82,6 @@ impl Inputs {
             );
         }
         Ok(())
-    }
-
-    /// What is wrong with the files and the settings of the run in a folder, whatever its version.
-    pub fn faults(&self, run: &Path) -> Vec<String> {
-        let settings = run.join(SETTINGS);
-        let mut faults: Vec<String> = self.files.iter().filter_map(InputFile::fault).collect();
-        match output::read(&settings) {
-            Ok(bytes) if Sum::of(&bytes) == self.settings => {}
-            Ok(_) => faults.push(format!("{} has changed", settings.display())),
-            Err(error) => faults.push(crate::plain::reasons(&error)),
-        }
-        faults
     }
 
     /// Refuses files that are not what they were.

@@ -127,7 +127,7 @@ mod tests {
             Scanned::even(Parameter::Inclination, [0.5f64.to_radians(), 1.0f64.to_radians()], 2),
         ];
         let world = |k: usize| {
-            let world = World::new(0.0, 0.0, 2.0);
+            let world = World::new(0.0, 0.0);
             let world = world.with(Parameter::Spin, over[0].values[k / 2]);
             world.with(Parameter::Inclination, over[1].values[k % 2])
         };

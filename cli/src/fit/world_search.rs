@@ -151,13 +151,11 @@ fn flow_error(file: &FitFile, worlds: [&World; 2]) -> anyhow::Result<Option<f64>
     let laws = worlds.map(|world| setup::motion(&settled(file, world), Vec::new()));
     let [found, truth] = laws;
     let (found, truth) = (found?.velocity, truth?.velocity);
-    let [by, of] = worlds.map(|world| world.get(Parameter::Rotation));
     let Region { r_min, r_max, .. } = file.region;
     let (mut away, mut all) = (0.0, 0.0);
     for k in 0..RADII {
         let r = r_min + (r_max - r_min) * (k as f64 + 0.5) / RADII as f64;
-        let [found, truth] = [(&found, by), (&truth, of)]
-            .map(|(law, factor)| [factor * law.fall(r), factor * r * law.rate(r)]);
+        let [found, truth] = [&found, &truth].map(|law| [law.fall(r), r * law.rate(r)]);
         away += (found[0] - truth[0]).powi(2) + (found[1] - truth[1]).powi(2);
         all += truth[0].powi(2) + truth[1].powi(2);
     }
@@ -251,7 +249,7 @@ mod tests {
         let prior = Prior::Uniform { low: -0.9, high: 0.9 };
         let free = [Free { parameter: Parameter::Spin, prior }];
         let trial = |spin: f64, value: f64| {
-            let end = World::new(spin, 1.0, 2.0);
+            let end = World::new(spin, 1.0);
             Trial { start: end, end, reduced_chi2: 1.0, value, worlds: 1, converged: true }
         };
         // Of 200 data, whose χ²/2 scatters by 10; the interval reaches 0.0196 to each side.

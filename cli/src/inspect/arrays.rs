@@ -79,13 +79,6 @@ impl Line {
         }
         Line { name: name.to_owned(), shape: shape.to_vec(), text, json }
     }
-
-    /// The same with more to say to programs.
-    #[cfg(feature = "zarr")]
-    pub fn with(mut self, key: &str, value: Value) -> Self {
-        self.json[key] = value;
-        self
-    }
 }
 
 /// What kerrlight takes an archive for.

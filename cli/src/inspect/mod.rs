@@ -2,13 +2,11 @@
 
 mod arrays;
 mod run_folder;
-#[cfg(feature = "zarr")]
-mod store;
 mod visibilities;
 
 use crate::answer::Answer;
 use crate::interferometry::plots::{self, PlotFile};
-use crate::{output, zarr};
+use crate::output;
 use anyhow::{Context, bail};
 use clap::Args;
 use kerrlight_render::image::exr::{self, Attributes, ChannelSurvey, Survey};
@@ -22,7 +20,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 pub struct Inspect {
     /// A picture (EXR), arrays (NPZ, NPY: movies, volumes, tables), visibilities (UVFITS, eht-imaging's
-    /// text, tables of the EHT or of kerrlight), a store of Zarr, or the folder of a fit
+    /// text, tables of the EHT or of kerrlight), or the folder of a fit
     file: PathBuf,
     /// Of visibilities: where to draw amplitudes against baselines
     #[arg(long, value_name = "FILE.png|.svg")]
@@ -40,7 +38,7 @@ impl Inspect {
         };
         if self.file.is_dir() {
             refuse_plot("a folder")?;
-            return self.folder();
+            return run_folder::describe(&self.file);
         }
         let start = first_bytes(&self.file)?;
         if start.starts_with(&EXR_MAGIC) {
@@ -60,24 +58,6 @@ impl Inspect {
         plot.spares(&self.file)?;
         plot.write(plots::amplitudes(&observation, &observation.source))?;
         Ok(answer.outputs([plot.output()]))
-    }
-}
-
-impl Inspect {
-    #[cfg(feature = "zarr")]
-    fn folder(&self) -> anyhow::Result<Answer> {
-        if !zarr::is_store(&self.file) {
-            return run_folder::describe(&self.file);
-        }
-        store::describe(&self.file).with_context(|| self.file.display().to_string())
-    }
-
-    #[cfg(not(feature = "zarr"))]
-    fn folder(&self) -> anyhow::Result<Answer> {
-        if !zarr::is_store(&self.file) {
-            return run_folder::describe(&self.file);
-        }
-        zarr::refuse(&self.file)
     }
 }
 

@@ -206,14 +206,6 @@ impl Sequence {
         Ok(decoded.with_context(|| path.display().to_string())?.0)
     }
 
-    /// An error if a file of its own would take the place of a frame.
-    pub fn avoid(&self, output: &Output) -> anyhow::Result<()> {
-        let frames = 0..self.plans.len();
-        frames
-            .flat_map(|k| ["exr", "png"].map(|extension| self.path(k, extension)))
-            .try_for_each(|frame| output.differs(&frame))
-    }
-
     /// Writes a batch of frames in some style, so many a second. What is scaled to Jy is scaled by the first frame's
     /// factor.
     pub fn write(

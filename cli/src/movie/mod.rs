@@ -9,7 +9,6 @@ use crate::answer::{self, Answer};
 use crate::assets::{self, Reach};
 use crate::devices::{self, DeviceOption};
 use crate::output::Output;
-use crate::overlay::OverlayOptions;
 use crate::render::exr_options::ExrOptions;
 use crate::render::preview::PreviewOptions;
 use crate::render::report;
@@ -54,8 +53,6 @@ pub struct Movie {
     viewing: viewing::Viewing,
     #[command(flatten)]
     look: PreviewOptions,
-    #[command(flatten)]
-    overlay: OverlayOptions,
 }
 
 /// Refuses frames that there is no memory for.
@@ -75,21 +72,18 @@ impl Movie {
         let plans = f64::from(self.frames.all) * (2 * text.len() + 4096) as f64;
         memory::afford(|| format!("the settings of {} frames", self.frames.all), plans)?;
         let times = self.span.times(self.frames.all, &scene)?;
-        let animations = self.viewing.outputs(self.frames.all)?;
+        let animations = self.viewing.outputs()?;
         let files = assets::load(&scene, &source.folder, &animations.files(), self.reach)?;
         animations.files().iter().try_for_each(|output| output.spares(&self.scene))?;
         let mut film = Film::new(&scene, files.decoded).with_context(|| source.name.clone())?;
         if animations.any() && !self.frames.are_all() {
             bail!(
-                "--gif, --apng and --png show the whole film: give them with --frames {}",
+                "--gif and --png show the whole film: give them with --frames {}",
                 self.frames.all
             );
         }
         if animations.any() {
             self.look.channels(&scene, &film.names())?;
-            self.overlay.check(&scene, &film.names())?;
-        } else if self.overlay.any() {
-            bail!("marks are drawn only into --gif, --apng or --png: give one of them");
         }
         if let Some(device) = self.device.open()? {
             film = film.with_device(device);
@@ -100,9 +94,6 @@ impl Movie {
         let mut sequence = Sequence::new(&self.output, &of, &times, &self.frames.part)?;
         for input in iter::once(&self.scene).chain(&files.paths) {
             sequence.spare(input)?;
-        }
-        for output in animations.files() {
-            sequence.avoid(output)?;
         }
         if !film.changes() && self.frames.all > 1 {
             eprintln!("warning: nothing in this scene moves: all frames are the same");
@@ -115,9 +106,7 @@ impl Movie {
         let style = (&self.exr, self.viewing.frames_per_second());
         let rendering = Rendering::new(&mut film, &mut sequence, &self.output, style);
         let rendered = rendering.run().with_context(|| source.name.clone())?;
-        animations.write(&sequence, self.look.look(&scene), |picture, look, white| {
-            self.overlay.draw(&scene, (picture, 1), look, white)
-        })?;
+        animations.write(&sequence, self.look.look(&scene))?;
         Ok(self.answer(&sequence, rendered, start.elapsed().as_secs_f64(), &animations.files()))
     }
 

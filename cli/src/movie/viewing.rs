@@ -6,8 +6,7 @@ use crate::progress;
 use anyhow::{Context, bail};
 use clap::Args;
 use image::RgbImage;
-use kerrlight_render::image::Picture;
-use kerrlight_render::image::animation::{Apng, Gif, Palette};
+use kerrlight_render::image::animation::{Gif, Palette};
 use kerrlight_render::image::preview::{self, Look};
 use std::path::PathBuf;
 
@@ -17,13 +16,10 @@ pub struct Viewing {
     /// Where to write a GIF: 256 colours, shown everywhere
     #[arg(long, value_name = "FILE.gif")]
     gif: Option<PathBuf>,
-    /// Where to write an animated PNG: all colours
-    #[arg(long, value_name = "FILE.png")]
-    apng: Option<PathBuf>,
     /// Write a PNG beside each EXR
     #[arg(long)]
     png: bool,
-    /// Frames per second of the GIF and the APNG, and in the headers of the EXR files
+    /// Frames per second of the GIF, and in the headers of the EXR files
     #[arg(long, value_name = "N", default_value = "25", value_parser = clap::value_parser!(u16).range(1..=50))]
     fps: u16,
     /// The value that is white in all pictures [default: the largest of all frames, but for 0.2 %
@@ -35,9 +31,7 @@ pub struct Viewing {
 /// The requested files, checked.
 pub struct Animations {
     gif: Option<Output>,
-    apng: Option<Output>,
     png: bool,
-    frames: u32,
     per_second: u16,
     white: Option<f32>,
 }
@@ -52,18 +46,13 @@ impl Viewing {
     }
 
     /// Checks where files are to go.
-    pub fn outputs(&self, frames: u32) -> anyhow::Result<Animations> {
-        let check = |path: &Option<PathBuf>, extension| {
-            path.as_deref().map(|path| Output::new(path, extension)).transpose()
-        };
+    pub fn outputs(&self) -> anyhow::Result<Animations> {
         if let Some(white) = self.white.filter(|white| !(white.is_finite() && *white > 0.0)) {
             bail!("--white {white} is not allowed: a finite number above 0");
         }
         Ok(Animations {
-            gif: check(&self.gif, "gif")?,
-            apng: check(&self.apng, "png")?,
+            gif: self.gif.as_deref().map(|path| Output::new(path, "gif")).transpose()?,
             png: self.png,
-            frames,
             per_second: self.fps,
             white: self.white,
         })
@@ -73,21 +62,16 @@ impl Viewing {
 impl Animations {
     /// The files of their own.
     pub fn files(&self) -> Vec<&Output> {
-        [&self.gif, &self.apng].into_iter().flatten().collect()
+        self.gif.iter().collect()
     }
 
     /// Whether any image or animation is to be made.
     pub fn any(&self) -> bool {
-        self.gif.is_some() || self.apng.is_some() || self.png
+        self.gif.is_some() || self.png
     }
 
     /// Draws all frames and writes the requested files.
-    pub fn write(
-        &self,
-        sequence: &Sequence,
-        look: Look,
-        draw: impl Fn(&Picture, Look, f32) -> anyhow::Result<RgbImage>,
-    ) -> anyhow::Result<()> {
+    pub fn write(&self, sequence: &Sequence, look: Look) -> anyhow::Result<()> {
         if !self.any() {
             return Ok(());
         }
@@ -95,26 +79,23 @@ impl Animations {
             Some(white) => white,
             None => common_white(sequence, look)?,
         };
-        let draw = |k: usize| draw(&sequence.read(k)?, look, white);
+        let draw = |k: usize| {
+            preview::draw(&sequence.read(k)?, look, white).context("cannot draw the frames")
+        };
         let first = draw(0)?;
         let size = [first.width(), first.height()];
-        let (mut gif_bytes, mut apng_bytes) = (Vec::new(), Vec::new());
+        let mut bytes = Vec::new();
         let mut gif = match &self.gif {
             Some(_) => {
                 let palette = palette(sequence.len(), draw)?;
-                Some(Gif::new(&mut gif_bytes, size, palette, self.per_second)?)
+                Some(Gif::new(&mut bytes, size, palette, self.per_second)?)
             }
-            None => None,
-        };
-        let mut apng = match &self.apng {
-            Some(_) => Some(Apng::new(&mut apng_bytes, size, self.frames, self.per_second)?),
             None => None,
         };
         let bar = progress::frames(sequence.len() as u64);
         for k in 0..sequence.len() {
             let drawn = draw(k)?;
             gif.as_mut().map(|film| film.push(&drawn)).transpose()?;
-            apng.as_mut().map(|film| film.push(&drawn)).transpose()?;
             if self.png {
                 let bytes = preview::encode(&drawn).context("cannot encode the PNG")?;
                 Output::new(&sequence.path(k, "png"), "png")?.write(&bytes)?;
@@ -123,13 +104,7 @@ impl Animations {
         }
         bar.finish_and_clear();
         drop(gif);
-        apng.map(Apng::finish).transpose()?;
-        for (output, bytes) in [(&self.gif, gif_bytes), (&self.apng, apng_bytes)] {
-            if let Some(output) = output {
-                output.write(&bytes)?;
-            }
-        }
-        Ok(())
+        self.gif.as_ref().map_or(Ok(()), |output| output.write(&bytes))
     }
 }
 

@@ -1,4 +1,4 @@
-//! What a scene calls for, what that is going to cost, and what it did cost.
+//! What a scene calls for, and what that is going to cost.
 
 use crate::answer::Answer;
 use kerrlight_render::Error;
@@ -63,16 +63,5 @@ fn trial(raster: &Raster) -> Result<(Meter, usize), Error> {
             return Ok((trial, rays));
         }
         rays *= 2;
-    }
-}
-
-/// Prints the measured cost of each part.
-pub fn after(meter: &Meter, rays: u64) {
-    let threads = rayon::current_num_threads() as f64;
-    eprintln!("measured:");
-    for part in Part::ALL {
-        let spent = meter.spent(part).as_secs_f64();
-        let each = spent / rays.max(1) as f64;
-        eprint!("{}", line(part, each, spent / threads));
     }
 }

@@ -12,16 +12,13 @@ use crate::answer::{self, Answer};
 use crate::assets::{self, Reach};
 use crate::devices::{self, DeviceOption};
 use crate::output::{self, Output};
-use crate::overlay::OverlayOptions;
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::Args;
 use exr_options::ExrOptions;
-use image::RgbImage;
 use kerrlight_common::memory;
 use kerrlight_render::image::Picture;
 use kerrlight_render::image::preview as drawing;
 use kerrlight_render::image::reduce::Reduction;
-use kerrlight_render::image::sheet::sheet;
 use kerrlight_render::picture::{Raster, Summary};
 use kerrlight_render::scene::Scene;
 use preview::PreviewOptions;
@@ -36,8 +33,8 @@ pub struct Render {
     /// Scene file (TOML), or an EXR that kerrlight rendered, to render it again; without it
     /// a built-in scene: Sgr A* with a flare and a disc
     scene: Option<PathBuf>,
-    /// Where to write the EXR, `-` for standard output [default, without --preview and --sheet either: EXR and PNG in
-    /// the current folder, named after the scene]
+    /// Where to write the EXR, `-` for standard output [default, without --preview either: EXR and PNG in the current
+    /// folder, named after the scene]
     #[arg(short, long, value_name = "FILE.exr")]
     output: Option<PathBuf>,
     /// Where to write a tone-mapped PNG, `-` for standard output
@@ -53,18 +50,10 @@ pub struct Render {
     image_error: Option<f64>,
     /// Print what is computed for this scene and what is not, with the estimated cost of each
     /// part, and render nothing
-    #[arg(long, visible_alias = "dry-run", conflicts_with = "measure")]
+    #[arg(long, visible_alias = "dry-run")]
     explain: bool,
-    /// Print the measured cost of each part after rendering
-    #[arg(long)]
-    measure: bool,
     #[command(flatten)]
     look: PreviewOptions,
-    #[command(flatten)]
-    overlay: OverlayOptions,
-    /// Where to write a contact sheet, a PNG of all channels with colour bars; `-` for standard output
-    #[arg(long, value_name = "FILE.png")]
-    sheet: Option<PathBuf>,
     #[command(flatten)]
     exr: ExrOptions,
     #[command(flatten)]
@@ -97,9 +86,6 @@ impl Render {
         if self.explain {
             return explain::before(&scene, &raster);
         }
-        if self.measure {
-            raster = raster.with_meter();
-        }
         if let Some(device) = raster.device() {
             devices::announce(device, &raster.beside_device());
         }
@@ -109,9 +95,6 @@ impl Render {
         let summary = self.render(&work, look, &outputs)?;
         let seconds = start.elapsed().as_secs_f64();
         report::warn(&scene, &summary);
-        if self.measure {
-            explain::after(&raster.meter(), summary.rays);
-        }
         let worth = report::worth(&scene, &summary, seconds);
         let files = answer::written(outputs.all());
         Ok(Answer::lines(&worth, &answer::listed(files.iter().copied()))
@@ -126,13 +109,12 @@ impl Render {
         look: Option<Reduction>,
         outputs: &Outputs,
     ) -> anyhow::Result<Summary> {
-        let reduced = look.as_ref().map_or(1, Reduction::factor);
         let (summary, picture) = match &outputs.exr {
             Some(exr) => work.exr(exr, &(work.raster.identity() + work.files), look)?,
             None => work.preview(look)?,
         };
-        if let Some(picture) = picture {
-            self.draw(work.scene, (&picture, reduced), outputs)?;
+        if let (Some(picture), Some(png)) = (picture, &outputs.png) {
+            self.draw(work.scene, &picture, png)?;
         }
         Ok(summary)
     }
@@ -143,56 +125,37 @@ impl Render {
         if let Some(input) = &self.scene {
             outputs.all().iter().try_for_each(|output| output.spares(input))?;
         }
-        if self.overlay.any() && outputs.png.is_none() {
-            bail!("marks are drawn only into the PNG: add --preview");
-        }
         outputs.differ()?;
         Ok(outputs)
     }
 
     /// Whether standard output carries one of the files.
     pub fn pipes(&self) -> bool {
-        let all = [&self.output, &self.preview, &self.sheet];
+        let all = [&self.output, &self.preview];
         all.into_iter().flatten().any(|path| output::is_pipe(path))
     }
 
-    /// What keeps the channels of the PNG and of the contact sheet, if there is one of them.
+    /// What keeps the channels of the PNG, if there is one.
     fn reduction(
         &self,
         scene: &Scene,
         raster: &Raster,
         outputs: &Outputs,
     ) -> anyhow::Result<Option<Reduction>> {
+        if outputs.png.is_none() {
+            return Ok(None);
+        }
         let names = raster.names();
-        let mut wanted = Vec::new();
-        if outputs.png.is_some() {
-            self.overlay.check(scene, &names)?;
-            wanted = self.look.channels(scene, &names)?;
-            wanted.extend(self.overlay.channels());
-        }
-        if outputs.sheet.is_some() {
-            preview::check_sheet(scene)?;
-            wanted.clone_from(&names);
-        }
-        Ok((!wanted.is_empty()).then(|| preview::reduction(scene, &names, &wanted)))
+        let wanted = self.look.channels(scene, &names)?;
+        Ok(Some(preview::reduction(scene, &names, &wanted)))
     }
 
-    /// Writes the preview images. A pixel of the picture may be the mean of several.
-    fn draw(
-        &self,
-        scene: &Scene,
-        (picture, reduced): (&Picture, usize),
-        outputs: &Outputs,
-    ) -> anyhow::Result<()> {
-        if let Some(png) = &outputs.png {
-            let look = self.look.look(scene);
-            let white = drawing::white(picture, look).context("cannot draw the picture")?;
-            write_png(png, &self.overlay.draw(scene, (picture, reduced), look, white)?)?;
-        }
-        if let Some(output) = &outputs.sheet {
-            write_png(output, &sheet(picture).context("cannot draw the sheet")?)?;
-        }
-        Ok(())
+    /// Writes the PNG.
+    fn draw(&self, scene: &Scene, picture: &Picture, png: &Output) -> anyhow::Result<()> {
+        let look = self.look.look(scene);
+        let white = drawing::white(picture, look).context("cannot draw the picture")?;
+        let drawn = drawing::draw(picture, look, white).context("cannot draw the picture")?;
+        png.write(&drawing::encode(&drawn).context("cannot encode the PNG")?)
     }
 
     fn all_overrides(&self) -> Vec<String> {
@@ -208,11 +171,10 @@ impl Render {
         let check = |path: &Option<PathBuf>, extension| {
             path.as_deref().map(|path| Output::or_pipe(path, &[extension])).transpose()
         };
-        if self.output.is_some() || self.preview.is_some() || self.sheet.is_some() {
+        if self.output.is_some() || self.preview.is_some() {
             return Ok(Outputs {
                 exr: check(&self.output, "exr")?,
                 png: check(&self.preview, "png")?,
-                sheet: check(&self.sheet, "png")?,
             });
         }
         let stem = match &self.scene {
@@ -222,7 +184,7 @@ impl Render {
         let stem = stem.unwrap_or_else(|| source.name.clone());
         let exr = PathBuf::from(format!("{stem}.exr"));
         let png = PathBuf::from(format!("{stem}.png"));
-        Ok(Outputs { exr: check(&Some(exr), "exr")?, png: check(&Some(png), "png")?, sheet: None })
+        Ok(Outputs { exr: check(&Some(exr), "exr")?, png: check(&Some(png), "png")? })
     }
 }
 
@@ -237,24 +199,18 @@ fn afford(scene: &Scene) -> anyhow::Result<()> {
 struct Outputs {
     exr: Option<Output>,
     png: Option<Output>,
-    sheet: Option<Output>,
 }
 
 impl Outputs {
     /// No two may be one file.
     fn differ(&self) -> anyhow::Result<()> {
-        let all = self.all();
-        for (k, one) in all.iter().enumerate() {
-            all[..k].iter().try_for_each(|other| one.differs(other.shown()))?;
+        match (&self.exr, &self.png) {
+            (Some(exr), Some(png)) => exr.differs(png.shown()),
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     fn all(&self) -> Vec<&Output> {
-        [&self.exr, &self.png, &self.sheet].into_iter().flatten().collect()
+        [&self.exr, &self.png].into_iter().flatten().collect()
     }
-}
-
-fn write_png(output: &Output, drawn: &RgbImage) -> anyhow::Result<()> {
-    output.write(&drawing::encode(drawn).context("cannot encode the PNG")?)
 }

@@ -90,17 +90,6 @@ pub fn reduction(scene: &Scene, names: &[&str], wanted: &[&str]) -> Reduction {
     reduction
 }
 
-/// Refuses a contact sheet of a picture that a PNG cannot show pixel by pixel.
-pub fn check_sheet(scene: &Scene) -> anyhow::Result<()> {
-    let (width, height) = (scene.screen.width, scene.screen.rows());
-    if u64::from(width) * u64::from(height) > MOST_PIXELS as u64 {
-        bail!(
-            "--sheet: {width} x {height} pixels are too many, at most {MOST_PIXELS} (4096 x 4096)"
-        );
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

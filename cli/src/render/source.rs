@@ -22,8 +22,6 @@ pub struct Source {
     pub folder: PathBuf,
     /// What tells the files that it named from others, where it comes from a picture.
     pub files: Option<String>,
-    /// Version of the program that has made that picture.
-    pub version: Option<String>,
 }
 
 impl Source {
@@ -31,7 +29,7 @@ impl Source {
     pub fn built_in() -> Self {
         let name = "built-in scene".to_owned();
         let (text, folder) = (BUILT_IN.to_owned(), PathBuf::from("."));
-        Source { text, name, folder, files: None, version: None }
+        Source { text, name, folder, files: None }
     }
 
     /// The scene of a file, or the built-in one.
@@ -44,16 +42,10 @@ impl Source {
         let folder = path.parent().unwrap_or(Path::new(".")).to_owned();
         let is_exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
         if !is_exr {
-            return Ok(Source {
-                text: output::read_text(path)?,
-                name,
-                folder,
-                files: None,
-                version: None,
-            });
+            return Ok(Source { text: output::read_text(path)?, name, folder, files: None });
         }
-        let (text, files, version) = scene_of_exr(path)?;
-        Ok(Source { text, name, folder, files, version })
+        let (text, files) = scene_of_exr(path)?;
+        Ok(Source { text, name, folder, files })
     }
 
     /// Warns where files that the scene of a picture names are not those that the picture was made of.
@@ -86,14 +78,13 @@ impl Source {
     }
 }
 
-/// The scene of a picture or of a film's frame, what tells the files that it named from others, and the version of the
-/// program.
-fn scene_of_exr(path: &Path) -> anyhow::Result<(String, Option<String>, Option<String>)> {
+/// The scene of a picture or of a film's frame, and what tells the files that it named from others.
+fn scene_of_exr(path: &Path) -> anyhow::Result<(String, Option<String>)> {
     let name = || path.display().to_string();
     let file = output::open(path)?;
     let attributes = exr::decode_attributes(file).with_context(name)?;
     let scene = attributes.get("scene").cloned();
     let scene = scene.with_context(|| format!("{} holds no scene of kerrlight", name()))?;
     let files = attributes.get("files").or(attributes.get("frame_files"));
-    Ok((scene, files.cloned(), attributes.get("version").cloned()))
+    Ok((scene, files.cloned()))
 }

@@ -3,8 +3,8 @@
 use super::Axis;
 use super::infall::{Falling, Origin, Profile};
 use crate::Error;
+use kerrlight_geodesic::Dual;
 use kerrlight_geodesic::vector::rotate;
-use kerrlight_geodesic::{Dual, Scalar};
 use std::sync::Arc;
 
 /// Angular velocity as a function of the (spherical) radius, in radians a unit of time; positive is
@@ -97,7 +97,7 @@ impl AngularVelocity {
             Self::Keplerian { drag } => 1.0 / (r.powf(1.5) + drag),
             Self::PowerLaw { radius, rate, exponent } => rate * (radius / r).powf(*exponent),
             Self::Table { .. } => self.interpolated(r).0,
-            Self::Profile(profile) => profile.rates(r, |x| x)[1],
+            Self::Profile(profile) => profile.rates(r)[1],
             Self::Falling(flow) => flow.rates(r)[1],
             Self::Scaled { of, factor } => factor * of.rate(r),
         }
@@ -111,7 +111,7 @@ impl AngularVelocity {
             Self::Table { .. } => self.interpolated(r).1,
             Self::Profile(profile) => {
                 let r = Dual::<f64, 1>::parameter(r, 0);
-                profile.rates(r, Dual::constant)[1].slope[0]
+                profile.rates(r)[1].slope[0]
             }
             Self::Falling(flow) => flow.slopes(r)[1].slope[0],
             Self::Scaled { of, factor } => factor * of.slope(r),

@@ -1,4 +1,4 @@
-//! Animations for a quick look: animated PNG and GIF.
+//! Animations for a quick look: GIF.
 
 use crate::Error;
 use color_quant::NeuQuant;
@@ -9,53 +9,12 @@ use std::collections::{BTreeSet, HashMap};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AnimationError {
-    /// The PNG encoder failed.
-    #[error(transparent)]
-    Png(#[from] png::EncodingError),
     /// The GIF encoder failed.
     #[error(transparent)]
     Gif(#[from] gif::EncodingError),
     /// A GIF has at most 65535 pixels a side.
     #[error("a GIF has at most 65535 pixels a side, these frames have {0} x {1}")]
     TooLarge(u32, u32),
-}
-
-/// An animated PNG in memory: all colours, but not shown by every viewer.
-pub struct Apng<'a>(png::Writer<&'a mut Vec<u8>>);
-
-impl<'a> Apng<'a> {
-    /// An animation of `frames` frames that repeats for ever.
-    ///
-    /// # Errors
-    /// If the encoder refuses the size.
-    pub fn new(
-        bytes: &'a mut Vec<u8>,
-        [width, height]: [u32; 2],
-        frames: u32,
-        per_second: u16,
-    ) -> Result<Self, Error> {
-        let mut encoder = png::Encoder::new(bytes, width, height);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_animated(frames, 0).map_err(AnimationError::from)?;
-        encoder.set_frame_delay(1, per_second).map_err(AnimationError::from)?;
-        Ok(Apng(encoder.write_header().map_err(AnimationError::from)?))
-    }
-
-    /// Appends a frame.
-    ///
-    /// # Errors
-    /// If it has another size, or is one too many.
-    pub fn push(&mut self, frame: &RgbImage) -> Result<(), Error> {
-        Ok(self.0.write_image_data(frame.as_raw()).map_err(AnimationError::from)?)
-    }
-
-    /// Ends the animation.
-    ///
-    /// # Errors
-    /// On a failure of the encoder.
-    pub fn finish(self) -> Result<(), Error> {
-        Ok(self.0.finish().map_err(AnimationError::from)?)
-    }
 }
 
 /// 256 colours for all frames of a GIF: a palette for each frame would flicker.
@@ -155,23 +114,6 @@ mod tests {
     fn frames() -> Vec<RgbImage> {
         let color = |x: u32, k: u8| image::Rgb([if x < 4 { 250 } else { 0 }, 10 * k, 7]);
         (0..3).map(|k| RgbImage::from_fn(8, 5, |x, _| color(x, k))).collect()
-    }
-
-    #[test]
-    fn exact_apng_frames() {
-        let mut bytes = Vec::new();
-        let mut film = Apng::new(&mut bytes, [8, 5], 3, 25).unwrap();
-        for frame in &frames() {
-            film.push(frame).unwrap();
-        }
-        film.finish().unwrap();
-        let mut reader = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
-        assert_eq!(reader.info().animation_control().unwrap().num_frames, 3);
-        let mut data = vec![0; 8 * 5 * 3];
-        for frame in &frames() {
-            reader.next_frame(&mut data).unwrap();
-            assert_eq!(&data, frame.as_raw());
-        }
     }
 
     #[test]

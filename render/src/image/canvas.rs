@@ -167,6 +167,22 @@ fn paint([r, g, b]: Rgb) -> Paint<'static> {
     paint
 }
 
+/// Three digits, and no exponent where it can be helped.
+pub fn digits(x: f64) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return format!("{x}");
+    }
+    let exponent = x.abs().log10().floor() as i32;
+    if !(-4..7).contains(&exponent) {
+        return format!("{x:.2e}");
+    }
+    let text = format!("{x:.*}", (2 - exponent).max(0) as usize);
+    if !text.contains('.') {
+        return text;
+    }
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -189,5 +205,13 @@ mod tests {
         let mut canvas = Canvas::of(&drawn).unwrap();
         canvas.label("beyond", [-20.0, 500.0], 12.0, Align::Left);
         assert_eq!(canvas.into_picture(), drawn);
+    }
+
+    #[test]
+    fn exact_three_digits() {
+        for (x, text) in [(5.0, "5"), (25.07, "25.1"), (1234.0, "1234"), (0.1, "0.1"), (0.0, "0")] {
+            assert_eq!(digits(x), text);
+        }
+        assert_eq!(digits(-2.5e-7), "-2.50e-7");
     }
 }

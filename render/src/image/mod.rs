@@ -5,11 +5,9 @@ pub mod canvas;
 pub mod colormap;
 pub(crate) mod decode;
 pub mod exr;
-pub mod overlay;
 pub mod preview;
 pub(crate) mod profile;
 pub mod reduce;
-pub mod sheet;
 pub mod ticks;
 
 /// A named channel, row by row from the top.

@@ -8,7 +8,6 @@ use super::tally::Tally;
 use super::workspace::Workspace;
 use super::{Progress, Raster, RenderError};
 use crate::Error;
-use crate::transport::Meter;
 use rayon::prelude::*;
 use std::iter::from_fn;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -94,9 +93,6 @@ impl Raster {
         let end = ((tile + 1) * self.tile).min(self.grid.width);
         let columns = tile * self.tile..end;
         let (prepared, grid, rows) = (&self.prepared, &self.grid, self.layout.rows(band));
-        if self.meter.is_some() {
-            work.scratch.meter = Meter::running();
-        }
         let pixels = match tolerance {
             Some(tolerance) => {
                 let rings = self.rings.as_ref();
@@ -105,9 +101,6 @@ impl Raster {
             }
             None => uniform((prepared, self.rings.as_ref()), grid, (rows, columns), times, work)?,
         };
-        if let Some(meter) = &self.meter {
-            meter.lock().unwrap_or_else(PoisonError::into_inner).add(&work.scratch.meter);
-        }
         Ok(pixels)
     }
 

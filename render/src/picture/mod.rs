@@ -37,7 +37,7 @@ use crate::transport::{Assets, Meter, PreparedScene, RayResult, Scratch, names};
 use grid::Grid;
 use kerrlight_geodesic::RayDevice;
 use rings::Resolver;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use tally::{Tally, own_unit};
 
 /// Told how many more rows of pixels are done; returns whether to go on.
@@ -91,8 +91,6 @@ pub struct Raster {
     unit: f64,
     /// Columns of a tile.
     tile: usize,
-    /// Where the time goes, if that is asked.
-    meter: Option<Mutex<Meter>>,
 }
 
 /// Rays of a block of a trial.
@@ -127,7 +125,7 @@ impl Raster {
         let layout = Layout::new(grid.width, grid.height, &names)?;
         let unit = if scene.screen.total_flux_jy.is_none() { own_unit(scene) } else { 1.0 };
         let scene = scene.clone();
-        Ok(Raster { scene, prepared, grid, rings, channels, layout, unit, tile: TILE, meter: None })
+        Ok(Raster { scene, prepared, grid, rings, channels, layout, unit, tile: TILE })
     }
 
     /// The same with tiles of `columns` pixels; no pixel depends on it.
@@ -150,17 +148,6 @@ impl Raster {
     /// What of the scene is traced on this processor even so.
     pub fn beside_device(&self) -> Vec<&'static str> {
         self.prepared.beside_device()
-    }
-
-    /// The same with a meter of the time that its parts take.
-    pub fn with_meter(self) -> Self {
-        Raster { meter: Some(Mutex::new(Meter::running())), ..self }
-    }
-
-    /// What the meter has read, over all threads; nothing without one.
-    pub fn meter(&self) -> Meter {
-        let read = |meter: &Mutex<Meter>| *meter.lock().unwrap_or_else(PoisonError::into_inner);
-        self.meter.as_ref().map(read).unwrap_or_default()
     }
 
     /// Time of all parts on one thread for `rays` rays spread over the picture.

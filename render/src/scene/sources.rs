@@ -202,7 +202,7 @@ pub enum MeshVelocity {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VolumeSource {
-    /// NPZ or NPY file, or a Zarr store.
+    /// NPZ or NPY file.
     pub path: String,
     /// Emissivity where the file has 1, intensity per M.
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "intensity per M"))]

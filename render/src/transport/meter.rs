@@ -23,11 +23,6 @@ impl Meter {
         self.spent[part as usize]
     }
 
-    /// Adds what another one has read.
-    pub fn add(&mut self, other: &Meter) {
-        self.spent.iter_mut().zip(other.spent).for_each(|(sum, spent)| *sum += spent);
-    }
-
     /// From now on time is spent on a part.
     #[inline]
     pub(super) fn switch(&mut self, part: Part) {

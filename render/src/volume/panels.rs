@@ -1,9 +1,8 @@
 //! Small pictures in rows, each with axes in M, and one colour scale for all of them.
 
 use super::Volume;
-use crate::image::canvas::{Align, BLACK, Canvas, Rgb, WHITE, text_width};
+use crate::image::canvas::{Align, BLACK, Canvas, Rgb, WHITE, digits, text_width};
 use crate::image::colormap::Colormap;
-use crate::image::overlay::digits;
 use image::RgbImage;
 
 /// A volume and what it is called on pictures.

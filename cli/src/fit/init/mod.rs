@@ -122,8 +122,7 @@ fn of_data(data: &Path, toml: &Path, model: Option<Model>) -> anyhow::Result<Str
     }
     let path = toml::Value::String(seen_from(toml, data)?).to_string();
     let extension = data.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    let is_sequence = data.is_dir() && !crate::zarr::is_store(data);
-    if is_sequence || matches!(extension.to_ascii_lowercase().as_str(), "npz" | "npy" | "exr") {
+    if data.is_dir() || matches!(extension.to_ascii_lowercase().as_str(), "npz" | "npy" | "exr") {
         return of_movie(&read_movie(data)?, &path);
     }
     let name = data.file_name().and_then(|name| name.to_str()).unwrap_or_default();

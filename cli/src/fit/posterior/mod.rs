@@ -179,7 +179,7 @@ fn add_up(
     let truth = prepared.measured.truth.as_ref();
     let truth = truth.map(|t| super::results::true_volume(&prepared.settings, t)).transpose()?;
     let found = summary::Summary::new(&prepared.settings, world.as_ref(), all, truth)?;
-    page::write(&found, prepared, (folder, path))?;
+    page::write(&found, prepared, path)?;
     let numbers = found.numbers();
     output::Output::new(&path.join(NUMBERS), "")?.write(sealed(numbers.clone()).as_bytes())?;
     let files = [PAGE, NUMBERS, "mean.npz", "deviation.npz"].map(|name| path.join(name));

@@ -1,7 +1,5 @@
 //! The page of a posterior, its volumes and tables.
 
-use super::super::folder::Folder;
-use super::super::results::stores;
 use super::PAGE;
 use super::predictive;
 use super::summary::{Interval, Summary};
@@ -13,13 +11,8 @@ use kerrlight_render::volume::{Shown, Volume, VolumeFile, vti};
 use kerrlight_tomo::recovery::Problem;
 use std::path::Path;
 
-/// Writes mean.npz, deviation.npz, posterior.vti, posterior.zarr, worlds.csv, triangle.svg and the page of draws about the
-/// run in `run`.
-pub fn write(
-    found: &Summary,
-    prepared: &Problem,
-    (run, folder): (&Folder, &Path),
-) -> anyhow::Result<()> {
+/// Writes mean.npz, deviation.npz, posterior.vti, worlds.csv, triangle.svg and the page of draws.
+pub fn write(found: &Summary, prepared: &Problem, folder: &Path) -> anyhow::Result<()> {
     let file = |name: &str| Output::new(&folder.join(name), "");
     let noise = found.ensemble.signal_to_noise()?;
     let mut volumes = vec![
@@ -36,7 +29,6 @@ pub fn write(
         volumes.into_iter().map(|(name, volume)| vti::Field { name, volume }).collect();
     let write = |out: &mut std::io::BufWriter<&std::fs::File>| Ok(vti::write(out, &fields)?);
     file("posterior.vti")?.write_with(write)?;
-    stores::write(run, &stores::of_draws(folder), &fields, None)?;
     let triangle = triangle(found);
     if let Some(triangle) = &triangle {
         file("worlds.csv")?.write(table(&found.world).as_bytes())?;

@@ -13,7 +13,6 @@ mod quadrature;
 mod quiescent;
 pub mod residuals;
 mod scene;
-pub mod stores;
 pub mod verdict;
 
 pub use kerrlight_tomo::recovery::{recovered, true_volume};
@@ -137,9 +136,7 @@ impl Estimate<'_> {
             fields.push(vti::Field { name: "truth", volume });
         }
         let write = |out: &mut std::io::BufWriter<&std::fs::File>| Ok(vti::write(out, &fields)?);
-        self.folder.file("volume.vti")?.write_with(write)?;
-        let axis = Some(state.now.axis.vector());
-        stores::write(self.folder, &stores::of_run(self.folder), &fields, axis)
+        self.folder.file("volume.vti")?.write_with(write)
     }
 
     fn movies(&self, movie: &Frames<f32>) -> anyhow::Result<()> {

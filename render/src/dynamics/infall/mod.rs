@@ -84,8 +84,6 @@ pub struct Family<N> {
     pub spin: N,
     /// Shares of circular motion and of free fall.
     pub mixture: Mixture<N>,
-    /// Factor of all rates.
-    pub factor: N,
 }
 
 impl Falling {
@@ -96,7 +94,7 @@ impl Falling {
     pub fn new(law: Law) -> Result<Self, Error> {
         let profile = match &law {
             Law::Family { spin, mixture } => {
-                return Family { spin: *spin, mixture: *mixture, factor: 1.0 }.falling(law);
+                return Family { spin: *spin, mixture: *mixture }.falling(law);
             }
             Law::Profile(profile) => profile,
         };
@@ -121,7 +119,7 @@ impl Falling {
     pub fn slopes(&self, r: f64) -> [Along<f64>; 2] {
         let r = Along::parameter(r, 0);
         let [fall, turn] = match (&self.law, &self.flow) {
-            (Law::Profile(profile), _) => profile.rates(r, Along::constant),
+            (Law::Profile(profile), _) => profile.rates(r),
             (Law::Family { .. }, Some(flow)) => flow.rates(outside(flow, r)),
             (Law::Family { .. }, None) => [Along::constant(0.0); 2],
         };
@@ -140,9 +138,9 @@ impl Falling {
         self.circular
     }
 
-    /// The table, with a factor on all angular velocities that may have derivatives.
-    pub fn lifted<N: Elementary>(&self, factor: N) -> Trajectory<N> {
-        self.table.lift(factor)
+    /// The table, of numbers that may have derivatives.
+    pub fn lifted<N: Elementary>(&self) -> Trajectory<N> {
+        self.table.lift(N::constant(1.0))
     }
 
     /// The table, number by number.
@@ -177,16 +175,12 @@ impl Falling {
 }
 
 /// dr/dt and Ω of the family.
-pub struct Flow<N> {
-    flow: Infall<N>,
-    factor: N,
-}
+pub struct Flow<N>(Infall<N>);
 
 impl<N: Elementary> Flow<N> {
     /// At a radius; next to the horizon, where it is not outside of it.
     pub fn rates(&self, r: N) -> [N; 2] {
-        let [fall, turn] = self.flow.rates(outside(&self.flow, r));
-        [fall, turn * self.factor]
+        self.0.rates(outside(&self.0, r))
     }
 }
 
@@ -208,7 +202,7 @@ impl<N: Elementary> Family<N> {
 
     /// Its dr/dt and Ω.
     pub fn flowing(&self) -> Result<Flow<N>, Error> {
-        Ok(Flow { flow: self.flow(|x| x)?, factor: self.factor })
+        Ok(Flow(self.flow(|x| x)?))
     }
 
     fn is_still(&self) -> bool {
@@ -220,7 +214,6 @@ impl<N: Elementary> Family<N> {
     pub fn trajectory(&self) -> Result<Trajectory<N>, Error> {
         let lift = |x: N| Along { value: x, slope: [N::constant(0.0)] };
         let (flow, s) = (self.flow(lift)?, |x: f64| Along::<N>::constant(x));
-        let factor = lift(self.factor);
         let (isco, horizon) = (flow.isco(), flow.hole().horizon());
         let gap = isco - horizon;
         // Of extremal holes there are no digits for what lies inside of the orbit.
@@ -229,11 +222,11 @@ impl<N: Elementary> Family<N> {
         let (half, flow) = (gap * s(0.5), &flow);
         let at = move |r: Along<N>| -> Point<Along<N>> {
             let [fall, turn] = flow.rates(r);
-            [r, fall, turn * factor]
+            [r, fall, turn]
         };
         let below = move |part: Along<N>| -> Point<Along<N>> {
             let [fall, turn] = flow.rates_below(part * half.sqrt());
-            [isco - half * part * part, fall, turn * factor]
+            [isco - half * part * part, fall, turn]
         };
         let far = move |part: Along<N>| at(isco + gap * (part - s(1.0)));
         let near = move |part: Along<N>| at(horizon + half * part);
@@ -272,13 +265,7 @@ impl Family<f64> {
     fn falling(self, law: Law) -> Result<Falling, Error> {
         let flow = self.flow(Along::constant)?;
         let circular = self.circular_from()?;
-        Ok(Falling {
-            law,
-            factor: self.factor,
-            table: self.trajectory()?,
-            flow: Some(flow),
-            circular,
-        })
+        Ok(Falling { law, factor: 1.0, table: self.trajectory()?, flow: Some(flow), circular })
     }
 }
 

@@ -7,13 +7,13 @@ use kerrlight_geodesic::Elementary;
 /// Inside of any horizon, M.
 const INNERMOST: f64 = 0.5;
 
-/// Ω(r) and dr/dt between knots, held beyond the first and the last. `N` is `f64`, or a number with derivatives.
+/// Ω(r) and dr/dt between knots, held beyond the first and the last.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Profile<N = f64> {
+pub struct Profile {
     radii: Vec<f64>,
     /// Values and slopes at the knots.
-    angular: [Vec<N>; 2],
-    radial: [Vec<N>; 2],
+    angular: [Vec<f64>; 2],
+    radial: [Vec<f64>; 2],
 }
 
 impl Profile {
@@ -51,37 +51,15 @@ impl Profile {
         !self.falls()
     }
 
-    /// How many knots there are.
-    pub fn knots(&self) -> usize {
-        self.radii.len()
-    }
-
-    /// The same with the values at each knot multiplied by factors, which may have derivatives.
-    pub fn times<N: Elementary>(&self, angular: &[N], radial: &[N]) -> Profile<N> {
-        let times = |values: &[f64], factors: &[N]| -> [Vec<N>; 2] {
-            let pairs = values.iter().zip(factors);
-            let values: Vec<N> = pairs.map(|(x, by)| *by * N::constant(*x)).collect();
-            let slopes = monotone_slopes(&self.radii, &values);
-            [values, slopes]
-        };
-        Profile {
-            radii: self.radii.clone(),
-            angular: times(&self.angular[0], angular),
-            radial: times(&self.radial[0], radial),
-        }
-    }
-}
-
-impl<N: Elementary> Profile<N> {
     /// Whether matter changes its radius.
     pub fn falls(&self) -> bool {
-        self.radial[0].iter().any(|v| v.value() != 0.0)
+        self.radial[0].iter().any(|v| *v != 0.0)
     }
 
-    /// dr/dt (dimensionless) and Ω (radians per M) at radius r (M), of numbers that `lift` makes of those at the knots.
-    pub fn rates<M: Elementary>(&self, r: M, lift: impl Fn(N) -> M + Copy) -> [M; 2] {
+    /// dr/dt (dimensionless) and Ω (radians per M) at radius r (M).
+    pub fn rates<N: Elementary>(&self, r: N) -> [N; 2] {
         let last = self.radii.len() - 1;
-        let constant = |k: usize| [lift(self.radial[0][k]), lift(self.angular[0][k])];
+        let constant = |k: usize| [self.radial[0][k], self.angular[0][k]].map(N::constant);
         if r.value() <= self.radii[0] {
             return constant(0);
         }
@@ -89,37 +67,29 @@ impl<N: Elementary> Profile<N> {
             return constant(last);
         }
         let k = self.radii.partition_point(|x| *x <= r.value()) - 1;
-        [&self.radial, &self.angular].map(|columns| self.cubic(columns, k, r, lift))
+        [&self.radial, &self.angular].map(|columns| self.cubic(columns, k, r))
     }
 
-    fn cubic<M: Elementary>(
-        &self,
-        [values, slopes]: &[Vec<N>; 2],
-        k: usize,
-        r: M,
-        lift: impl Fn(N) -> M,
-    ) -> M {
+    fn cubic<N: Elementary>(&self, [values, slopes]: &[Vec<f64>; 2], k: usize, r: N) -> N {
         let (width, s) = (self.radii[k + 1] - self.radii[k], N::constant);
-        let part = (r - M::constant(self.radii[k])) / M::constant(width);
-        let (rise, v0, v1) =
-            (values[k + 1] - values[k], s(width) * slopes[k], s(width) * slopes[k + 1]);
-        let [c, d] = [s(3.0) * rise - s(2.0) * v0 - v1, v0 + v1 - s(2.0) * rise];
-        lift(values[k]) + part * (lift(v0) + part * (lift(c) + part * lift(d)))
+        let part = (r - s(self.radii[k])) / s(width);
+        let (rise, v0, v1) = (values[k + 1] - values[k], width * slopes[k], width * slopes[k + 1]);
+        let [c, d] = [3.0 * rise - 2.0 * v0 - v1, v0 + v1 - 2.0 * rise];
+        s(values[k]) + part * (s(v0) + part * (s(c) + part * s(d)))
     }
 
     /// The fall from the farthest radius to inside of any horizon, or the rise from there.
-    pub fn trajectory(&self) -> Trajectory<N> {
-        let lift = |x: N| Along { value: x, slope: [N::constant(0.0)] };
-        let at = move |r: Along<N>| -> Point<Along<N>> {
-            let [fall, turn] = self.rates(r, lift);
+    pub fn trajectory(&self) -> Trajectory<f64> {
+        let at = move |r: Along<f64>| -> Point<Along<f64>> {
+            let [fall, turn] = self.rates(r);
             [r, fall, turn]
         };
         let inner = INNERMOST.min(0.5 * self.radii[0]);
         let knots = self.radii.iter().copied();
         let ends: Vec<f64> =
             core::iter::once(inner).chain(knots).chain([super::FARTHEST]).collect();
-        let falls = self.radial[0][0].value() < 0.0;
-        let mut ways: Vec<Way<'_, N>> = ends
+        let falls = self.radial[0][0] < 0.0;
+        let mut ways: Vec<Way<'_, f64>> = ends
             .windows(2)
             .map(|pair| {
                 let mut marks = super::geometric(pair[0], pair[1]);
@@ -138,19 +108,19 @@ impl<N: Elementary> Profile<N> {
 
 /// Slopes at knots: weighted harmonic means of those of both sides, 0 at extrema and at both ends, beyond
 /// which values are held.
-fn monotone_slopes<N: Elementary>(radii: &[f64], values: &[N]) -> Vec<N> {
-    let (s, width) = (N::constant, |k: usize| radii[k + 1] - radii[k]);
-    let secant = |k: usize| (values[k + 1] - values[k]) / s(width(k));
+fn monotone_slopes(radii: &[f64], values: &[f64]) -> Vec<f64> {
+    let width = |k: usize| radii[k + 1] - radii[k];
+    let secant = |k: usize| (values[k + 1] - values[k]) / width(k);
     let last = radii.len() - 1;
     let inner = |k: usize| {
         let (left, right) = (secant(k - 1), secant(k));
-        if left.value() * right.value() <= 0.0 {
-            return s(0.0);
+        if left * right <= 0.0 {
+            return 0.0;
         }
         let (a, b) = (2.0 * width(k) + width(k - 1), width(k) + 2.0 * width(k - 1));
-        s(a + b) / (s(a) / left + s(b) / right)
+        (a + b) / (a / left + b / right)
     };
-    let slope = |k: usize| if k == 0 || k == last { s(0.0) } else { inner(k) };
+    let slope = |k: usize| if k == 0 || k == last { 0.0 } else { inner(k) };
     (0..=last).map(slope).collect()
 }
 
@@ -164,11 +134,11 @@ mod tests {
         let straight = |f: fn(f64) -> f64| radii.iter().map(|r| f(*r)).collect::<Vec<f64>>();
         let lines =
             Profile::new(radii.clone(), straight(|r| 0.1 - 0.003 * r), straight(|r| -0.01 * r));
-        let [fall, turn] = lines.unwrap().rates(5.3, |x| x);
+        let [fall, turn] = lines.unwrap().rates(5.3);
         assert!((turn - (0.1 - 0.0159)).abs() < 1e-15 && (fall + 0.053).abs() < 1e-15);
         let steps = Profile::new(radii, vec![0.1, 0.1, 0.5, 0.5, 0.2], vec![0.0; 5]).unwrap();
         for k in 0..400 {
-            let [_, turn] = steps.rates(2.0 + 0.05 * f64::from(k), |x| x);
+            let [_, turn] = steps.rates(2.0 + 0.05 * f64::from(k));
             assert!((0.1..=0.5).contains(&turn), "{turn}");
         }
         assert!(steps.is_circular());

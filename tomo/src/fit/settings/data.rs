@@ -41,7 +41,7 @@ pub enum DataFiles {
     LightCurve(Box<MeasuredCurve>),
     /// A movie in Jy/pixel: .npz, .npy, .csv, .fits or .exr.
     Movie {
-        /// NPZ, NPY, CSV, FITS or EXR in Jy/pixel, a Zarr store, or a sequence: `frames/*.exr`, `f_%04d.exr`, a
+        /// NPZ, NPY, CSV, FITS or EXR in Jy/pixel, or a sequence: `frames/*.exr`, `f_%04d.exr`, a
         /// folder of EXR files.
         path: PathBuf,
         /// Time of the first image, M; the others follow at equal steps.

@@ -186,7 +186,6 @@ pub(super) fn key(parameter: Parameter) -> &'static str {
         Parameter::Xi => "motion.velocity.infall.xi",
         Parameter::BetaR => "motion.velocity.infall.beta_r",
         Parameter::BetaPhi => "motion.velocity.infall.beta_phi",
-        _ => parameter.name(),
     }
 }
 

@@ -67,7 +67,7 @@ mod tests {
 
     #[test]
     fn exact_a_flat_direction_has_the_spread_of_its_prior() {
-        let world = World::new(0.3, 1.0, 2.0);
+        let world = World::new(0.3, 1.0);
         // The inclination to 0.01 radians; χ² knows nothing of the spin, or has a ridge there.
         for of_spin in [0.0, -0.2] {
             let inclination = (0.2f64 / 0.01).powi(2) + (0.2 / 1f64.sin()).powi(2);
@@ -83,20 +83,20 @@ mod tests {
         }
     }
 
-    /// Spin and inclination that only together are known: each has the spread that the sum leaves it.
+    /// Spin and position angle that only together are known: each has the spread that the sum leaves it.
     #[test]
     fn exact_a_degenerate_pair_is_bounded_by_its_priors() {
         let uniform = |low, high| Prior::Uniform { low, high };
-        let parameters = [(Parameter::OffsetX, 3.0), (Parameter::OffsetY, 1.0)];
+        let parameters = [(Parameter::Spin, 0.9), (Parameter::PositionAngle, 0.3)];
         let free = parameters
             .map(|(parameter, half)| Free { parameter, prior: uniform(-half, half) })
             .to_vec();
-        let (a, b) = (3.0 / 3f64.sqrt(), 1.0 / 3f64.sqrt());
-        // (x + y)² / (2 · 0.02²), in units of scales of 0.5.
-        let k = (0.5f64 / 0.02).powi(2);
-        let bends = DMatrix::from_element(2, 2, k);
-        let found = covariance(&free, &World::new(0.0, 1.0, 2.0), &bends, 1.0).unwrap();
-        let [x, y] = [0, 1].map(|k| found[(k, k)].sqrt() * 0.5);
+        let (a, b) = (0.9 / 3f64.sqrt(), 0.3 / 3f64.sqrt());
+        // (x + y)² / (2 · 0.02²), in units of the scales.
+        let scale = [0, 1].map(|k| free[k].parameter.scale());
+        let bends = DMatrix::from_fn(2, 2, |i, j| scale[i] * scale[j] / 4e-4);
+        let found = covariance(&free, &World::new(0.0, 1.0), &bends, 1.0).unwrap();
+        let [x, y] = [0, 1].map(|k| found[(k, k)].sqrt() * scale[k]);
         // Both priors and the sum: 1/σ² = 1/a² + 1/(b² + 0.02²).
         let both =
             |own: f64, other: f64| (1.0 / (own.powi(-2) + 1.0 / (other.powi(2) + 4e-4))).sqrt();
@@ -106,6 +106,6 @@ mod tests {
     #[test]
     fn exact_second_derivatives_that_are_not_numbers_have_no_covariance() {
         let bends = DMatrix::from_element(2, 2, f64::NAN);
-        assert!(covariance(&free(), &World::new(0.0, 1.0, 2.0), &bends, 1.0).is_none());
+        assert!(covariance(&free(), &World::new(0.0, 1.0), &bends, 1.0).is_none());
     }
 }

@@ -1,7 +1,7 @@
 //! Derivatives of images and losses with respect to the world, for any representation.
 
 use super::fall::Falls;
-use super::{Number, Parameter, Tangents};
+use super::{Number, Tangents};
 use crate::fit::batch::Batch;
 use crate::fit::{Field, ForwardModel};
 use crate::representation::{Gradient, Workspace};
@@ -61,15 +61,14 @@ impl<T: Float> PointCotangents<T> {
         let falls = tangents.falls.as_ref().filter(|_| carried);
         let free = tangents.free.len();
         let mut sums = vec![0.0; free];
-        for (group, (_, frame)) in batch.pairs.iter().enumerate() {
+        for group in 0..batch.pairs.len() {
             sums.fill(0.0);
-            let time = model.times[*frame as usize].double();
             for point in batch.starts[group]..batch.starts[group + 1] {
                 match falls {
-                    None => self.point(model, batch, (point, time), tangents, &mut sums),
+                    None => self.point(model, batch, point, tangents, &mut sums),
                     Some(falls) => {
                         let falls = (falls, tangents);
-                        self.fallen(model, batch, (point, time), falls, &mut sums);
+                        self.fallen(model, batch, point, falls, &mut sums);
                     }
                 }
             }
@@ -87,7 +86,7 @@ impl<T: Float> PointCotangents<T> {
         &self,
         model: &ForwardModel<T>,
         batch: &Batch<T>,
-        (point, frame_time): (usize, f64),
+        point: usize,
         (falls, tangents): (&Falls, &Tangents),
         sums: &mut [f64],
     ) {
@@ -96,10 +95,6 @@ impl<T: Float> PointCotangents<T> {
         let mut elapsed = Number::constant(batch.columns.time[point].double());
         for (parameter, by) in tangents.free.iter().zip(moves) {
             elapsed.slope[parameter.index()] = by.time;
-        }
-        if let Some((_, mass)) = tangents.mass {
-            // Times go like 1/mass.
-            elapsed.slope[Parameter::Mass.index()] -= frame_time / mass;
         }
         let [stretch, angle] = falls.before(node, elapsed);
         let of_place = [0, 1, 2].map(|c| self.places[c][point].double());
@@ -120,7 +115,7 @@ impl<T: Float> PointCotangents<T> {
         &self,
         model: &ForwardModel<T>,
         batch: &Batch<T>,
-        (point, frame_time): (usize, f64),
+        point: usize,
         tangents: &Tangents,
         sums: &mut [f64],
     ) {
@@ -136,10 +131,6 @@ impl<T: Float> PointCotangents<T> {
             let [x, y, z] = by.position;
             *sum += of_place[0] * x + of_place[1] * y + of_place[2] * z;
             *sum += of_weight * by.weight + of_rate * by.rate + of_time * by.time;
-        }
-        if let Some((place, mass)) = tangents.mass {
-            // Times go like 1/mass.
-            sums[place] -= of_time * frame_time / mass;
         }
     }
 }

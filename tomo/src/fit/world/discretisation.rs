@@ -112,8 +112,7 @@ mod tests {
     use nalgebra::DMatrix;
 
     fn standing(excess: f64) -> Standing {
-        let best =
-            Estimate { world: World::new(0.3, 1.0, 2.0), x: Vec::new(), chi2: 0.0, value: 0.0 };
+        let best = Estimate { world: World::new(0.3, 1.0), x: Vec::new(), chi2: 0.0, value: 0.0 };
         let (slopes, bends) = (DVector::zeros(1), DMatrix::identity(1, 1));
         Standing { best, bowl: Bowl { slopes, bends, responses: Vec::new() }, excess }
     }

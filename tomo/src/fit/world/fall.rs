@@ -1,23 +1,20 @@
 //! How falling matter is carried along, for numbers that carry derivatives.
 
-use super::knots::at_knots;
 use super::{Law, Number, Parameter, World, WorldModel};
 use crate::Error;
 use kerrlight_geodesic::Scalar;
 use kerrlight_geodesic::infall::Mixture;
 use kerrlight_render::dynamics::AngularVelocity;
-use kerrlight_render::dynamics::infall::{Falling, Family, Flow, Profile, Trajectory};
+use kerrlight_render::dynamics::infall::{Falling, Family, Flow, Trajectory};
 
 /// dr/dt and Ω as functions of the radius.
 pub(super) enum Rates<'a> {
     /// Of matter that stays at its radius.
     Circular,
-    /// Of a flow that is the same in all worlds, but for a factor.
-    Fixed(&'a Falling, Number),
+    /// Of a flow that is the same in all worlds.
+    Fixed(&'a Falling),
     /// Of the family.
     Family(Box<Flow<Number>>),
-    /// Between knots.
-    Profile(Box<Profile<Number>>),
 }
 
 /// What of the flow the tangents of nodes take: rates, and the table of the fall.
@@ -32,12 +29,11 @@ impl<'a> Flowing<'a> {
     pub fn new(model: &'a WorldModel, world: &World) -> Result<Self, Error> {
         let numbers = world.numbers();
         let of = |parameter: Parameter| numbers[parameter.index()];
-        let factor = of(Parameter::Rotation);
         match &model.law {
             Law::Fixed(AngularVelocity::Falling(flow)) => Ok(Self {
-                table: Some(flow.lifted(factor)),
+                table: Some(flow.lifted()),
                 circular: flow.circular_from(),
-                rates: Rates::Fixed(flow, factor),
+                rates: Rates::Fixed(flow),
             }),
             Law::Infall(drag) => {
                 let along = Number::constant(model.axis.vector()[2]);
@@ -45,19 +41,11 @@ impl<'a> Flowing<'a> {
                     [Parameter::Xi, Parameter::BetaR, Parameter::BetaPhi].map(of);
                 let spin = drag.map_or(of(Parameter::Spin) * along, Number::constant);
                 let mixture = Mixture { xi, beta_r, beta_phi };
-                let family = Family { spin, mixture, factor };
+                let family = Family { spin, mixture };
                 Ok(Self {
                     table: Some(family.trajectory()?),
                     circular: family.circular_from()?,
                     rates: Rates::Family(Box::new(family.flowing()?)),
-                })
-            }
-            Law::Profile(profile) => {
-                let profile = Box::new(at_knots(profile, numbers, factor));
-                Ok(Self {
-                    table: profile.falls().then(|| profile.trajectory()),
-                    circular: f64::INFINITY,
-                    rates: Rates::Profile(profile),
                 })
             }
             _ => Ok(Self { rates: Rates::Circular, table: None, circular: 0.0 }),
@@ -68,23 +56,11 @@ impl<'a> Flowing<'a> {
     pub fn at(&self, r: Number) -> Option<[Number; 2]> {
         match &self.rates {
             Rates::Circular => None,
-            Rates::Fixed(flow, factor) => {
-                let [fall, turn] = flow.slopes(r.value).map(|rate| Number {
-                    value: rate.value,
-                    slope: r.slope.map(|slope| slope * rate.slope[0]),
-                });
-                Some([fall, turn * *factor])
-            }
+            Rates::Fixed(flow) => Some(flow.slopes(r.value).map(|rate| Number {
+                value: rate.value,
+                slope: r.slope.map(|slope| slope * rate.slope[0]),
+            })),
             Rates::Family(flow) => Some(flow.rates(r)),
-            Rates::Profile(profile) => profile.falls().then(|| profile.rates(r, |x| x)),
-        }
-    }
-
-    /// Ω at a radius of matter that stays there, where knots say it.
-    pub fn turning(&self, r: Number) -> Option<Number> {
-        match &self.rates {
-            Rates::Profile(profile) => Some(profile.rates(r, |x| x)[1]),
-            _ => None,
         }
     }
 

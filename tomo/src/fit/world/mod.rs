@@ -9,7 +9,6 @@ mod discretisation;
 mod envelope;
 mod explore;
 mod fall;
-mod knots;
 mod model;
 mod polish;
 mod prior;
@@ -51,73 +50,19 @@ pub enum Parameter {
     Inclination,
     /// Of the spin axis on the sky, radians east of north (anticlockwise on images with north up).
     PositionAngle,
-    /// Where the hole is on the screen, M of the reference mass to the right (west).
-    OffsetX,
-    /// The same, upwards (north).
-    OffsetY,
-    /// Mass over the reference mass, dimensionless: the unit of time, and the angular size at the same distance.
-    Mass,
-    /// Angular velocity over that of the law, dimensionless: below 1, sub-Keplerian.
-    Rotation,
-    /// Power of g that emission goes with, dimensionless: 2 + spectral index.
-    RedshiftPower,
     /// ξ of [`Law::Infall`]: specific angular momentum over that of circular geodesics, 0 to 1.
     Xi,
     /// β_r of the same: radial velocity from that of free fall, 0, to that of circular orbits, 1.
     BetaR,
     /// β_φ of the same: the same of the angular velocity.
     BetaPhi,
-    /// Ω at a knot of [`Law::Profile`], the first of which is 0 and the last below [`KNOTS`], over that of the profile,
-    /// dimensionless.
-    Angular(u8),
-    /// dr/dt at a knot of the same, over that of the profile.
-    Radial(u8),
 }
 
-/// Knots of a [`Law::Profile`], at most.
-pub const KNOTS: usize = 6;
-
 /// Number of parameters.
-pub const PARAMETERS: usize = 11 + 2 * KNOTS;
+pub const PARAMETERS: usize = 6;
 
 /// A number with its derivatives with respect to all parameters.
 pub(super) type Number = Dual<f64, PARAMETERS>;
-
-/// Names of the factors at the knots.
-const ANGULAR: [&str; KNOTS] = [
-    "angular_factor_0",
-    "angular_factor_1",
-    "angular_factor_2",
-    "angular_factor_3",
-    "angular_factor_4",
-    "angular_factor_5",
-];
-const RADIAL: [&str; KNOTS] = [
-    "radial_factor_0",
-    "radial_factor_1",
-    "radial_factor_2",
-    "radial_factor_3",
-    "radial_factor_4",
-    "radial_factor_5",
-];
-
-/// Their words in a sentence.
-const ANGULAR_LABELS: [&str; KNOTS] = [
-    "angular velocity at the first radius over the assumed one",
-    "angular velocity at the second radius over the assumed one",
-    "angular velocity at the third radius over the assumed one",
-    "angular velocity at the fourth radius over the assumed one",
-    "angular velocity at the fifth radius over the assumed one",
-    "angular velocity at the sixth radius over the assumed one",
-];
-const RADIAL_LABELS: [&str; KNOTS] = [
-    "radial velocity at the first radius over the assumed one",
-    "radial velocity at the second radius over the assumed one",
-    "radial velocity at the third radius over the assumed one",
-    "radial velocity at the fourth radius over the assumed one",
-    "radial velocity at the fifth radius over the assumed one",
-    "radial velocity at the sixth radius over the assumed one",
-];
 
 impl Parameter {
     /// All of them, in the order of [`World`].
@@ -125,26 +70,9 @@ impl Parameter {
         Parameter::Spin,
         Parameter::Inclination,
         Parameter::PositionAngle,
-        Parameter::OffsetX,
-        Parameter::OffsetY,
-        Parameter::Mass,
-        Parameter::Rotation,
-        Parameter::RedshiftPower,
         Parameter::Xi,
         Parameter::BetaR,
         Parameter::BetaPhi,
-        Parameter::Angular(0),
-        Parameter::Angular(1),
-        Parameter::Angular(2),
-        Parameter::Angular(3),
-        Parameter::Angular(4),
-        Parameter::Angular(5),
-        Parameter::Radial(0),
-        Parameter::Radial(1),
-        Parameter::Radial(2),
-        Parameter::Radial(3),
-        Parameter::Radial(4),
-        Parameter::Radial(5),
     ];
 
     /// Those of [`Law::Infall`] alone.
@@ -156,16 +84,9 @@ impl Parameter {
             Parameter::Spin => 0,
             Parameter::Inclination => 1,
             Parameter::PositionAngle => 2,
-            Parameter::OffsetX => 3,
-            Parameter::OffsetY => 4,
-            Parameter::Mass => 5,
-            Parameter::Rotation => 6,
-            Parameter::RedshiftPower => 7,
-            Parameter::Xi => 8,
-            Parameter::BetaR => 9,
-            Parameter::BetaPhi => 10,
-            Parameter::Angular(knot) => 11 + usize::from(knot),
-            Parameter::Radial(knot) => 11 + KNOTS + usize::from(knot),
+            Parameter::Xi => 3,
+            Parameter::BetaR => 4,
+            Parameter::BetaPhi => 5,
         }
     }
 
@@ -175,22 +96,10 @@ impl Parameter {
             Parameter::Spin => ("spin", ""),
             Parameter::Inclination => ("inclination", "°"),
             Parameter::PositionAngle => ("position angle of the spin", "°"),
-            Parameter::OffsetX => ("horizontal position of the hole", " M"),
-            Parameter::OffsetY => ("vertical position of the hole", " M"),
-            Parameter::Mass => ("mass over the assumed one", ""),
-            Parameter::Rotation => ("angular velocity over the assumed one", ""),
-            Parameter::RedshiftPower => ("power of the redshift factor", ""),
             Parameter::Xi => ("angular momentum over that of circular orbits", ""),
             Parameter::BetaR => ("part of the radial velocity that is not free fall", ""),
             Parameter::BetaPhi => ("part of the angular velocity that is not free fall", ""),
-            Parameter::Angular(knot) => (ANGULAR_LABELS[usize::from(knot)], ""),
-            Parameter::Radial(knot) => (RADIAL_LABELS[usize::from(knot)], ""),
         }
-    }
-
-    /// Whether it is a factor at a knot of [`Law::Profile`].
-    pub fn is_of_knots(self) -> bool {
-        matches!(self, Parameter::Angular(_) | Parameter::Radial(_))
     }
 
     /// What settings and results call it.
@@ -199,16 +108,9 @@ impl Parameter {
             Parameter::Spin => "spin",
             Parameter::Inclination => "inclination_deg",
             Parameter::PositionAngle => "position_angle_deg",
-            Parameter::OffsetX => "offset_x",
-            Parameter::OffsetY => "offset_y",
-            Parameter::Mass => "mass_factor",
-            Parameter::Rotation => "rotation_factor",
-            Parameter::RedshiftPower => "redshift_power",
             Parameter::Xi => "xi",
             Parameter::BetaR => "beta_r",
             Parameter::BetaPhi => "beta_phi",
-            Parameter::Angular(knot) => ANGULAR[usize::from(knot)],
-            Parameter::Radial(knot) => RADIAL[usize::from(knot)],
         }
     }
 
@@ -227,12 +129,7 @@ impl Parameter {
             Parameter::Spin => [-0.999, 0.999],
             Parameter::Inclination => [0.0, PI],
             Parameter::PositionAngle => [-TAU, TAU],
-            Parameter::OffsetX | Parameter::OffsetY => [-1e3, 1e3],
-            Parameter::Mass => [1e-3, 1e3],
-            Parameter::Rotation => [-10.0, 10.0],
-            Parameter::RedshiftPower => [-10.0, 10.0],
             Parameter::Xi | Parameter::BetaR | Parameter::BetaPhi => [0.0, 1.0],
-            Parameter::Angular(_) | Parameter::Radial(_) => [1e-3, 1e3],
         }
     }
 
@@ -249,13 +146,9 @@ impl Parameter {
         match self {
             Parameter::Spin => 0.3,
             Parameter::Inclination | Parameter::PositionAngle => 0.2,
-            Parameter::OffsetX | Parameter::OffsetY => 0.5,
-            Parameter::Mass | Parameter::Rotation | Parameter::Angular(_) => 0.1,
-            Parameter::RedshiftPower => 0.5,
             Parameter::Xi => 0.15,
             Parameter::BetaR => 0.05,
             Parameter::BetaPhi => 0.1,
-            Parameter::Radial(_) => 0.3,
         }
     }
 }
@@ -270,21 +163,9 @@ impl World {
         crate::fit::journal::bits(&self.0)
     }
 
-    /// A hole of the reference mass in the middle of the screen, its spin towards north, matter as fast as the law or the
-    /// profile, and on circular orbits where the law has three more parameters.
-    pub fn new(spin: f64, inclination: f64, redshift_power: f64) -> Self {
-        let mut world = World([1.0; PARAMETERS]);
-        for (parameter, value) in [
-            (Parameter::Spin, spin),
-            (Parameter::Inclination, inclination),
-            (Parameter::PositionAngle, 0.0),
-            (Parameter::OffsetX, 0.0),
-            (Parameter::OffsetY, 0.0),
-            (Parameter::RedshiftPower, redshift_power),
-        ] {
-            world = world.with(parameter, value);
-        }
-        world
+    /// A hole whose spin points towards north, with matter on circular orbits where the law has three more parameters.
+    pub fn new(spin: f64, inclination: f64) -> Self {
+        World([spin, inclination, 0.0, 1.0, 1.0, 1.0])
     }
 
     /// Of a parameter.
@@ -310,11 +191,7 @@ impl World {
                     Parameter::Spin => "-0.999 to 0.999",
                     Parameter::Inclination => "0 to pi radians",
                     Parameter::PositionAngle => "-2 pi to 2 pi radians",
-                    Parameter::OffsetX | Parameter::OffsetY => "-1000 to 1000 M",
-                    Parameter::Mass => "0.001 to 1000",
-                    Parameter::Rotation | Parameter::RedshiftPower => "-10 to 10",
                     Parameter::Xi | Parameter::BetaR | Parameter::BetaPhi => "0 to 1",
-                    Parameter::Angular(_) | Parameter::Radial(_) => "0.001 to 1000",
                 };
                 return Err(Error::out_of_range(parameter.name(), value, allowed));
             }

@@ -1,6 +1,5 @@
 //! From a world to the forward model of a fit.
 
-use super::knots::at_knots;
 use super::tangents::Tangents;
 use super::{Number, PARAMETERS, Parameter, World};
 use crate::Error;
@@ -14,12 +13,12 @@ use kerrlight_geodesic::infall::Mixture;
 use kerrlight_geodesic::node_gradients;
 use kerrlight_geodesic::simd::{NodeRequest, PanelRule};
 use kerrlight_geodesic::{Inclination, Kerr, Observer, Quantities};
-use kerrlight_render::dynamics::infall::{self, Falling, Profile};
+use kerrlight_render::dynamics::infall::{self, Falling};
 use kerrlight_render::dynamics::{AngularVelocity, Axis};
 use kerrlight_render::polarization::PolarizationLaw;
 use std::sync::Arc;
 
-/// How matter moves before [`Parameter::Rotation`] is applied.
+/// How matter moves.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Law {
     /// 1/(r^{3/2} + a): circular geodesics about whatever spin the hole has.
@@ -29,26 +28,15 @@ pub enum Law {
     /// The family between circular orbits and free fall that [`Parameter::Xi`], [`Parameter::BetaR`] and
     /// [`Parameter::BetaPhi`] say, about a spin (M) of the flow's own or, without one, that of each world along the axis.
     Infall(Option<f64>),
-    /// Ω and dr/dt at knots, each times its [`Parameter::Angular`] or [`Parameter::Radial`].
-    Profile(Profile),
 }
 
 impl Law {
     /// As it is in a world, about an axis.
     fn velocity(&self, world: &World, axis: Axis) -> Result<AngularVelocity, Error> {
-        let factor = world.get(Parameter::Rotation);
-        let law = match self {
-            Law::Infall(drag) => infall(*drag, world, axis)?,
-            Law::Profile(profile) => profiled(&at_knots(profile, world.0, 1.0))?,
-            _ => self.circular(world.get(Parameter::Spin) * axis.vector()[2]),
-        };
-        Ok(match law {
-            law if factor == 1.0 => law,
-            AngularVelocity::Falling(flow) => {
-                AngularVelocity::Falling(Arc::new(flow.scaled(factor)))
-            }
-            law => AngularVelocity::Scaled { of: Box::new(law), factor },
-        })
+        match self {
+            Law::Infall(drag) => infall(*drag, world, axis),
+            _ => Ok(self.circular(world.get(Parameter::Spin) * axis.vector()[2])),
+        }
     }
 
     fn circular(&self, spin: f64) -> AngularVelocity {
@@ -58,25 +46,15 @@ impl Law {
         }
     }
 
-    /// The angular velocity of matter that stays at its radius, with the derivatives that radius, spin (along the axis)
-    /// and factor have.
-    pub(super) fn rate(&self, r: Number, spin: Number, factor: Number) -> Number {
+    /// The angular velocity of matter that stays at its radius, with the derivatives that radius and spin (along the
+    /// axis) have.
+    pub(super) fn rate(&self, r: Number, spin: Number) -> Number {
         let law = self.circular(spin.value);
         let (rate, slope) = (law.rate(r.value), law.slope(r.value));
         let by_spin = if *self == Law::CircularOrbits { -rate * rate } else { 0.0 };
         let bend = core::array::from_fn(|k| slope * r.slope[k] + by_spin * spin.slope[k]);
-        factor * Number { value: rate, slope: bend }
+        Number { value: rate, slope: bend }
     }
-}
-
-fn profiled(profile: &Profile) -> Result<AngularVelocity, Error> {
-    Ok(match profile.is_circular() {
-        true => AngularVelocity::Profile(profile.clone()),
-        false => {
-            let law = infall::Law::Profile(profile.clone());
-            AngularVelocity::Falling(Arc::new(Falling::new(law)?))
-        }
-    })
 }
 
 /// The family's flow in a world.
@@ -90,7 +68,7 @@ fn infall(drag: Option<f64>, world: &World, axis: Axis) -> Result<AngularVelocit
 /// What all worlds share: the screen, where emission is looked for, the law of motion and the frames.
 #[derive(Clone, Debug)]
 pub struct WorldModel {
-    /// Where the pixels are, M of the reference mass to the right of the middle of the screen.
+    /// Where the pixels are, M to the right of the middle of the screen.
     pub x: Vec<f64>,
     /// The same, upwards.
     pub y: Vec<f64>,
@@ -108,13 +86,13 @@ pub struct WorldModel {
     pub split: u32,
     /// Whether light takes its time.
     pub slow_light: bool,
-    /// Whether emission goes like a power of g.
-    pub redshift: bool,
+    /// The power of g that emission goes like; none without redshift.
+    pub redshift: Option<Redshift>,
     /// How fast matter turns.
     pub law: Law,
     /// What it turns about.
     pub axis: Axis,
-    /// Times of the frames in M of the reference mass, and when emission is what a representation says; its velocity
+    /// Times of the frames, M, and when emission is what a representation says; its velocity
     /// is not used.
     pub motion: Motion,
     /// Jy in a pixel of a ray with 1 M of emission 1.
@@ -139,7 +117,7 @@ impl WorldModel {
             region: self.region,
             sampling: Sampling::Gauss { order: self.order, split: self.split },
             delay: self.slow_light,
-            momentum: self.redshift || self.polarization.is_some(),
+            momentum: self.redshift.is_some() || self.polarization.is_some(),
         };
         let (rays, numbers) = (self.rays(world, (&hole, &observer)), world.numbers());
         let screen = |place| self.place(&numbers, place).map(|number| number.value);
@@ -193,10 +171,8 @@ impl WorldModel {
         lines: &Sightlines,
     ) -> Result<ForwardModel<T>, Error> {
         let (hole, _) = self.observed(world)?;
-        let power = world.get(Parameter::RedshiftPower);
-        let redshift = self.redshift.then_some(Redshift { power });
         let motion = self.motion_of(world)?;
-        let model = ForwardModel::new(lines, &motion, &hole, redshift)?;
+        let model = ForwardModel::new(lines, &motion, &hole, self.redshift)?;
         let view = self.polarized(world);
         let factors = view.map(|view| view.factors(lines, &hole, &motion.velocity)).transpose()?;
         let mut model = model.seen(factors.as_deref(), &self.seen)?;
@@ -239,19 +215,12 @@ impl WorldModel {
         Self { ring: self.ring.map(shifted), ..self.clone() }
     }
 
-    /// How matter moves in a world, and the times of its frames in that world's M.
+    /// How matter moves in a world.
     ///
     /// # Errors
     /// If a parameter of the flow is out of its range.
     pub fn motion_of(&self, world: &World) -> Result<Motion, Error> {
-        let mass = world.get(Parameter::Mass);
-        let reference = self.motion.reference;
-        let since = |time: &f64| reference + (time - reference) / mass;
-        Ok(Motion {
-            velocity: self.law.velocity(world, self.axis)?,
-            times: self.motion.times.iter().map(since).collect(),
-            ..self.motion.clone()
-        })
+        Ok(Motion { velocity: self.law.velocity(world, self.axis)?, ..self.motion.clone() })
     }
 
     /// Which pixels are nearer to the critical curve of a world than a limit, M.
@@ -286,9 +255,7 @@ impl WorldModel {
         use kerrlight_geodesic::{Elementary, Scalar};
         let of = |parameter: Parameter| numbers[parameter.index()];
         let (sin, cos) = of(Parameter::PositionAngle).sin_cos();
-        let x = Number::constant(place[0]) - of(Parameter::OffsetX);
-        let y = Number::constant(place[1]) - of(Parameter::OffsetY);
-        let mass = of(Parameter::Mass);
-        [(x * cos + y * sin) / mass, (y * cos - x * sin) / mass]
+        let [x, y] = place.map(Number::constant);
+        [x * cos + y * sin, y * cos - x * sin]
     }
 }

@@ -152,13 +152,13 @@ mod tests {
         let over = vec![
             Scanned::even(Parameter::Spin, [-0.5, 0.5], 3),
             Scanned::even(Parameter::Inclination, [0.2, 0.5], 4),
-            Scanned::even(Parameter::Mass, [0.9, 1.1], 2),
+            Scanned::even(Parameter::Xi, [0.5, 0.9], 2),
         ];
         assert!((over[1].step() - 0.1).abs() < 1e-12);
         let mut scan = WorldScan { over, points: Vec::new() };
         let value = |[a, b, c]: [usize; 3]| ((7 * a + 5 * b + 3 * c) % 11) as f64;
         let all = (0..24).map(|at| [at / 8, at / 2 % 4, at % 2]);
-        let world = World::new(0.0, 0.5, 2.0);
+        let world = World::new(0.0, 0.5);
         let point = |value| ScanPoint { world, value, reduced_chi2: 1.0 };
         scan.points = all.map(|places| point(value(places))).collect();
         let of_pair = scan.profile(&[0, 2]);

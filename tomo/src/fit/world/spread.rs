@@ -175,7 +175,7 @@ mod tests {
     #[test]
     fn exact_a_step_is_part_of_the_error() {
         let free = free();
-        let world = World::new(0.1, 1.0, 0.0);
+        let world = World::new(0.1, 1.0);
         let spread = Spread {
             world,
             sigma: vec![0.03, 0.02],
@@ -207,7 +207,7 @@ mod tests {
     #[test]
     fn exact_covariance_of_a_paraboloid() {
         let free = free();
-        let center = World::new(0.31, 1.02, 2.0);
+        let center = World::new(0.31, 1.02);
         // Inverse covariance.
         let (a, b, c) = (1.0 / 0.0025, 300.0, 1.0 / 0.0009);
         let value = |world: &World| {
@@ -239,7 +239,7 @@ mod tests {
         let free = free();
         let sample = |k: usize| {
             let (angle, r) = (2.4 * k as f64, 0.1 * ((k + 1) as f64 / 60.0).sqrt());
-            let world = World::new(0.31 + 4.0 * r * angle.cos(), 1.02 + r * angle.sin(), 2.0);
+            let world = World::new(0.31 + 4.0 * r * angle.cos(), 1.02 + r * angle.sin());
             let y = world.get(Parameter::Inclination) - 1.03;
             Sample { world, value: 0.5 * (y / 0.02).powi(2) }
         };

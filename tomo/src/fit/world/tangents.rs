@@ -4,8 +4,8 @@ use super::fall::{Fallen, Falls, Flowing};
 use super::redshift::Gas;
 use super::{Number, PARAMETERS, Parameter, World, WorldModel};
 use crate::Error;
-use crate::fit::Sightlines;
 use crate::fit::pixel_rays::PixelRays;
+use crate::fit::{Redshift, Sightlines};
 use kerrlight_geodesic::derivatives::Gradient;
 use kerrlight_geodesic::node_gradients::{DifferentiatedNode, DifferentiatedNodes};
 use kerrlight_geodesic::{Elementary, Scalar};
@@ -30,8 +30,6 @@ pub struct Tangents {
     pub free: Vec<Parameter>,
     /// Of node k with respect to parameter p: `moves[k * free.len() + p]`.
     pub(super) moves: Vec<Move>,
-    /// ln(mass) is by how much the frames' times shrink, if that is free.
-    pub(super) mass: Option<(usize, f64)>,
     /// How matter is carried along that changes its radius; the moves' rates are then not used.
     pub(super) falls: Option<Falls>,
 }
@@ -47,9 +45,7 @@ impl Tangents {
         let pixels = rays.starts.len() - 1;
         let limits = Some(model.region.radii());
         let mut lines = Sightlines { pixels, starts: vec![0], limits, ..Sightlines::default() };
-        let mass = free.iter().position(|parameter| *parameter == Parameter::Mass);
-        let mass = mass.map(|place| (place, world.get(Parameter::Mass)));
-        let mut tangents = Tangents { free: free.to_vec(), mass, ..Tangents::default() };
+        let mut tangents = Tangents { free: free.to_vec(), ..Tangents::default() };
         let (numbers, flow) = (world.numbers(), Flowing::new(model, world)?);
         let mut builder =
             Builder { model, flow, numbers, ray: [Number::constant(0.0); 2], jy: 0.0 };
@@ -90,7 +86,7 @@ impl Builder<'_> {
         if self.model.slow_light {
             lines.delay.push(node.value.delay - self.flight());
         }
-        if self.model.redshift {
+        if self.model.redshift.is_some() {
             let columns = lines.momentum.iter_mut().zip(node.value.momentum);
             columns.for_each(|(column, x)| column.push(x));
             lines.radial.push(node.value.radial);
@@ -122,18 +118,21 @@ impl Builder<'_> {
         let r = (x * x + y * y + z * z).sqrt();
         let spin = of(Parameter::Spin);
         let falling = self.flow.at(r);
-        let velocity = match falling.map(|[_, turn]| turn).or_else(|| self.flow.turning(r)) {
-            Some(turn) => turn,
+        let velocity = match falling {
+            Some([_, turn]) => turn,
             None => {
                 let along = Number::constant(self.model.axis.vector()[2]);
-                self.model.law.rate(r, spin * along, of(Parameter::Rotation))
+                self.model.law.rate(r, spin * along)
             }
         };
         let plain = self.number(at.weight, by.weight) * Number::constant(self.jy);
         let momentum = vector(at.momentum, by.momentum);
         let fall = falling.map(|[fall, _]| [fall, self.number(at.radial, by.radial)]);
         let gas = Gas { position, momentum, spin, velocity, fall };
-        let weight = if self.model.redshift { self.shifted(&gas, plain) } else { plain };
+        let weight = match self.model.redshift {
+            Some(Redshift { power }) => self.shifted(&gas, plain, power),
+            None => plain,
+        };
         let delay = self.number(at.delay, by.delay);
         let moves = core::array::from_fn(|k| Move {
             position: [0, 1, 2].map(|c| position[c].slope[k]),
@@ -145,10 +144,9 @@ impl Builder<'_> {
     }
 
     /// Weight times g^power: dark where the gas would be faster than light.
-    fn shifted(&self, gas: &Gas<Number>, plain: Number) -> Number {
-        let power = self.numbers[Parameter::RedshiftPower.index()];
+    fn shifted(&self, gas: &Gas<Number>, plain: Number, power: f64) -> Number {
         let Some(g) = gas.redshift(self.model.axis.vector()) else { return Number::constant(0.0) };
-        let exponent = power * g.ln();
+        let exponent = Number::constant(power) * g.ln();
         let value = exponent.value.exp();
         plain * Number { value, slope: exponent.slope.map(|slope| value * slope) }
     }

@@ -14,15 +14,14 @@ use super::instrument::ring;
 use super::{Instrument, Measured, Result, axis, motion};
 use crate::fit::settings::{AxisSearch, FitError, FitFile};
 use crate::fit::world::{Law, Parameter, World, WorldModel};
-use crate::fit::{Motion, Redshift, Sampling};
+use crate::fit::{Motion, Sampling};
 use kerrlight_geodesic::Kerr;
 use kerrlight_render::dynamics::Velocity;
 
 /// The geometry that the settings say, with the medians of priors in place of what is not known.
 pub fn known_world(file: &FitFile) -> World {
     let inclination = file.observer.inclination_deg.value().to_radians();
-    let power = file.effects.redshift_power.unwrap_or(0.0);
-    let world = World::new(file.hole.spin.value(), inclination, power)
+    let world = World::new(file.hole.spin.value(), inclination)
         .with(Parameter::PositionAngle, file.observer.position_angle_deg.value().to_radians());
     let Velocity::Infall { xi, beta_r, beta_phi, .. } = file.motion.law() else { return world };
     let flow = Parameter::FLOW.into_iter().zip([xi, beta_r, beta_phi]);
@@ -51,13 +50,12 @@ pub fn in_world(
 ) -> Result<(Instrument, Motion)> {
     let plain = motion(file, measured.times.clone())?;
     let model = model(file, instrument, &plain)?.seen_along(rays);
-    let power = world.get(Parameter::RedshiftPower);
     let hole = Kerr::new(world.get(Parameter::Spin))?;
     let found = Instrument {
         pixels: instrument.pixels.clone(),
         hole,
         lines: model.sightlines(world)?,
-        redshift: instrument.redshift.map(|_| Redshift { power }),
+        redshift: instrument.redshift,
         polarized: model.polarized(world),
         seen: instrument.seen.clone(),
         quiescent: instrument.quiescent.clone(),
@@ -96,7 +94,7 @@ fn model(file: &FitFile, instrument: &Instrument, motion: &Motion) -> Result<Wor
         order,
         split,
         slow_light: file.effects.slow_light,
-        redshift: instrument.redshift.is_some(),
+        redshift: instrument.redshift,
         law,
         axis: axis(file)?.0,
         motion: motion.clone(),

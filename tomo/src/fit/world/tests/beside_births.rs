@@ -1,16 +1,16 @@
-//! The flow of matter whose emission appears while it is seen.
+//! The view of matter whose emission appears while it is seen.
 
 use super::*;
 use crate::fit::linear::LinearProblem;
 use crate::representation::{Allowed, Knots};
 
-/// Two spots, one of which begins to shine half-way: the angular velocity is found where births are allowed. Without them
-/// no flow explains the images.
+/// Two spots, one of which begins to shine half-way: the inclination is found where births are allowed. Without them no view
+/// explains the images.
 #[test]
-fn exact_flow_is_found_beside_births() {
+fn exact_inclination_is_found_beside_births() {
     let (mut model, side) = (screen(16, 12), 16);
     model.slow_light = false;
-    let truth = World::new(0.3, 0.9, 2.0);
+    let truth = World::new(0.3, 0.9);
     let forward: ForwardModel<f32> = model.forward(&truth).unwrap();
     let opposite = |[x, y, z]: [f64; 3]| spot([-x, y, z]);
     let movies = [&spot as &(dyn Fn([f64; 3]) -> f64 + Sync), &opposite]
@@ -22,21 +22,21 @@ fn exact_flow_is_found_beside_births() {
     let count = movie.len() as f64;
     let term = ImageTerm::new(movie, side * side, sigma).unwrap();
     let terms = [Weighted { weight: count, term: &term as &dyn FrameTerm<f32> }];
-    let free =
-        [Free { parameter: Parameter::Rotation, prior: Prior::Uniform { low: 0.5, high: 1.5 } }];
+    let prior = Prior::Isotropic { low: 0.0, high: PI };
+    let free = [Free { parameter: Parameter::Inclination, prior }];
     let knots = Knots { first: 0.0, spacing: 10.0, count: 12, allowed: Allowed::Births };
     let within = Some(model.region);
     let change = Change { knots, weight: 0.01 * count, within, sharpen: None };
     let effort = Effort { nodes: 14, degree: Degree::Linear, patience: Patience::looking(60) };
     let steady = WorldProblem { known: truth, effort, ..of_hot_spot(&model, &free, &terms) };
-    let over = [Scanned::even(Parameter::Rotation, [0.8, 1.2], 5)];
+    let over = [Scanned::even(Parameter::Inclination, [0.5, 1.3], 5)];
     let how = Exploration { width: 1.0, worlds: 1, seed: 1 };
     let scan = |problem: &WorldProblem<'_, f32>| {
         let scan = problem.scan(&over, &how, &mut |_, _| true).unwrap().unwrap();
         *scan.best().unwrap()
     };
     let (born, carried) = (scan(&WorldProblem { change, ..steady }), scan(&steady));
-    assert!((born.world.get(Parameter::Rotation) - 1.0).abs() < 1e-9, "{:?}", born.world);
+    assert!((born.world.get(Parameter::Inclination) - 0.9).abs() < 1e-9, "{:?}", born.world);
     assert!(2.0 * born.value < carried.value, "{} {}", born.value, carried.value);
     // What births cost is no part of the residuals, which are those of images of the volume.
     let problem = WorldProblem { change, ..steady };

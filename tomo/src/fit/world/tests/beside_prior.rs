@@ -8,7 +8,7 @@ use crate::fit::linear::{GaussianField, Matern, Roughness, Voxels};
 #[test]
 fn exact_a_prior_of_voxels_is_part_of_the_value() {
     let (model, side) = (screen(20, 12), 20);
-    let truth = World::new(0.6, 1.05, 2.0);
+    let truth = World::new(0.6, 1.05);
     let forward: ForwardModel<f32> = model.forward(&truth).unwrap();
     let movie = forward.movie_of(model.axis, &spot, &mut Batch::default());
     let sigma = 2e-2 * movie.iter().fold(0.0f64, |most, x| most.max(*x));
