@@ -35,8 +35,28 @@ use std::path::{Path, PathBuf};
 pub fn explained(error: &ReadError) -> anyhow::Error {
     let text = error.to_string();
     let missing = text.split_once("missing field `").and_then(|(_, rest)| rest.split('`').next());
-    let advice = missing.map_or(String::new(), |missing| advice(missing, &error.key()));
+    let unknown = text.split_once("unknown field `").and_then(|(_, rest)| rest.split('`').next());
+    let advice = match (missing, unknown) {
+        (Some(missing), _) => advice(missing, &error.key()),
+        (_, Some(unknown)) if error.key().is_empty() => moved(unknown).to_owned(),
+        _ => String::new(),
+    };
     anyhow::anyhow!("{text}{advice}")
+}
+
+/// Where the keys of a table are that files do not have.
+fn moved(table: &str) -> &'static str {
+    match table {
+        "world" => {
+            "\na number that is not known has a prior in place of its value, such as `spin = { uniform = [0.0, 0.9] }` in \
+             [hole]; the search for it is [search], and what differs in a simulation stands in [simulation]"
+        }
+        "truth" | "observation" | "light_curve" | "movie" => {
+            "\nwhat is simulated stands in [simulation]: [simulation.truth], [simulation.movie], \
+             [simulation.observation], [simulation.light_curve]; times of images that are read stand in [data.movie]"
+        }
+        _ => "",
+    }
 }
 
 /// What to write for a key that is missing in a table; `loss.0` is one of the tables `loss`.
