@@ -226,40 +226,6 @@ fn exact_same_bytes_after_kills_of_an_unknown_world() {
     killed_fit(&words, &["training.steps=400"], 8);
 }
 
-/// Beside the grid over the inclination the position angle is searched for in each of its worlds.
-#[test]
-#[ignore = "long"]
-fn exact_a_scan_leaves_its_map() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("fit.toml"), settings(60)).unwrap();
-    let scanned = "observer.inclination_deg={scanned={from=30.0,to=90.0,points=5}}";
-    let told = succeed(
-        folder.path(),
-        &["fit", "fit.toml", "-o", "run", "--set", scanned, "--set", "search.coarse.worlds=24"],
-    );
-    assert!(!told.is_empty());
-    let world = read(&folder.path().join("run/world.json"));
-    assert_eq!((&world["scan"]["worlds"], &world["starts"]), (&Value::from(5), &Value::from(0)));
-    let table = std::fs::read_to_string(folder.path().join("run/world_scan.csv")).unwrap();
-    let rows: Vec<Vec<f64>> = table
-        .lines()
-        .skip(1)
-        .map(|row| row.split(',').map(|cell| cell.parse().unwrap()).collect())
-        .collect();
-    assert!(table.starts_with("inclination_deg,position_angle_deg,half_chi2,"), "{table}");
-    assert_eq!(
-        rows.iter().map(|row| row[0].round()).collect::<Vec<_>>(),
-        [30.0, 45.0, 60.0, 75.0, 90.0]
-    );
-    let best = rows.iter().min_by(|a, b| a[2].total_cmp(&b[2])).unwrap();
-    assert!(best[0].round() == 60.0 && best[1].abs() < 5.0, "{best:?}");
-    let page = std::fs::read_to_string(folder.path().join("run/report.html")).unwrap();
-    assert!(page.contains("on a grid of 5 worlds over inclination"));
-    assert!(
-        std::fs::read_to_string(folder.path().join("run/world_scan.svg")).unwrap().contains("<svg")
-    );
-}
-
 #[test]
 fn exact_impossible_priors_are_refused_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();
@@ -289,11 +255,6 @@ fn exact_impossible_priors_are_refused_before_anything_is_written() {
         ("axis={from={start=[0.0,0.0,1.0],rate=0.1,last_rate=0.1}}", "[axis.known]"),
         ("hole.spin={uniform=[0.0,0.5]}", "simulation.hole.spin is missing: hole.spin has a prior"),
         ("observer.inclination_deg=60.0 observer.position_angle_deg=0.0", "there is none"),
-        (
-            "observer.inclination_deg={scanned={from=40.0,to=80.0,points=1}}",
-            "observer.inclination_deg.scanned.points = 1 is not allowed: 2 to 1000",
-        ),
-        ("observer.inclination_deg={scanned={from=80.0,to=40.0,points=5}}", "high"),
         ("linear= representation.kind=grid training.start=drawn", "search: linear is missing"),
     ] {
         let mut words = vec!["fit", "fit.toml", "-o", "run"];

@@ -23,7 +23,6 @@ mod run;
 mod static_image;
 mod work;
 mod world_results;
-mod world_scan;
 mod world_search;
 
 use crate::answer::Answer;

@@ -1,6 +1,5 @@
 //! What is said of a world that was found: lines, sentences, and distances from a known one.
 
-use super::world_scan;
 use kerrlight_tomo::fit::verdict::EXCESS;
 use kerrlight_tomo::fit::world::Parameter;
 use serde_json::{Value, json};
@@ -30,20 +29,17 @@ pub fn lines(results: &Value) -> Vec<String> {
             }
         })
         .collect();
-    lines.extend(own(results).into_iter().map(|said| format!("world: {said}")));
+    lines.extend(own(results).into_iter().map(|said| format!("error: {said}")));
     lines.extend(small_residuals(results).map(|said| format!("note: {said}")));
     lines.extend(rival(results).map(|said| format!("note: {said}")));
     lines.extend(unfinished(results).map(|said| format!("note: {said}")));
     lines.extend(edges(results).into_iter().map(|said| format!("note: {said}")));
     lines.extend(unexplained(results).map(|said| format!("note: {said}")));
     let chi2 = reduced(results["chi2_per_datum"].as_f64().unwrap_or(f64::NAN));
-    lines.push(match results["scan"]["worlds"].as_u64() {
-        Some(worlds) => format!("world: a grid of {worlds} worlds was scanned; χ²/N = {chi2}"),
-        None => format!(
-            "world: {} of {} starts ended at the best one; χ²/N = {chi2}",
-            results["ended_at_the_best"], results["starts"],
-        ),
-    });
+    lines.push(format!(
+        "search: {} of {} starts ended at the best one; χ²/N = {chi2}",
+        results["ended_at_the_best"], results["starts"],
+    ));
     lines
 }
 
@@ -112,12 +108,10 @@ pub fn sentences(results: &Value) -> Vec<String> {
     all.extend(unfinished(results).map(|said| format!("Note that {said}.")));
     all.extend(edges(results).into_iter().map(|said| format!("Note that {said}.")));
     all.extend(unexplained(results).map(|said| format!("Note that {said}.")));
-    all.push(world_scan::sentence(&results["scan"]).unwrap_or_else(|| {
-        format!(
-            "The world was searched for from {} places; {} of the searches ended near the best one.",
-            results["starts"], results["ended_at_the_best"]
-        )
-    }));
+    all.push(format!(
+        "The geometry was searched for from {} places; {} of the searches ended near the best one.",
+        results["starts"], results["ended_at_the_best"]
+    ));
     all
 }
 

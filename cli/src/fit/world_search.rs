@@ -1,7 +1,7 @@
 //! A world that is not known: it is found before the emission is fitted in it.
 
 use super::folder::Folder;
-use super::{world_results, world_scan};
+use super::world_results;
 use crate::checksum::sealed;
 use crate::output;
 use anyhow::{Context, bail};
@@ -22,10 +22,6 @@ pub fn write(
     found: &FoundWorld,
 ) -> anyhow::Result<()> {
     let Problem { settings, measured, .. } = problem;
-    if let Some(scan) = &found.scan {
-        let truth = true_world(settings, measured)?;
-        world_scan::write(folder, scan, truth.as_ref())?;
-    }
     let results = results(settings, measured, unknown, found)?;
     folder.file(FILE)?.write(sealed(results).as_bytes())
 }
@@ -55,12 +51,8 @@ pub fn planned(file: &FitFile) -> anyhow::Result<u64> {
 /// Coarse searches, worlds of each, and worlds of the fine one.
 fn searches(file: &FitFile) -> anyhow::Result<[usize; 3]> {
     let Some(unknown) = file.unknown_world()? else { return Ok([0; 3]) };
-    let (search, scanned) = (&unknown.search, unknown.scanned());
-    let [count, each] = match scanned.is_empty() {
-        true => [search.starts, search.coarse.worlds],
-        false => [1, scanned.iter().map(|scanned| scanned.values.len()).product()],
-    };
-    Ok([count, each, search.fine.worlds])
+    let search = &unknown.search;
+    Ok([search.starts, search.coarse.worlds, search.fine.worlds])
 }
 
 /// Names and values of the free parameters of a world, in their units.
@@ -138,7 +130,6 @@ fn results(
         "starts": trials.len(),
         "ended_at_the_best": same,
         "trials": trials,
-        "scan": found.scan.as_ref().map(world_scan::json),
     }))
 }
 

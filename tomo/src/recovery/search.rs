@@ -153,7 +153,7 @@ pub(super) fn weighed_before_steps(
 /// The settings with what was found in place of priors.
 pub fn settled(file: &FitFile, world: &World) -> FitFile {
     let mut file = file.clone();
-    for (parameter, quantity) in file.quantities_mut() {
+    for (parameter, _, quantity) in file.quantities_mut() {
         if quantity.prior().is_some() {
             *quantity = (world.get(parameter) / parameter.unit()).into();
         }

@@ -11,7 +11,7 @@ use super::{Estimate, Found, bounds, quadrature};
 use crate::fit::SETTINGS;
 use crate::fit::curves::{loss_plot, psnr_plot};
 use crate::fit::folder::Folder;
-use crate::fit::{band_plots, band_search, band_words, held_out, world_results, world_scan};
+use crate::fit::{band_plots, band_search, band_words, held_out, world_results};
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
 use anyhow::Context;
@@ -62,7 +62,6 @@ impl Estimate<'_> {
             .collect(),
             view: Some(self.view(found)),
             figures: self.figures(found)?,
-            drawings: world_scan::drawing(self.folder)?.into_iter().collect(),
             plots,
             settings: settings(self.file, FitFile::keys(), self.folder)?
                 .into_iter()

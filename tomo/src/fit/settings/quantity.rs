@@ -31,26 +31,8 @@ pub enum PriorSettings {
         #[schemars(range(min = 0.0))]
         sigma: f64,
     },
-    /// A bell curve of the logarithm.
-    LogNormal {
-        /// The median, above 0.
-        median: f64,
-        /// Standard deviation of the logarithm, above 0.
-        #[schemars(range(min = 0.0, max = 1e3))]
-        sigma: f64,
-    },
     /// Of an inclination: any direction in space between two angles.
     Isotropic([f64; 2]),
-    /// The same everywhere from the first to the last value, and looked at on a grid.
-    Scanned {
-        /// First value.
-        from: f64,
-        /// Last value.
-        to: f64,
-        /// Values of the grid.
-        #[schemars(range(min = 2, max = 1000), extend("unit" = "values"))]
-        points: usize,
-    },
 }
 
 impl Quantity {
@@ -97,8 +79,6 @@ impl PriorSettings {
             Self::Normal { mean, sigma } => {
                 Prior::Normal { mean: mean * unit, sigma: sigma * unit }
             }
-            Self::LogNormal { median, sigma } => Prior::LogNormal { median: median * unit, sigma },
-            Self::Scanned { from, to, .. } => Prior::Uniform { low: from * unit, high: to * unit },
         }
     }
 

@@ -1,6 +1,7 @@
 //! The hole, the view of it, what happens to light, and how matter turns.
 
-use super::Quantity;
+use super::{FitFile, Quantity};
+use crate::fit::world::Parameter;
 use crate::fit::{Region as Limits, Sampling};
 use kerrlight_render::dynamics::Velocity;
 use kerrlight_vlbi::operator::Pulse;
@@ -202,5 +203,31 @@ impl Motion {
     /// The law of motion; of what is not known, with the median of its prior.
     pub fn law(&self) -> Velocity {
         self.velocity.clone().map(&|quantity: Quantity| quantity.value())
+    }
+}
+
+impl FitFile {
+    /// Numbers that may have a prior: their parameters, their keys, and themselves.
+    pub(crate) fn quantities_mut(&mut self) -> Vec<(Parameter, &'static str, &mut Quantity)> {
+        let Observer { inclination_deg, position_angle_deg, .. } = &mut self.observer;
+        let mut all = vec![
+            (Parameter::Spin, "hole.spin", &mut self.hole.spin),
+            (Parameter::Inclination, "observer.inclination_deg", inclination_deg),
+            (Parameter::PositionAngle, "observer.position_angle_deg", position_angle_deg),
+        ];
+        if let Velocity::Infall { xi, beta_r, beta_phi, .. } = &mut self.motion.velocity {
+            all.extend([
+                (Parameter::Xi, "motion.velocity.infall.xi", xi),
+                (Parameter::BetaR, "motion.velocity.infall.beta_r", beta_r),
+                (Parameter::BetaPhi, "motion.velocity.infall.beta_phi", beta_phi),
+            ]);
+        }
+        all
+    }
+
+    /// The same as they are.
+    pub(super) fn quantities(&self) -> Vec<(Parameter, &'static str, Quantity)> {
+        let mut file = self.clone();
+        file.quantities_mut().into_iter().map(|(p, key, quantity)| (p, key, *quantity)).collect()
     }
 }

@@ -19,13 +19,6 @@ pub enum Prior {
         /// Its standard deviation, above 0.
         sigma: f64,
     },
-    /// A bell curve of the logarithm.
-    LogNormal {
-        /// The median, above 0.
-        median: f64,
-        /// Standard deviation of ln x, above 0.
-        sigma: f64,
-    },
     /// Of an inclination whose axis may point anywhere: sin i between two angles in radians.
     Isotropic {
         /// Least inclination.
@@ -41,7 +34,6 @@ impl Prior {
         match *self {
             Prior::Uniform { low, high } | Prior::Isotropic { low, high } => [low, high],
             Prior::Normal { .. } => [f64::NEG_INFINITY, f64::INFINITY],
-            Prior::LogNormal { .. } => [f64::MIN_POSITIVE, f64::INFINITY],
         }
     }
 
@@ -54,9 +46,6 @@ impl Prior {
         match *self {
             Prior::Uniform { .. } => 0.0,
             Prior::Normal { mean, sigma } => 0.5 * ((x - mean) / sigma).powi(2),
-            Prior::LogNormal { median, sigma } => {
-                0.5 * ((x / median).ln() / sigma).powi(2) + x.ln()
-            }
             // At the poles, where p = 0, only just not impossible.
             Prior::Isotropic { .. } => -x.sin().max(1e-6).ln(),
         }
@@ -82,9 +71,6 @@ impl Prior {
         match *self {
             Prior::Uniform { low, high } => (high - low) / 12f64.sqrt(),
             Prior::Normal { sigma, .. } => sigma,
-            Prior::LogNormal { median, sigma } => {
-                median * (sigma.powi(2).exp_m1() * sigma.powi(2).exp()).sqrt()
-            }
             Prior::Isotropic { low, high } => {
                 // Integrals of sin θ, θ sin θ and θ² sin θ.
                 let sums = |x: f64| {
@@ -103,7 +89,6 @@ impl Prior {
         match *self {
             Prior::Uniform { low, high } => low + (high - low) * share,
             Prior::Normal { mean, sigma } => mean + sigma * normal(share),
-            Prior::LogNormal { median, sigma } => median * (sigma * normal(share)).exp(),
             Prior::Isotropic { low, high } => {
                 (low.cos() + (high.cos() - low.cos()) * share).clamp(-1.0, 1.0).acos()
             }
@@ -125,14 +110,6 @@ impl Prior {
             Prior::Normal { mean, sigma } => {
                 if !mean.is_finite() {
                     return wrong("mean", mean, "a finite number");
-                }
-                if !(sigma > 0.0 && sigma.is_finite()) {
-                    return wrong("sigma", sigma, "above 0");
-                }
-            }
-            Prior::LogNormal { median, sigma } => {
-                if !(median > 0.0 && median.is_finite()) {
-                    return wrong("median", median, "above 0");
                 }
                 if !(sigma > 0.0 && sigma.is_finite()) {
                     return wrong("sigma", sigma, "above 0");
@@ -180,7 +157,6 @@ mod tests {
     fn exact_quantiles_have_their_share_of_the_density() {
         let priors = [
             (Prior::Normal { mean: 0.3, sigma: 0.2 }, 1e-3),
-            (Prior::LogNormal { median: 1.2, sigma: 0.4 }, 1e-3),
             (Prior::Isotropic { low: 0.3, high: 3.0 }, 1e-4),
             (Prior::Uniform { low: -0.5, high: 2.0 }, 1e-4),
         ];

@@ -1,4 +1,4 @@
-//! The search for a world: from many starts or over a grid with coarse voxels, then with fine ones.
+//! The search for a world: from many starts with coarse voxels, then with fine ones.
 
 use super::fine::{Detail, PART, nearer};
 use super::seen::Seen;
@@ -7,7 +7,7 @@ use crate::fit::journal::{Journal, Memory};
 use crate::fit::settings::{FieldKind, FitFile, Linear, UnknownWorld};
 use crate::fit::setup::{Measured, Result};
 use crate::fit::world::{
-    Estimate, Exploration, Explored, Scanned, Spread, World, WorldProblem, WorldScan, WorldWatch,
+    Estimate, Exploration, Explored, Spread, World, WorldProblem, WorldWatch,
 };
 
 use rayon::prelude::*;
@@ -41,10 +41,8 @@ pub struct FoundWorld {
     /// Errors that the search took over those of the data: below 1 where residuals are much smaller than the errors,
     /// as those of images without noise.
     pub noise_factor: f64,
-    /// The searches from all starts; none where a grid was scanned in their place.
+    /// The searches from all starts.
     pub trials: Vec<Trial>,
-    /// The grid of worlds, if one was scanned.
-    pub scan: Option<WorldScan>,
 }
 
 /// Told which search of how many goes on, its number of worlds and its least value; says whether to go on.
@@ -76,17 +74,13 @@ pub fn find_world(
     let scale = |reduced: f64| if has_prior { 1.0 } else { scale(reduced) };
     let first = coarse
         .with(unknown, &search.coarse, (1.0, memory), |problem| least(problem, search.starts))?;
-    let over = unknown.scanned();
     let found = coarse.with(unknown, &search.coarse, (scale(first), memory), |problem| {
-        if over.is_empty() {
-            return from_starts(&coarse, problem, file.seed, unknown, watch);
-        }
-        on_grid(problem, &over, file.seed, unknown, watch)
+        from_starts(&coarse, problem, file.seed, unknown, watch)
     })?;
-    let Some(Found { start, volume, reduced_chi2, trials, scan }) = found else {
+    let Some(Found { start, volume, reduced_chi2, trials }) = found else {
         return Ok(None);
     };
-    let how = Exploration { width: width(&over), worlds: search.fine.worlds, seed: file.seed };
+    let how = Exploration { width: WIDTHS[1], worlds: search.fine.worlds, seed: file.seed };
     let count = trials.len().max(1) + 1;
     let mut told = |worlds: usize, best: f64| watch((count - 1, count), worlds, best);
     // The coarse search has left less than it began with.
@@ -98,7 +92,6 @@ pub fn find_world(
         noise_factor: errors.powf(-0.5),
         spread,
         trials,
-        scan,
     }))
 }
 
@@ -109,7 +102,6 @@ struct Found {
     volume: Option<Anchor>,
     reduced_chi2: f64,
     trials: Vec<Trial>,
-    scan: Option<WorldScan>,
 }
 
 fn from_starts(
@@ -138,7 +130,7 @@ fn from_starts(
     let Some(best) = best else { return Ok(None) };
     let (start, reduced_chi2) = (best.world, problem.left(&best)?);
     let volume = Some(Anchor::of(problem, &best));
-    Ok(Some(Found { start, volume, reduced_chi2, trials, scan: None }))
+    Ok(Some(Found { start, volume, reduced_chi2, trials }))
 }
 
 /// Worlds whose lit fields are tried, for each from which a search begins.
@@ -211,32 +203,6 @@ fn or_twin(
     }
     explored.samples.extend(other.samples);
     Ok(Some(explored))
-}
-
-fn on_grid(
-    problem: &WorldProblem<'_, f32>,
-    over: &[Scanned],
-    seed: u64,
-    UnknownWorld { search, .. }: &UnknownWorld,
-    watch: &mut SearchWatch<'_>,
-) -> Result<Option<Found>> {
-    let mut told = |worlds: usize, best: f64| watch((0, 2), worlds, best);
-    let how = Exploration { width: WIDTHS[0], worlds: search.coarse.worlds, seed };
-    let Some(scan) = problem.scan(over, &how, &mut told)? else { return Ok(None) };
-    let best = scan.best().map(|best| (best.world, best.reduced_chi2));
-    Ok(best.map(|(start, reduced_chi2)| Found {
-        start,
-        volume: None,
-        reduced_chi2,
-        trials: Vec::new(),
-        scan: Some(scan),
-    }))
-}
-
-/// Width of the fine search's first population: where a grid is coarse, half of its cells.
-fn width(over: &[Scanned]) -> f64 {
-    let cell = |scanned: &Scanned| 0.5 * scanned.step() / scanned.parameter.scale();
-    over.iter().map(cell).fold(WIDTHS[1], f64::max)
 }
 
 /// The least χ²/N of the worlds where searches begin.
