@@ -109,7 +109,6 @@ fn training(words: &Words, rate: f64) -> Result<Training, String> {
         ramp: 0,
         batch: BatchSize::Pixels(words.get("pixels", 512)?),
         occupancy: (warm_up > 0).then_some(plan),
-        penalties: None,
         change: None,
         region: REGION,
         keep_every: 50,

@@ -36,7 +36,7 @@ pub use held_out::{HeldOutBy, HeldOutSettings, Weight};
 pub use instrument::{GainPhases, GainSettings, InstrumentSettings, LeakageSettings};
 pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedBackground, SimulatedCurve};
 pub use medium::{Scattering, Variability};
-pub use penalties::{PenaltyKind, PenaltySettings, ProbeSettings};
+pub use penalties::{PenaltyKind, PenaltySettings};
 pub use quiescent::QuiescentSettings;
 pub use recovery::{
     AxisScan, AxisSearch, Kind, Linear, Occupancy, Optimiser, Representation, Start, Training,
@@ -119,12 +119,6 @@ pub struct FitFile {
     pub instrument: Option<InstrumentSettings>,
     /// Terms of the loss, the sum of weight · χ² per datum.
     pub loss: Vec<Loss>,
-    /// Penalties on the emission, integrals over its volume.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub regulariser: Vec<PenaltySettings>,
-    /// Grid on which penalties of a network are evaluated.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub probe: Option<ProbeSettings>,
     /// How the recovered emission is represented.
     pub representation: Representation,
     /// How the representation is optimised.

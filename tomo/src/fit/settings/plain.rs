@@ -83,8 +83,6 @@ impl FitFile {
             data: None,
             instrument: None,
             loss: Vec::new(),
-            regulariser: Vec::new(),
-            probe: None,
             representation: Representation::of(kind),
             training: Training::starting(start),
             linear: Some(Linear::below(3.0)),
