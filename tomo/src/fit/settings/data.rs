@@ -155,11 +155,6 @@ impl LossKind {
         !all.contains(&self)
     }
 
-    /// Whether they are visibilities, or made of those.
-    pub fn has_baselines(self) -> bool {
-        !matches!(self, LossKind::Image | LossKind::LightCurve)
-    }
-
     /// Whether they are complex visibilities, of total intensity or of all products.
     pub fn is_visibilities(self) -> bool {
         matches!(self, LossKind::Visibilities | LossKind::PolarizedVisibilities)

@@ -32,7 +32,7 @@ pub use data::{DataFiles, Loss, LossKind};
 pub use error::FitError;
 pub(crate) use error::{Within, refuse};
 pub use gaussian::{FieldKind, FieldSettings, Negative, PriorOfVoxels};
-pub use held_out::{HeldOutBy, HeldOutSettings, Weight};
+pub use held_out::{HeldOutSettings, Weight};
 pub use instrument::{GainPhases, GainSettings, InstrumentSettings, LeakageSettings};
 pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedBackground, SimulatedCurve};
 pub use medium::{Scattering, Variability};
