@@ -1,9 +1,8 @@
 //! `kerrlight convert`: visibilities from one format to another.
 
 use crate::answer::{self, Answer};
-use crate::columns;
+use crate::interferometry::arguments;
 use crate::interferometry::{self, ObservationFile, Written};
-use crate::interferometry::{arguments, traces};
 use crate::output::{self, Output};
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
@@ -12,7 +11,7 @@ use kerrlight_vlbi::array::Station;
 use kerrlight_vlbi::files::{self, FileError};
 use kerrlight_vlbi::gains::is_same_station;
 use kerrlight_vlbi::light_curve::LightCurve;
-use kerrlight_vlbi::observation::{Averaging, Basis, Flags, Observation};
+use kerrlight_vlbi::observation::{Averaging, Flags, Observation};
 use kerrlight_vlbi::source::Source;
 use std::path::PathBuf;
 
@@ -27,10 +26,6 @@ pub struct Convert {
     /// Write the light curve that baselines within a site (ALMA-APEX, JCMT-SMA) have measured: I, Q, U, V as CSV
     #[arg(long, conflicts_with_all = ["format", "stokes_i"])]
     light_curve: bool,
-    /// Write closure traces as CSV, of baselines whose Stokes I is stronger than this many times its noise
-    #[arg(long, value_name = "LEAST-SNR", allow_negative_numbers = true)]
-    #[arg(conflicts_with_all = ["format", "comments", "stokes_i", "light_curve"])]
-    closure_traces: Option<f64>,
     /// Format to write [default: by the name's ending]
     #[arg(long, value_name = "FORMAT")]
     format: Option<Written>,
@@ -92,9 +87,6 @@ impl Convert {
         if let Some(seconds) = self.average.filter(|s| !Averaging::over(*s).is_allowed()) {
             bail!("--average {seconds} is not allowed: seconds in [1e-3, 1e9]");
         }
-        if let Some(snr) = self.closure_traces.filter(|snr| !(0.0..=1e9).contains(snr)) {
-            bail!("--closure-traces {snr} is not allowed: a signal-to-noise ratio in [0, 1e9]");
-        }
         for (name, limit) in [("--uv-min", self.uv_min), ("--uv-max", self.uv_max)] {
             if let Some(limit) = limit.filter(|limit| limit.is_nan() || *limit < 0.0) {
                 bail!("{name} {limit} is not allowed: wavelengths, 0 or more");
@@ -141,9 +133,6 @@ impl Convert {
         if self.light_curve {
             return self.write_light_curve(&observation);
         }
-        if let Some(least_snr) = self.closure_traces {
-            return self.write_traces(&observation, least_snr);
-        }
         if observation.is_polarized() && !output.keeps_polarization() {
             eprintln!(
                 "warning: {} has Stokes I alone: the polarisation of {} is left out; .uvfits keeps it",
@@ -189,26 +178,6 @@ impl Convert {
             );
         }
         Ok(())
-    }
-
-    fn write_traces(&self, observation: &Observation, least_snr: f64) -> anyhow::Result<Answer> {
-        let input = self.input.display();
-        if observation.basis != Basis::Circular {
-            bail!(
-                "{input}: closure traces need RR, LL, RL and LR, and this file has Stokes parameters"
-            );
-        }
-        let (table, count) = traces::table(observation, least_snr);
-        if count == 0 {
-            bail!(
-                "{input}: at no time have four stations RR, LL, RL and LR with errors and Stokes I above {least_snr} times its noise"
-            );
-        }
-        let output = Output::or_pipe(&self.output, &["csv"])?;
-        output.spares(&self.input)?;
-        output.write(&columns::csv(&[table], count)?)?;
-        eprintln!("{count} independent numbers of closure traces");
-        Ok(written(&output).with("traces", count))
     }
 
     fn write_light_curve(&self, observation: &Observation) -> anyhow::Result<Answer> {

@@ -70,40 +70,6 @@ fn exact_every_representation_leaves_a_whole_run() {
     }
 }
 
-/// All penalties of all representations, as terms of the log.
-#[test]
-fn exact_penalties_are_terms_of_the_log() {
-    let folder = tempfile::tempdir().unwrap();
-    let all = "[probe]\nnodes = 10\n\n\
-               [[regulariser]]\nkind = \"total-variation\"\nweight = 1e-6\nepsilon = 0.05\n\n\
-               [[regulariser]]\nkind = \"smoothness\"\nweight = 1e-6\n\n\
-               [[regulariser]]\nkind = \"sparsity\"\nweight = 1e-6\n\n\
-               [[regulariser]]\nkind = \"entropy\"\nweight = 1e-6\nlevel = 0.1\nfloor = 0.1\n\n[representation]";
-    let words = changed(folder.path(), |text| text.replace("[representation]", all));
-    for kind in ["bhnerf", "feature-grid", "grid", "linear-grid"] {
-        let kind_of = format!("representation={kind}");
-        let few = ["-o", kind, "--set", &kind_of, "--set", "training.steps=40"];
-        succeed(
-            folder.path(),
-            &with(&words, &[&few[..], &["--set", "representation.nodes=20"]].concat()),
-        );
-        let log = std::fs::read_to_string(folder.path().join(kind).join("log.jsonl")).unwrap();
-        let last: serde_json::Value = serde_json::from_str(log.lines().last().unwrap()).unwrap();
-        if kind == "linear-grid" {
-            assert!(last["linear"]["certificate"]["relative_gap"].as_f64().is_some(), "{last}");
-            continue;
-        }
-        let penalties = last["penalties"].as_object().unwrap();
-        let sum: f64 = penalties.values().map(|value| value.as_f64().unwrap()).sum();
-        let data = last["chi2_per_datum"]["image"].as_f64().unwrap();
-        assert_eq!(penalties.len(), 4, "{last}");
-        assert!(
-            (last["loss"].as_f64().unwrap() - data - sum).abs() < 1e-9 * (data + sum),
-            "{last}"
-        );
-    }
-}
-
 /// A field of events has no co-rotating coordinates to mask.
 #[test]
 fn exact_a_field_of_events_is_fitted_without_a_mask() {

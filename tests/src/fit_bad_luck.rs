@@ -70,7 +70,6 @@ fn exact_a_read_only_folder_is_named() {
 #[test]
 fn bad_settings_are_named_with_their_line() {
     let folder = tempfile::tempdir().unwrap();
-    let tv = "[[regulariser]]\nkind = \"total-variation\"\nweight = 1e-3\n\n[representation]";
     for (from, to, said) in [
         ("seed = 1", "seed = -1", "line 4"),
         ("seed = 1", "seed = \"one\"", "line 4"),
@@ -80,7 +79,6 @@ fn bad_settings_are_named_with_their_line() {
         ("weight = 1.0", "weight = nan", "loss.0.weight = NaN"),
         ("sigma = 1.0", "sigma = -0.5", "loss.0.sigma = -0.5 is not allowed"),
         ("sigma = 0.4", "sigma = inf", "simulation.truth.spot.0.sigma = inf"),
-        ("[representation]", tv, "regulariser 0: epsilon is missing"),
         ("[[simulation.truth.spot]]", "[[simulation.truth.spots]]", "spot"),
         (
             "kind = \"bhnerf\"",
@@ -109,28 +107,6 @@ fn bad_settings_are_named_with_their_line() {
     });
     let error = fail(folder.path(), &with(&words, &["-o", "run"]));
     assert!(error.contains("loss is empty"), "{error}");
-}
-
-#[test]
-fn bad_regularisers_and_optimisers_are_named() {
-    let folder = tempfile::tempdir().unwrap();
-    for (setting, said) in [
-        ("kind = \"total-variation\"\nweight = 1.0\nepsilon = 0.0", "epsilon = 0 is not allowed"),
-        ("kind = \"smoothness\"\nweight = -1.0", "regulariser.0.weight = -1 is not allowed"),
-        ("kind = \"smoothness\"\nweight = 1.0\nlevel = 1.0", "level is not for smoothness"),
-        ("kind = \"entropy\"\nweight = 1.0\nlevel = 1.0", "floor is missing: entropy needs it"),
-        ("kind = \"sparsity\"\nweight = 1.0", "probe.nodes is missing"),
-        ("kind = \"order\"\nweight = 1.0", "unknown variant `order`"),
-    ] {
-        let words = changed(folder.path(), |text| {
-            text.replace(
-                "[representation]",
-                &format!("[[regulariser]]\n{setting}\n\n[representation]"),
-            )
-        });
-        let error = fail(folder.path(), &with(&words, &["-o", "run"]));
-        assert!(error.contains(said), "{setting}: {error}");
-    }
 }
 
 /// A movie in text, a row of numbers a line, with a change to one of its numbers.

@@ -56,24 +56,6 @@ fn exact_held_out_frames_choose_the_weight() {
     assert!(page.contains("linear.smoothness = 0.1 was chosen from 3 values"));
 }
 
-/// The same by baselines: too much smoothness predicts those badly that were left out.
-#[test]
-fn exact_held_out_baselines_choose_the_weight() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let by = HELD_OUT.replace("folds=2", "folds=3,by=\"baselines\"");
-    succeed(at, &[&SMALL[..], &["--set", &by, "-o", "chosen"]].concat());
-    let found = results(&at.join("chosen"));
-    let held_out = &found["held_out"];
-    let values = held_out["values"].as_array().unwrap();
-    let losses: Vec<f64> = values.iter().map(|v| v["loss"].as_f64().unwrap()).collect();
-    assert!(losses[1] < losses[2] && losses.iter().all(|x| x.is_finite()), "{losses:?}");
-    assert!(values.iter().all(|value| value["losses"].as_array().unwrap().len() == 3));
-    assert_eq!(held_out["by"], "baselines");
-    let page = std::fs::read_to_string(at.join("chosen/report.html")).unwrap();
-    assert!(page.contains("Held-out baselines"));
-}
-
 #[test]
 fn bad_ways_to_hold_out_are_refused_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();
@@ -85,10 +67,6 @@ fn bad_ways_to_hold_out_are_refused_before_anything_is_written() {
         (
             "held_out={setting=\"linear.smoothness\",values=[0.1,1.0],folds=900}",
             "half of the frames",
-        ),
-        (
-            "held_out={setting=\"linear.smoothness\",values=[0.1,1.0],folds=2,by=\"stations\"}",
-            "expected `frames` or `baselines`",
         ),
         ("held_out={setting=\"linear.upper\",values=[0.1,1.0],folds=2}", "expected one of"),
     ] {

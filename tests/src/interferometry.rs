@@ -5,7 +5,7 @@ use crate::support::{kerrlight, root, succeed};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::observation::Observation;
-use kerrlight_vlbi::products::{ClosureKind, ClosureSet, TraceSet};
+use kerrlight_vlbi::products::{ClosureKind, ClosureSet};
 use std::path::Path;
 
 const WHEN: [&str; 10] =
@@ -202,43 +202,6 @@ fn exact_cross_hands_are_those_of_the_input() {
         let (rl, lr) = (Complex64::new(0.1, -0.2) * i, Complex64::new(0.1, 0.2) * i);
         assert!((b.products[2] - rl).norm() < 1e-9 && (b.products[3] - lr).norm() < 1e-9);
         assert!(b.noise_sigma.iter().all(|sigma| *sigma > 0.0));
-    }
-}
-
-/// The table has the numbers of the library, of averages too, whose baselines share one time; files without cross hands are
-/// refused.
-#[test]
-fn exact_closure_traces_as_a_table() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
-    write_polarized_image(path);
-    let start = ["observe", "image.txt", "--array", "EHT2017", "-o", "a.uvfits"];
-    succeed(path, &[&start[..], &WHEN[..]].concat());
-    succeed(path, &["convert", "a.uvfits", "traces.csv", "--closure-traces", "100"]);
-    let table = std::fs::read_to_string(path.join("traces.csv")).unwrap();
-    assert!(table.starts_with("time_utc_h,t1,t2,t3,t4,quantity,value,sigma\n"), "{table}");
-    let count = |snr: f64| -> usize {
-        let sets = TraceSet::of(&read(path, "a.uvfits"), snr);
-        sets.iter().map(|set| set.quantities.len()).sum()
-    };
-    let of = |table: &str, name: &str| table.lines().filter(|line| line.contains(name)).count();
-    let [amplitudes, phases] = ["log_amplitude", "phase_rad"].map(|name| of(&table, name));
-    assert!(amplitudes > 100 && phases >= amplitudes, "{amplitudes} {phases}");
-    assert_eq!(amplitudes + phases, count(100.0));
-    let averaged = ["--closure-traces", "100", "--average", "600"];
-    succeed(path, &[&["convert", "a.uvfits", "mean.csv"][..], &averaged[..]].concat());
-    let mean = std::fs::read_to_string(path.join("mean.csv")).unwrap();
-    assert!(of(&mean, "log_amplitude") > 20, "{mean}");
-    succeed(path, &["convert", "a.uvfits", "i.csv", "--stokes-i"]);
-    for (input, snr, said) in [
-        ("i.csv", "0", "RR, LL, RL and LR"),
-        ("a.uvfits", "1e8", "at no time have four stations"),
-        ("a.uvfits", "-1", "--closure-traces -1 is not allowed"),
-    ] {
-        let output = kerrlight(path, &["convert", input, "none.csv", "--closure-traces", snr]);
-        let message = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{message}");
-        assert!(message.contains(said) && !path.join("none.csv").exists(), "{message}");
     }
 }
 

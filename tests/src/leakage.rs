@@ -24,31 +24,3 @@ fn exact_leakage_is_found_with_the_flare() {
     let report = std::fs::read_to_string(folder.path().join("flare/report.html")).unwrap();
     assert!(report.contains("Leakage of stations"));
 }
-
-/// Closure traces of stations that leak and whose gains are not known, with amplitudes for the flux: neither is solved for, and
-/// the flare is found. `convert` writes as many numbers of the simulated file.
-#[test]
-#[ignore = "long"]
-fn exact_closure_traces_find_the_flare_behind_leakage() {
-    let folder = tempfile::tempdir().unwrap();
-    let text = std::fs::read_to_string(root().join("scenes/fits/polarized_flare.toml")).unwrap();
-    let solved = "[instrument.leakage]\namplitude = 0.1\nrounds = 8\n";
-    let products = "data = \"polarized-visibilities\"\nweight = 1.0\n";
-    assert!(text.contains(solved) && text.contains(products));
-    let traces = "data = \"amplitudes\"\nweight = 1.0\n\n[[loss]]\ndata = \"closure-traces\"\nweight = 1.0\nleast_snr = 3.0\n";
-    let text = text.replace(solved, "").replace(products, traces);
-    std::fs::write(folder.path().join("traces.toml"), text).unwrap();
-    let set = [
-        "screen.pixels=24",
-        "simulation.truth.spot.0.sigma=1.0",
-        "simulation.observation.scans=16",
-        "linear.iterations=200",
-    ];
-    let mut words = vec!["fit", "traces.toml", "-o", "flare"];
-    set.iter().for_each(|change| words.extend(["--set", change]));
-    succeed(folder.path(), &words);
-    let found = results(&folder.path().join("flare"));
-    let chi2 = found["chi2_per_datum"]["closure traces"].as_f64().unwrap();
-    assert!((0.8..1.3).contains(&chi2), "{found}");
-    assert!(found["correlation"].as_f64().unwrap() > 0.95, "{found}");
-}

@@ -48,7 +48,6 @@ fn training(batch: BatchSize) -> Training {
         batch,
         // A step in twenty looks at every cell.
         occupancy: Some(OccupancyPlan { settings, warm_up: 60, every: 20 }),
-        penalties: None,
         change: None,
         region: REGION,
         keep_every: 50,

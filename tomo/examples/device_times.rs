@@ -150,7 +150,6 @@ fn training(batch: BatchSize, steps: u64) -> Training {
         ramp: 0,
         batch,
         occupancy: None,
-        penalties: None,
         change: None,
         region: REGION,
         keep_every: 50,

@@ -1,7 +1,6 @@
 //! `kerrlight compare`: many fits that differ in named factors, in one command.
 
 mod cases;
-mod changes;
 mod experiment;
 mod figures;
 mod labels;
@@ -78,9 +77,6 @@ pub struct Compare {
     /// Write the report of the cases that are done so far
     #[arg(long, conflicts_with_all = ["resume", "case", "list", "status"])]
     collect: bool,
-    /// Show what changed since an earlier run
-    #[arg(long, value_name = "RESULTS")]
-    against: Option<PathBuf>,
     /// List the cases, one a line: ID, expected cost, and the command that runs it
     #[arg(long, conflicts_with = "case")]
     list: bool,
@@ -103,10 +99,6 @@ impl Compare {
         program: &Program,
     ) -> anyhow::Result<Answer> {
         let Some(name) = &self.experiment else { return Ok(listing::experiments()) };
-        let before = self.against.as_deref().map(changes::read).transpose()?;
-        if self.are_results(name) {
-            return changes::between(name, before.as_ref());
-        }
         let mut asked = self.asked(name, program)?;
         let folder = asked.folder.clone();
         if let Some(id) = &self.case {
@@ -154,18 +146,9 @@ impl Compare {
         };
         let summary = page::results((experiment, choice.quick), &cases, status, &folder)?;
         let page = Page { experiment, choice, summary: &summary };
-        let tables = page.write(&runner, &folder, before.as_ref())?;
+        let tables = page.write(&runner, &folder)?;
         recorder.write_into(&folder)?;
         Ok(end(&tables, &summary, &folder, self.collect))
-    }
-
-    /// Whether results of an earlier run are meant. A folder that is called like an experiment is meant by ./name.
-    fn are_results(&self, name: &Path) -> bool {
-        let is_known = source::built_in().any(|(known, _)| Path::new(known) == name);
-        let is_file = name.extension().is_some_and(|e| e == "json");
-        let goes_on = self.resume || self.case.is_some() || self.status || self.collect;
-        let is_new = goes_on || self.list || self.output.is_some();
-        is_file || (!is_known && !is_new && name.join("results.json").is_file())
     }
 
     /// Runs one case of a folder in which others may run others.

@@ -5,11 +5,10 @@ use super::experiment::Experiment;
 use super::recipe::Choice;
 use super::runner::Runner;
 use super::summary::Summary;
-use super::{changes, figures, quick, ran, tables, verdicts};
+use super::{figures, quick, ran, tables, verdicts};
 use crate::output::Output;
 use crate::plain;
 use crate::report::{Figure, Part, Report, Table};
-use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Most failures that the head of the page tells.
@@ -49,30 +48,24 @@ pub fn results<'a>(
 
 impl Page<'_> {
     /// Writes the results, tables.md, pictures and report.html; the text of the tables.
-    pub fn write(
-        &self,
-        runner: &Runner<'_>,
-        folder: &Path,
-        before: Option<&Value>,
-    ) -> anyhow::Result<String> {
+    pub fn write(&self, runner: &Runner<'_>, folder: &Path) -> anyhow::Result<String> {
         if !self.choice.quick {
-            return self.files(runner, folder, before, Vec::new());
+            return self.files(runner, folder, Vec::new());
         }
         let (look, left_out) = quick::look(self.experiment);
-        Page { experiment: &look, ..*self }.files(runner, folder, before, left_out)
+        Page { experiment: &look, ..*self }.files(runner, folder, left_out)
     }
 
     fn files(
         &self,
         runner: &Runner<'_>,
         folder: &Path,
-        before: Option<&Value>,
         mut left_out: Vec<String>,
     ) -> anyhow::Result<String> {
         let Page { experiment, choice, summary } = self;
         let file = |name: &str| Output::new(&folder.join(name), "");
         file("results.csv")?.write(&summary.csv()?)?;
-        let shown = self.tables(before, folder)?;
+        let shown = self.tables();
         let text: String = shown.iter().map(tables::markdown).collect();
         let text = [self.heading(), text].concat();
         file("tables.md")?.write(text.as_bytes())?;
@@ -98,16 +91,12 @@ impl Page<'_> {
         Ok(text)
     }
 
-    /// What ran, what the experiment asks for, and what has changed.
-    fn tables(&self, before: Option<&Value>, folder: &Path) -> anyhow::Result<Vec<Table>> {
+    /// What ran, and what the experiment asks for.
+    fn tables(&self) -> Vec<Table> {
         let Page { experiment, summary, .. } = self;
         let asked = experiment.table.iter();
         let asked = asked.map(|asked| tables::table(experiment, summary, asked));
-        let mut shown: Vec<Table> = std::iter::once(ran::table(summary)).chain(asked).collect();
-        if let Some(before) = before {
-            shown.push(changes::table(&changes::read(folder)?, before)?);
-        }
-        Ok(shown)
+        std::iter::once(ran::table(summary)).chain(asked).collect()
     }
 
     /// What tables.md and the terminal say of a quick look.

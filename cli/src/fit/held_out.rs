@@ -1,4 +1,4 @@
-//! A weight of the linear problem that is chosen by frames or baselines that are held out.
+//! A weight of the linear problem that is chosen by frames that are held out.
 
 use super::folder::Folder;
 use crate::checksum::sealed;
@@ -51,7 +51,6 @@ fn results(settings: &HeldOutSettings, held: &[Held]) -> Value {
         "setting": settings.setting.name(),
         "chosen": best.map(|best| best.value),
         "folds": settings.folds,
-        "by": settings.by.name(),
         "values": held.iter().map(one).collect::<Vec<_>>(),
     })
 }
@@ -79,9 +78,8 @@ pub fn sentence(results: &Value) -> Option<String> {
         true => "; it is the first or the last of the list, a better one may lie beyond",
         false => "",
     };
-    let by = results["by"].as_str().unwrap_or("frames");
     Some(format!(
-        "{setting} = {chosen} was chosen from {} values: the {by} that were held out have χ² {least:.3} per data \
+        "{setting} = {chosen} was chosen from {} values: the frames that were held out have χ² {least:.3} per data \
          point with it{end}.",
         values.len()
     ))
@@ -94,12 +92,11 @@ pub fn plot(results: &Value) -> Option<LinePlot> {
     let points: Vec<[f64; 2]> = values.iter().filter_map(point).collect();
     let errors = values.iter().filter_map(|value| value["error"].as_f64()).collect();
     let log = points.iter().all(|[x, _]| *x > 0.0);
-    let by = results["by"].as_str().unwrap_or("frames");
     Some(LinePlot {
-        title: format!("Held-out {by}"),
+        title: "Held-out frames".to_owned(),
         caption: format!(
-            "χ² per data point of {by} that were not fitted, against the weight: each of {} parts of the {by} was \
-             held out once. Too small a weight fits noise, too large a one cannot fit the data; both predict {by} badly \
+            "χ² per data point of frames that were not fitted, against the weight: each of {} parts of the frames was \
+             held out once. Too small a weight fits noise, too large a one cannot fit the data; both predict frames badly \
              that they have not seen. Bars are standard errors of the difference from the best weight.",
             results["folds"]
         ),
@@ -112,17 +109,12 @@ pub fn plot(results: &Value) -> Option<LinePlot> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kerrlight_tomo::fit::settings::HeldOutBy;
     use kerrlight_tomo::fit::settings::Weight;
 
     #[test]
     fn exact_the_best_value_is_told_with_its_place() {
-        let settings = HeldOutSettings {
-            setting: Weight::Smoothness,
-            values: vec![0.1, 1.0, 10.0],
-            folds: 2,
-            by: HeldOutBy::Frames,
-        };
+        let settings =
+            HeldOutSettings { setting: Weight::Smoothness, values: vec![0.1, 1.0, 10.0], folds: 2 };
         let held = |losses: [[f64; 2]; 3]| -> Vec<Held> {
             let pairs = settings.values.iter().zip(losses);
             pairs.map(|(value, losses)| Held { value: *value, losses: losses.to_vec() }).collect()

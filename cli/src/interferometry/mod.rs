@@ -5,7 +5,6 @@ pub mod image_files;
 pub mod movie_files;
 pub mod plots;
 pub mod scene_movie;
-pub mod traces;
 
 use crate::answer::{self, Answer};
 use crate::output::{self, Output};

@@ -2,7 +2,6 @@
 //! three dimensions. Nothing in it is loaded from anywhere else.
 
 mod escape;
-mod grid_map;
 mod html;
 mod paged;
 mod panels;
@@ -15,7 +14,6 @@ mod triangle;
 mod view;
 
 pub use escape::escape;
-pub use grid_map::{GridAxis, GridMap};
 pub use html::fill;
 pub use pictures::{
     Figure, Strip, encode, enlarged, frames, images, projections, residuals, slices, slices_with,

@@ -29,12 +29,12 @@ pub struct Data<T> {
 /// The loss of a selection, scaled to that of all data.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Loss {
-    /// Σ weight · χ²/data, and penalties.
+    /// Σ weight · χ²/data, and penalties of the representation.
     pub total: f64,
     /// χ² per datum of each kind of data, the image first if there is one.
     pub terms: Vec<f64>,
-    /// Weight · penalty of each, if there are any.
-    pub penalties: Vec<f64>,
+    /// What change costs, where a representation has that price.
+    pub change: Option<f64>,
     /// Nodes at which emission was evaluated.
     pub points: usize,
 }

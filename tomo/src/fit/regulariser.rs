@@ -31,14 +31,6 @@ pub enum Regulariser {
     Smoothness,
     /// ∫ |e| dV; its slope at 0 is that of positive e.
     Sparsity,
-    /// ∫ (e ln(e/m) − e + m) dV: entropy relative to a prior level m (Skilling 1989), 0 where e = m.
-    /// Below `floor` · m it goes on as the parabola that touches it there, also for negative e.
-    Entropy {
-        /// m, above 0.
-        level: f64,
-        /// Above 0, at most 1.
-        floor: f64,
-    },
 }
 
 /// A penalty with its weight.
@@ -68,26 +60,12 @@ impl Regulariser {
     /// # Errors
     /// Names the number that is not.
     pub fn checked(self) -> Result<Self, Error> {
-        let positive = |field, value: f64, most: f64, allowed| {
-            let ok = value > 0.0 && value.is_finite() && value <= most;
-            if ok { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
-        };
         match self {
-            Self::TotalVariation { epsilon } => {
-                positive("total variation epsilon", epsilon, f64::MAX, "above 0")?;
+            Self::TotalVariation { epsilon } if !(epsilon > 0.0 && epsilon.is_finite()) => {
+                Err(Error::out_of_range("total variation epsilon", epsilon, "above 0"))
             }
-            Self::Entropy { level, floor } => {
-                positive("entropy level", level, f64::MAX, "above 0")?;
-                positive("entropy floor", floor, 1.0, "above 0, at most 1")?;
-            }
-            Self::Smoothness | Self::Sparsity => {}
+            _ => Ok(self),
         }
-        Ok(self)
-    }
-
-    /// Whether it is quadratic, or linear, in fields that are nowhere negative.
-    pub fn is_quadratic(&self) -> bool {
-        matches!(self, Self::Smoothness | Self::Sparsity)
     }
 
     /// What it is called in text.
@@ -96,7 +74,6 @@ impl Regulariser {
             Self::TotalVariation { .. } => "total variation",
             Self::Smoothness => "smoothness",
             Self::Sparsity => "sparsity",
-            Self::Entropy { .. } => "entropy",
         }
     }
 
@@ -112,85 +89,33 @@ impl Regulariser {
         weight: f64,
         gradient: &mut [T],
     ) -> f64 {
-        self.value_and_gradient_inside(values, shape, None, weight, gradient)
-    }
-
-    /// The same of the nodes inside a region alone: neither those outside count, nor differences across its edge,
-    /// where slopes are free.
-    ///
-    /// # Panics
-    /// If the lengths are not that of the shape.
-    pub fn value_and_gradient_inside<T: Float>(
-        &self,
-        values: &[T],
-        shape: Shape,
-        inside: Option<&[bool]>,
-        weight: f64,
-        gradient: &mut [T],
-    ) -> f64 {
         assert!(values.len() == shape.count() && gradient.len() == values.len());
-        assert!(inside.is_none_or(|inside| inside.len() == values.len()));
         let scale = weight * shape.cell();
         let plane = shape.nodes[1] * shape.nodes[2];
         let of_plane = |(i, out): (usize, &mut [T])| match self {
             Self::TotalVariation { epsilon } => {
                 let slope = |square: f64| (square + epsilon * epsilon).sqrt();
                 let norm = |square| (slope(square) - epsilon, 1.0 / slope(square));
-                Differences { values, inside, shape, norm }.plane(i, scale, out)
+                Differences { values, shape, norm }.plane(i, scale, out)
             }
             Self::Smoothness => {
                 let norm = |square| (square, 2.0);
-                Differences { values, inside, shape, norm }.plane(i, scale, out)
+                Differences { values, shape, norm }.plane(i, scale, out)
             }
-            Self::Sparsity => {
-                each(Counted { values, inside }, i * plane, scale, out, |e| (e.abs(), sign(e)))
-            }
-            Self::Entropy { level, floor } => {
-                let of = |e| entropy(e, *level, floor * level);
-                each(Counted { values, inside }, i * plane, scale, out, of)
-            }
+            Self::Sparsity => sizes(&values[i * plane..], scale, out),
         };
         let sums: Vec<f64> = gradient.par_chunks_mut(plane).enumerate().map(of_plane).collect();
         scale * sums.iter().sum::<f64>()
     }
 }
 
-fn sign(e: f64) -> f64 {
-    if e < 0.0 { -1.0 } else { 1.0 }
-}
-
-/// e ln(e/m) − e + m and its slope.
-fn entropy(e: f64, m: f64, floor: f64) -> (f64, f64) {
-    let of = |e: f64| (e * (e / m).ln() - e + m, (e / m).ln());
-    if e >= floor {
-        return of(e);
-    }
-    let ((value, slope), below) = (of(floor), e - floor);
-    (value + below * (slope + 0.5 * below / floor), slope + below / floor)
-}
-
-/// Values and which of them count, all if nothing is said.
-#[derive(Clone, Copy)]
-struct Counted<'a, T> {
-    values: &'a [T],
-    inside: Option<&'a [bool]>,
-}
-
-/// Sum of a function of each value from `first` on; adds its slopes.
-fn each<T: Float>(
-    Counted { values, inside }: Counted<'_, T>,
-    first: usize,
-    scale: f64,
-    out: &mut [T],
-    f: impl Fn(f64) -> (f64, f64),
-) -> f64 {
+/// Sum of |e| over a plane; adds its slopes.
+fn sizes<T: Float>(values: &[T], scale: f64, out: &mut [T]) -> f64 {
     let mut sum = 0.0;
-    for (k, out) in (first..).zip(out) {
-        if inside.is_none_or(|inside| inside[k]) {
-            let (value, slope) = f(values[k].double());
-            *out += T::of(scale * slope);
-            sum += value;
-        }
+    for (value, out) in values.iter().zip(out) {
+        let e = value.double();
+        *out += T::of(if e < 0.0 { -scale } else { scale });
+        sum += e.abs();
     }
     sum
 }
@@ -198,20 +123,18 @@ fn each<T: Float>(
 /// A function of the squared slope at each node: its value and twice its derivative.
 struct Differences<'a, T, F> {
     values: &'a [T],
-    inside: Option<&'a [bool]>,
     shape: Shape,
     norm: F,
 }
 
 impl<T: Float, F: Fn(f64) -> (f64, f64)> Differences<'_, T, F> {
-    /// Forward differences at a node along each axis, 0 beyond the last one and across an edge.
+    /// Forward differences at a node along each axis, 0 beyond the last one.
     #[inline]
     fn slopes(&self, at: [usize; 3], index: usize) -> [f64; 3] {
         let [nx, ny, nz] = self.shape.nodes;
         let here = self.values[index].double();
-        let counts = |index: usize| self.inside.is_none_or(|inside| inside[index]);
         let slope = |c: usize, n: usize, stride: usize| {
-            if at[c] + 1 < n && counts(index) && counts(index + stride) {
+            if at[c] + 1 < n {
                 (self.values[index + stride].double() - here) / self.shape.spacing[c]
             } else {
                 0.0

@@ -3,7 +3,6 @@
 use super::Field;
 use super::objective::{Gradients, Loss};
 use super::occupancy::Occupancy;
-use super::penalties::Draw;
 use super::selection::Selection;
 use super::state::{Outcome, Progress, State, step_back};
 use super::trainer::Trainer;
@@ -72,7 +71,7 @@ impl<T: Float> Trainer<'_, T> {
         now.occupancy.as_ref().filter(|_| masked)
     }
 
-    /// The loss of the part of the data that a step looks at, with penalties. The gradient with respect to the
+    /// The loss of the part of the data that a step looks at, with what change costs. The gradient with respect to the
     /// parameters is [`gradient`](Self::gradient) then; that of the axis is added, if it is learnt.
     pub fn loss(&mut self, place: Place<'_, T>, of_axis: &mut [f64; 3]) -> Loss {
         self.objective.model.weigh(place.axis);
@@ -80,21 +79,13 @@ impl<T: Float> Trainer<'_, T> {
         let Place { parameters, axis, occupancy, step } = place;
         let field = Field { representation: self.representation, parameters, axis, occupancy };
         let mut loss = self.of_data(field, step, of_axis);
-        if let Some(penalties) = &self.training.penalties {
-            let draw = self.draw(step);
-            let (buffers, workspace) = (&mut self.probe, self.buffers.workspace());
-            let found =
-                penalties.value_and_gradient(field, &draw, &mut self.gradient, buffers, workspace);
-            loss.total += found.iter().sum::<f64>();
-            loss.penalties = found;
-        }
         if let Some(change) = &self.training.change {
             let seed = mix(self.training.seed, step, 3);
             let (buffers, workspace) = (&mut self.changes, self.buffers.workspace());
             let found =
                 change.value_and_gradient(field, seed, &mut self.gradient, buffers, workspace);
             loss.total += found;
-            loss.penalties.push(found);
+            loss.change = Some(found);
         }
         if let Some(quiescent) = self.objective.model.quiescent() {
             loss.total += quiescent.penalty(parameters, &mut self.gradient);
@@ -140,13 +131,6 @@ impl<T: Float> Trainer<'_, T> {
             }
             BatchSize::All => frames.clone_from(observed),
         }
-    }
-
-    fn draw(&self, step: u64) -> Draw<T> {
-        let mut random = Pcg64::seed_from_u64(mix(self.training.seed, step, 2));
-        let offset = [0, 1, 2].map(|_| random.random());
-        let times = &self.objective.model.times;
-        Draw { offset, time: times[self.observed[random.random_range(0..self.observed.len())]] }
     }
 
     fn learn(&mut self, now: &mut Progress<T>, of_axis: [f64; 3]) {

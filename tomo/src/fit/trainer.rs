@@ -3,7 +3,6 @@
 use super::change_price::ChangeBuffers;
 use super::device::Delegate;
 use super::objective::{Buffers, Objective};
-use super::penalties::ProbeBuffers;
 use super::training::Training;
 use crate::representation::{Representation, WeightMatrix};
 use kerrlight_common::simd::Float;
@@ -20,7 +19,6 @@ pub struct Trainer<'a, T> {
     pub device: Option<Delegate<T>>,
     pub(super) observed: Vec<usize>,
     pub(super) buffers: Buffers<T>,
-    pub(super) probe: ProbeBuffers<T>,
     pub(super) changes: ChangeBuffers<T>,
     pub(super) gradient: Vec<T>,
     /// Which parameters are matrices.
@@ -45,7 +43,6 @@ impl<'a, T: Float> Trainer<'a, T> {
             device: None,
             observed,
             buffers: Buffers::default(),
-            probe: ProbeBuffers::default(),
             changes: ChangeBuffers::default(),
             gradient,
             matrices: representation.matrices(),

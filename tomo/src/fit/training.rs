@@ -2,7 +2,6 @@
 
 use super::change_price::ChangePrice;
 use super::occupancy::OccupancySettings;
-use super::penalties::Penalties;
 use super::sightlines::Region;
 use crate::optimise::{Adam, Muon, Polynomial};
 use crate::representation::Representation;
@@ -52,8 +51,6 @@ pub struct Training {
     pub batch: BatchSize,
     /// A mask that skips dark cells.
     pub occupancy: Option<OccupancyPlan>,
-    /// Penalties beside the data, if any.
-    pub penalties: Option<Penalties>,
     /// What change costs while matter carries emission, where a representation allows it.
     pub change: Option<ChangePrice>,
     /// Where emission is looked for.
@@ -65,12 +62,6 @@ pub struct Training {
 }
 
 impl Training {
-    /// Names of what is added to the loss of the data, in the order of [`Loss::penalties`](super::Loss::penalties).
-    pub fn penalty_names(&self) -> Vec<&'static str> {
-        let penalties = self.penalties.iter().flat_map(Penalties::names);
-        penalties.chain(self.change.iter().map(|_| "change")).collect()
-    }
-
     /// Whether the axis is learnt, of a representation that knows of it.
     pub fn learns_axis<T: Float>(&self, representation: &dyn Representation<T>) -> bool {
         self.axis_rate.is_some() && representation.is_carried()

@@ -27,7 +27,7 @@ pub use words::{range_of, short};
 
 use crate::Error;
 use crate::fit::settings::{FitFile, Kind};
-use crate::fit::setup::{self, HeldData, Instrument, Measured};
+use crate::fit::setup::{self, Instrument, Measured};
 use crate::fit::{Loss, Motion, State, Trainer};
 use kerrlight_common::frames::Frames;
 use kerrlight_render::volume::Volume;
@@ -116,8 +116,8 @@ pub fn fit_with<R, E: From<Error>>(
     let mut objective = problem.objective(instrument, motion, measured)?;
     let times = setup::emission_times(instrument, motion);
     let (axis, axis_rate) = setup::axis(file)?;
-    let data = HeldData { objective: &mut objective, measured };
-    let file = &search::weighed_before_steps(file, data, (axis, times), progress)?;
+    let about = (axis, times);
+    let file = &search::weighed_before_steps(file, &mut objective, about, progress)?;
     let representation = setup::representation(file, &problem.registry, times)?;
     let training = setup::training(file, axis_rate, times)?;
     let mut state = State::new(&*representation, axis, &training);

@@ -106,7 +106,7 @@ impl Problem {
         }
         let seen = self.objective(instrument, motion, measured)?.observed().len();
         if let Some(held_out) = &settings.held_out {
-            setup::check_folds(held_out, seen, measured)?;
+            setup::check_folds(held_out, seen)?;
         }
         if matches!(settings.axis, AxisSearch::Scan(_)) && seen < 2 {
             let why = "axis.scan needs at least 2 frame times: a single frame does not constrain the axis";

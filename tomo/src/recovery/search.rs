@@ -4,10 +4,10 @@ use super::found::{Choice, Found, Searched, Stage};
 use super::progress::{At, Progress};
 use super::{Problem, Stopped};
 use crate::Error;
-use crate::fit::Motion;
 use crate::fit::settings::{FitFile, Kind, UnknownWorld};
-use crate::fit::setup::{self, BandScan, FoundWorld, HeldData, Instrument, Measured};
+use crate::fit::setup::{self, BandScan, FoundWorld, Instrument, Measured};
 use crate::fit::world::World;
+use crate::fit::{Motion, Objective};
 use kerrlight_render::dynamics::Axis;
 use std::sync::{Mutex, PoisonError};
 
@@ -115,7 +115,7 @@ fn band(problem: &Problem, progress: &mut dyn Progress) -> Result<BandScan, Erro
 /// The settings with the weight that held-out data choose.
 pub(super) fn weighed(
     file: &FitFile,
-    data: HeldData<'_>,
+    objective: &mut Objective<f32>,
     about: (Axis, [f64; 2]),
     progress: &mut dyn Progress,
 ) -> Result<FitFile, Error> {
@@ -125,7 +125,7 @@ pub(super) fn weighed(
         None => {
             let journal = progress.journal()?;
             let mut watch = |value: usize, fold: usize| progress.goes_on(At::HeldOut(value, fold));
-            let held = setup::hold_out(file, settings, data, about, &*journal, &mut watch)
+            let held = setup::hold_out(file, settings, objective, about, &*journal, &mut watch)
                 .map_err(|error| error.while_in("held_out"))?;
             progress.keep(&Found::Weight(file, &held.ok_or(Stopped::Kept)?))?
         }
@@ -140,13 +140,13 @@ pub(super) fn weighed(
 /// grid chooses is chosen where it is solved.
 pub(super) fn weighed_before_steps(
     file: &FitFile,
-    data: HeldData<'_>,
+    objective: &mut Objective<f32>,
     about: (Axis, [f64; 2]),
     progress: &mut dyn Progress,
 ) -> Result<FitFile, Error> {
     match file.representation.kind {
         Kind::LinearGrid => Ok(file.clone()),
-        _ => weighed(file, data, about, progress),
+        _ => weighed(file, objective, about, progress),
     }
 }
 

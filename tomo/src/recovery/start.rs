@@ -8,7 +8,7 @@ use crate::Error;
 use crate::fit::linear::{Change, Ending, LinearProgress, LinearSolution, Voxels};
 use crate::fit::scan::{AxisLoss, AxisProblem, AxisSettings, Effort, refine_axis, scan_axis};
 use crate::fit::settings::{AxisScan as AxisScanSettings, AxisSearch, FitFile, Kind, Start};
-use crate::fit::setup::{self, CoarseView, Given, HeldData, Measured, SolvedLeakage};
+use crate::fit::setup::{self, CoarseView, Given, Measured, SolvedLeakage};
 use crate::fit::{Batch, Beside, Field, Motion, State, Trainer};
 use crate::representation::{Representation, Workspace};
 use core::ops::ControlFlow;
@@ -73,8 +73,7 @@ impl Fit<'_, '_> {
         let trainer = &mut self.trainer;
         if file.representation.kind == Kind::LinearGrid {
             let nodes = file.representation.grid_nodes();
-            let data = HeldData { objective: &mut trainer.objective, measured };
-            let file = weighed(file, data, (axis, times), progress)?;
+            let file = weighed(file, &mut trainer.objective, (axis, times), progress)?;
             let change = setup::change(&file, times)?;
             let of = (&file, measured, (axis, change), (nodes, 1));
             let solution = solve_linear(of, trainer, progress)?;

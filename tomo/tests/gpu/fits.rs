@@ -5,11 +5,11 @@ use super::problem::{self, Kind, objective, start, training};
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::graphics::GraphicsFit;
 use kerrlight_tomo::fit::{
-    BatchSize, Delegate, Outcome, Penalties, Probe, State, StepDevice, Stretch, Taken, Trainer,
+    BatchSize, ChangePrice, Delegate, Outcome, State, StepDevice, Stretch, Taken, Trainer,
     Training, checkpoint,
 };
 use kerrlight_tomo::optimise::{Muon, Polynomial};
-use kerrlight_tomo::representation::{Activation, Representation};
+use kerrlight_tomo::representation::{Activation, Allowed, Knots, Representation};
 
 /// A fit with its data, on the device or not.
 struct Fit<'a> {
@@ -284,13 +284,14 @@ fn exact_a_divergence_is_stepped_back_from() {
 fn what_is_not_done_is_named_with_its_key() {
     let small = problem::small();
     let settings = training(BatchSize::All, false);
-    let region = settings.region;
-    let penalties = Penalties { priors: Vec::new(), probe: Probe::Fixed { nodes: 4 }, region };
-    let training = Training { penalties: Some(penalties), ..settings };
+    let (region, allowed) = (settings.region, Allowed::Any);
+    let knots = Knots { first: 0.0, spacing: 1.0, count: 2, allowed };
+    let change = ChangePrice { weight: 0.1, knots, linear: true, region };
+    let training = Training { change: Some(change), ..settings };
     let Some(device) = device() else { return };
     let objective = objective(Kind::Images);
     let refused = GraphicsFit::new(device, &objective, &small, &training, None);
     let told = refused.unwrap_err().to_string();
-    assert!(told.starts_with("penalty:"), "{told}");
+    assert!(told.starts_with("change:"), "{told}");
     assert!(told.contains("the processor does it"), "{told}");
 }

@@ -193,7 +193,6 @@ pub fn training(batch: BatchSize, masked: bool) -> Training {
         ramp: 3,
         batch,
         occupancy: masked.then_some(OccupancyPlan { settings, warm_up: 10, every: 7 }),
-        penalties: None,
         change: None,
         region: REGION,
         keep_every: 8,

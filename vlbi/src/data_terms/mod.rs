@@ -6,7 +6,6 @@ mod comparison;
 mod gains;
 mod polarized;
 mod ratios;
-mod traces;
 mod visibilities;
 
 pub use closures::ClosureTerm;
@@ -14,7 +13,6 @@ pub use comparison::{ClosureScan, Comparison};
 pub use gains::{GainTerm, TangentTerm};
 pub use polarized::PolarizedTerm;
 pub use ratios::RatioTerm;
-pub use traces::TraceTerm;
 pub use visibilities::{AmplitudeTerm, VisibilityTerm};
 
 use super::observation::{Measured, Observation};
@@ -50,11 +48,6 @@ pub enum DataTermError {
     /// Nothing to compare with.
     #[error("there are no data for this term")]
     Empty,
-    /// Closure traces are of products of feeds, whose errors are independent.
-    #[error(
-        "closure traces need the products of circular feeds (RR, LL, RL, LR): these data are I, Q, U, V"
-    )]
-    TracesOfStokes,
     /// Closure quantities that depend on each other.
     #[error("the covariance of closure quantities at {0} h UTC is singular")]
     Singular(f64),

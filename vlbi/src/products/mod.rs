@@ -3,16 +3,12 @@
 //! Moran & Swenson 2017, §10.3; Blackburn et al. 2020, ApJ 894, 31).
 
 mod closure;
-mod coherency;
 mod count;
 mod independent;
 mod layers;
-mod trace;
 
 pub use closure::{Closure, ClosureKind, ClosureSet, Leg};
-pub use coherency::Coherency;
 pub use count::ClosureCount;
-pub use trace::{ClosureTrace, LogTrace, TraceLeg, TracePart, TraceQuantity, TraceSet};
 
 use super::observation::Measured;
 

@@ -48,9 +48,8 @@ impl Kept<'_> {
             "chi2_per_datum": chi2,
             "evaluations": loss.points,
         });
-        let penalties = trainer.training.penalty_names();
-        if !penalties.is_empty() {
-            line["penalties"] = json!(map(penalties, &loss.penalties));
+        if let Some(change) = loss.change {
+            line["penalties"] = json!({"change": change});
         }
         if !matches!(settings.axis, AxisSearch::Known {}) {
             line["axis"] = json!(now.axis.vector());

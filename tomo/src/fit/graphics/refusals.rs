@@ -17,7 +17,6 @@ pub fn check(
 ) -> Result<(), Error> {
     let model = &objective.model;
     for (asked, key, what) in [
-        (training.penalties.is_some(), "penalty", "penalties are"),
         (training.change.is_some(), "change", "emission that changes while matter carries it is"),
         (model.planes.is_some(), "polarization", "Stokes parameters are"),
         (representation.built_in().is_none(), "representation.kind", "this representation is"),

@@ -71,7 +71,7 @@ pub struct Loss {
     /// Stokes parameters of a light curve of its own; `["I"]` without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stokes: Option<Vec<StokesParameter>>,
-    /// Least signal-to-noise ratio of baselines in closures, ratios and traces; 0 without it.
+    /// Least signal-to-noise ratio of baselines in closures and ratios; 0 without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "a signal-to-noise ratio"))]
     pub least_snr: Option<f64>,
@@ -99,15 +99,13 @@ pub enum LossKind {
     PolarizedVisibilities,
     /// (Q ± iU)/I of baselines.
     PolarimetricRatios,
-    /// Closure traces, which neither gains nor leakage change.
-    ClosureTraces,
     /// Total flux.
     LightCurve,
 }
 
 impl LossKind {
     /// All kinds.
-    pub const ALL: [LossKind; 9] = [
+    pub const ALL: [LossKind; 8] = [
         LossKind::Image,
         LossKind::Visibilities,
         LossKind::Amplitudes,
@@ -115,7 +113,6 @@ impl LossKind {
         LossKind::LogClosureAmplitudes,
         LossKind::PolarizedVisibilities,
         LossKind::PolarimetricRatios,
-        LossKind::ClosureTraces,
         LossKind::LightCurve,
     ];
 
@@ -129,7 +126,6 @@ impl LossKind {
             LossKind::LogClosureAmplitudes => "log-closure-amplitudes",
             LossKind::PolarizedVisibilities => "polarized-visibilities",
             LossKind::PolarimetricRatios => "polarimetric-ratios",
-            LossKind::ClosureTraces => "closure-traces",
             LossKind::LightCurve => "light-curve",
         }
     }
@@ -144,7 +140,6 @@ impl LossKind {
             LossKind::LogClosureAmplitudes => "log closure amplitudes",
             LossKind::PolarizedVisibilities => "polarized visibilities",
             LossKind::PolarimetricRatios => "polarimetric ratios",
-            LossKind::ClosureTraces => "closure traces",
             LossKind::LightCurve => "the light curve",
         }
     }
@@ -156,28 +151,14 @@ impl LossKind {
 
     /// Whether they compare Q and U of baselines too.
     pub fn is_polarized(self) -> bool {
-        let all = [
-            LossKind::PolarizedVisibilities,
-            LossKind::PolarimetricRatios,
-            LossKind::ClosureTraces,
-        ];
-        all.contains(&self)
+        matches!(self, LossKind::PolarizedVisibilities | LossKind::PolarimetricRatios)
     }
 
     /// Whether they know the flux of the source.
     pub fn knows_flux(self) -> bool {
-        let all = [
-            LossKind::ClosurePhases,
-            LossKind::LogClosureAmplitudes,
-            LossKind::PolarimetricRatios,
-            LossKind::ClosureTraces,
-        ];
+        let all =
+            [LossKind::ClosurePhases, LossKind::LogClosureAmplitudes, LossKind::PolarimetricRatios];
         !all.contains(&self)
-    }
-
-    /// Whether they are visibilities, or made of those.
-    pub fn has_baselines(self) -> bool {
-        !matches!(self, LossKind::Image | LossKind::LightCurve)
     }
 
     /// Whether they are complex visibilities, of total intensity or of all products.

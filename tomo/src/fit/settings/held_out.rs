@@ -14,33 +14,9 @@ pub struct HeldOutSettings {
     /// Values to choose from, two or more; those of a prior above 0.
     #[schemars(inner(range(min = 0.0, max = 1e12)), extend("unit" = "a factor"))]
     pub values: Vec<f64>,
-    /// Parts of the frames or baselines, at most half of their number.
-    #[schemars(range(min = 2, max = 1000), extend("unit" = "parts of the data"))]
+    /// Parts of the frames, at most half of their number.
+    #[schemars(range(min = 2, max = 1000), extend("unit" = "parts of the frames"))]
     pub folds: usize,
-    /// What the data are divided by; baselines need losses of visibilities or what is made of them alone.
-    #[serde(default)]
-    pub by: HeldOutBy,
-}
-
-/// What is held out together.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum HeldOutBy {
-    /// All data of a frame.
-    #[default]
-    Frames,
-    /// All visibilities of a baseline.
-    Baselines,
-}
-
-impl HeldOutBy {
-    /// Its word.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Frames => "frames",
-            Self::Baselines => "baselines",
-        }
-    }
 }
 
 /// A weight of the linear problem.
@@ -107,12 +83,6 @@ impl HeldOutSettings {
             return Err(
                 FitError::range("length of held_out.values", self.values.len(), allowed).into()
             );
-        }
-        if self.by == HeldOutBy::Baselines
-            && file.loss.iter().any(|loss| !loss.data.has_baselines())
-        {
-            let why = "held_out.by = \"baselines\" needs losses of visibilities or what is made of them alone";
-            return Err(FitError::Conflict(why.to_owned()).into());
         }
         let has_prior = file.linear.as_ref().is_some_and(|linear| linear.prior.is_some());
         let is_linear = file.representation.kind == Kind::LinearGrid;

@@ -33,12 +33,12 @@ pub use data::{DataFiles, Loss, LossKind};
 pub use error::FitError;
 pub(crate) use error::{Within, refuse};
 pub use gaussian::{FieldKind, FieldSettings, Negative, PriorOfVoxels};
-pub use held_out::{HeldOutBy, HeldOutSettings, Weight};
+pub use held_out::{HeldOutSettings, Weight};
 pub use instrument::{GainPhases, GainSettings, InstrumentSettings, LeakageSettings};
 pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedBackground, SimulatedCurve};
 pub use medium::{Scattering, Variability};
 pub use merge::merge;
-pub use penalties::{PenaltyKind, PenaltySettings, ProbeSettings};
+pub use penalties::{PenaltyKind, PenaltySettings};
 pub use quantity::{PriorSettings, Quantity};
 pub use quiescent::QuiescentSettings;
 pub use recovery::{
@@ -112,12 +112,6 @@ pub struct FitFile {
     pub instrument: Option<InstrumentSettings>,
     /// Terms of the loss, the sum of weight · χ² per datum.
     pub loss: Vec<Loss>,
-    /// Penalties on the emission, integrals over its volume.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub regulariser: Vec<PenaltySettings>,
-    /// Grid on which penalties of a network are evaluated.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub probe: Option<ProbeSettings>,
     /// How the recovered emission is represented.
     pub representation: Representation,
     /// How the representation is optimised.

@@ -87,8 +87,6 @@ impl FitFile {
             search: None,
             instrument: None,
             loss: Vec::new(),
-            regulariser: Vec::new(),
-            probe: None,
             representation: Representation::of(kind),
             training: Training::starting(start),
             linear: Some(Linear::below(3.0)),

@@ -3,7 +3,7 @@
 
 use super::penalties::priors_of;
 use super::static_polarization::check_strength;
-use super::{FitError, InstrumentSettings, Loss, LossKind, PenaltyKind, PenaltySettings, Within};
+use super::{FitError, InstrumentSettings, Loss, LossKind, PenaltySettings, Within};
 use super::{Scattering, StaticPolarization, Variability};
 use super::{keys, refuse};
 use crate::Error;
@@ -237,13 +237,6 @@ impl StaticImageFile {
     }
 
     fn check_penalties(&self) -> Result<(), Error> {
-        let is_sparsity = |penalty: &PenaltySettings| penalty.kind == PenaltyKind::Sparsity;
-        if let Some(k) = self.regulariser.iter().position(is_sparsity) {
-            refuse!(
-                "regulariser {k}: kind = \"sparsity\" is not for an image: its light adds up to the flux, which has a prior of \
-                 its own"
-            );
-        }
         self.priors()?;
         let Some(strength) = &self.strength else { return Ok(()) };
         check_strength("", strength)?;
@@ -329,7 +322,13 @@ most_radius_uas = 40.0
             ("diameter_uas = 40.0", "diameter_uas = 0.0", "image.starts.0.ring.diameter_uas = 0"),
             ("values = [0.1, 1.0]", "values = [0.1]", "length of strength.values = 1"),
             ("folds = 3", "folds = 1", "strength.folds = 1"),
-            ("\"smoothness\"", "\"sparsity\"", "regulariser 0: kind = \"sparsity\" is not for"),
+            ("kind = \"smoothness\"", "kind = \"sparsity\"", "unknown variant `sparsity`"),
+            ("\"smoothness\"", "\"total-variation\"", "regulariser 0: epsilon is missing"),
+            (
+                "\"smoothness\"",
+                "\"smoothness\"\nepsilon = 1.0",
+                "regulariser 0: epsilon is not for smoothness",
+            ),
             ("\"closure-phases\"", "\"image\"", "loss 0: data = \"image\" is not for"),
             ("most_radius_uas = 40.0", "most_radius_uas = 70.0", "at most 60, half of the field"),
             ("[ring]", "[hole]\nspin = 0.5\n[ring]", "unknown field `hole`"),

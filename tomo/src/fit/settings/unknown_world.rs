@@ -38,9 +38,7 @@ fn free(
 ) -> Result<Free, Error> {
     let prior = settings.prior(parameter.unit()).checked().within(key)?;
     if matches!(prior, Prior::Isotropic { .. }) && parameter != Parameter::Inclination {
-        let why = format!(
-            "{key}: isotropic is a prior of inclinations; take uniform or normal"
-        );
+        let why = format!("{key}: isotropic is a prior of inclinations; take uniform or normal");
         return Err(FitError::Conflict(why).into());
     }
     let ([low, high], [least, most], unit) = (parameter.range(), prior.bounds(), parameter.unit());

@@ -113,9 +113,9 @@ fn flux(file: &FitFile) -> Result<(), FitError> {
         );
     }
     let pulls = |linear: &Linear| linear.smoothness > 0.0 || linear.sparsity > 0.0;
-    if !file.regulariser.is_empty() || file.linear.as_ref().is_some_and(pulls) {
+    if file.linear.as_ref().is_some_and(pulls) {
         refuse!(
-            "regulariser, linear.smoothness and linear.sparsity are not allowed with {} alone: these do not determine the flux, and penalties would drive it to 0; add a loss of amplitudes or of the light curve",
+            "linear.smoothness and linear.sparsity are not allowed with {} alone: these do not determine the flux, and penalties would drive it to 0; add a loss of amplitudes or of the light curve",
             data(file)
         );
     }

@@ -1,12 +1,12 @@
 //! Weights of the linear problem, judged by data that its solution has not seen.
 
+use super::Result;
 use super::change::change;
 use super::linear_problem::{Of, misfit, solve_frames};
-use super::{Measured, Result};
+use crate::fit::Objective;
 use crate::fit::journal::{self, Journal};
-use crate::fit::linear::{Change, Ending, LinearProgress, Watch};
-use crate::fit::settings::{FitError, FitFile, HeldOutBy, HeldOutSettings, Kind, Start};
-use crate::fit::{Data, Objective};
+use crate::fit::linear::{Ending, LinearProgress, Watch};
+use crate::fit::settings::{FitError, FitFile, HeldOutSettings, Kind, Start};
 use core::ops::ControlFlow;
 use kerrlight_render::dynamics::Axis;
 
@@ -43,36 +43,31 @@ pub fn best(all: &[Held]) -> Option<&Held> {
 /// Told which value and which part is being solved, both from 0; says whether to go on.
 pub type HeldWatch<'a> = dyn FnMut(usize, usize) -> bool + 'a;
 
-/// A forward model with its data, and those as they were measured.
-pub struct HeldData<'a> {
-    /// Frames of all data.
-    pub objective: &'a mut Objective<f32>,
-    /// From which baselines are taken.
-    pub measured: &'a Measured,
-}
-
 /// Solves the linear problem for each value without each part of the data, and looks at that part: the loss of
 /// what was not fitted. `times` are those of the first and the last emission, M since the reference time. None if it
 /// was cancelled. Parts that the journal knows of an earlier call are not solved again.
 ///
 /// # Errors
-/// If a setting is out of range, there are fewer frames or baselines than parts, or a problem has no solution.
+/// If a setting is out of range, there are fewer frames than parts, or a problem has no solution.
 pub fn hold_out(
     file: &FitFile,
     held_out: &HeldOutSettings,
-    HeldData { objective, measured }: HeldData<'_>,
+    objective: &mut Objective<f32>,
     (axis, times): (Axis, [f64; 2]),
     journal: &dyn Journal,
     watch: &mut HeldWatch<'_>,
 ) -> Result<Option<Vec<Held>>> {
     objective.model.weigh(axis);
-    check_folds(held_out, objective.observed().len(), measured)?;
+    let observed = objective.observed();
+    check_folds(held_out, observed.len())?;
     let mut found: Vec<Held> =
         held_out.values.iter().map(|value| Held { value: *value, losses: Vec::new() }).collect();
     for fold in 0..held_out.folds {
-        let mut parts = Parts::new((file, held_out), (objective, measured), fold)?;
+        let (out, kept): (Vec<_>, Vec<_>) =
+            observed.iter().enumerate().partition(|(at, _)| at % held_out.folds == fold);
+        let parts = [kept, out].map(|part| part.into_iter().map(|(_, frame)| *frame).collect());
         for (k, held) in found.iter_mut().enumerate() {
-            let key = journal::key((held_out.by.name(), held.value.to_bits(), fold));
+            let key = journal::key((held.value.to_bits(), fold));
             if let Some(&[loss]) = journal.recall(key).as_deref() {
                 held.losses.push(loss);
                 continue;
@@ -83,7 +78,8 @@ pub fn hold_out(
                 false => ControlFlow::Break(()),
             };
             let how = (axis, change(&file, times)?);
-            let Some(loss) = parts.loss(&file, objective, how, &mut told)? else { return Ok(None) };
+            let of = Of { file: &file, objective, how, nodes: nodes(&file), seed: None };
+            let Some(loss) = loss(&of, &parts, &mut told)? else { return Ok(None) };
             journal.keep(key, &[loss]);
             held.losses.push(loss);
         }
@@ -91,98 +87,25 @@ pub fn hold_out(
     Ok(Some(found))
 }
 
-/// Refuses more parts than there are data for, of which so many frames have some.
+/// Refuses more parts than half of the frames with data.
 ///
 /// # Errors
 /// Names the most parts that data allow.
-pub fn check_folds(held_out: &HeldOutSettings, frames: usize, measured: &Measured) -> Result<()> {
-    let (all, what) = match held_out.by {
-        HeldOutBy::Frames => (frames, "frames with data"),
-        HeldOutBy::Baselines => (measured.baselines().len(), "baselines"),
-    };
-    if all < 2 * held_out.folds {
-        let allowed = format!("{} at most, half of the {what}", all / 2);
+pub fn check_folds(held_out: &HeldOutSettings, frames: usize) -> Result<()> {
+    if frames < 2 * held_out.folds {
+        let allowed = format!("{} at most, half of the frames with data", frames / 2);
         return Err(FitError::range("held_out.folds".to_owned(), held_out.folds, &allowed).into());
     }
     Ok(())
 }
 
-/// What is fitted, and what is held out of it.
-struct Parts {
-    /// Frames that are fitted, and those that are held out.
-    frames: [Vec<usize>; 2],
-    /// Data of the two, where they are not those of the objective.
-    data: Option<[Data<f32>; 2]>,
-}
-
-impl Parts {
-    fn new(
-        (file, held_out): (&FitFile, &HeldOutSettings),
-        (objective, measured): (&mut Objective<f32>, &Measured),
-        fold: usize,
-    ) -> Result<Self> {
-        let is_held = |k: usize| k % held_out.folds == fold;
-        if held_out.by == HeldOutBy::Frames {
-            let all = objective.observed();
-            let part = |held: bool| -> Vec<usize> {
-                let frames = all.iter().enumerate().filter(|(at, _)| is_held(*at) == held);
-                frames.map(|(_, frame)| *frame).collect()
-            };
-            return Ok(Self { frames: [false, true].map(part), data: None });
-        }
-        let pixels = file.screen.pixels * file.screen.pixels;
-        let terms =
-            |held: bool| measured.of_baselines(|k| is_held(k) == held).terms(&file.loss, pixels);
-        let mut data = [terms(false)?, terms(true)?];
-        // What has no data says so by its terms.
-        let frames = [0, 1].map(|k| {
-            core::mem::swap(&mut objective.data, &mut data[k]);
-            let frames = objective.observed();
-            core::mem::swap(&mut objective.data, &mut data[k]);
-            frames
-        });
-        Ok(Self { frames, data: Some(data) })
+/// The loss of frames that are held out, beside the solution of the others; none if that was cancelled.
+fn loss(of: &Of<'_>, [kept, out]: &[Vec<usize>; 2], watch: &mut Watch<'_>) -> Result<Option<f64>> {
+    let solution = solve_frames(of, kept, watch)?;
+    if solution.ending == Ending::Cancelled {
+        return Ok(None);
     }
-
-    /// Beside what is fitted, or what is held out.
-    fn beside<R>(
-        &mut self,
-        held: bool,
-        objective: &mut Objective<f32>,
-        work: impl FnOnce(&Objective<f32>, &[usize]) -> Result<R>,
-    ) -> Result<R> {
-        let k = usize::from(held);
-        if let Some(data) = &mut self.data {
-            core::mem::swap(&mut objective.data, &mut data[k]);
-        }
-        let done = work(objective, &self.frames[k]);
-        if let Some(data) = &mut self.data {
-            core::mem::swap(&mut objective.data, &mut data[k]);
-        }
-        done
-    }
-
-    /// The loss of what is held out, beside the solution of the rest; none if that was cancelled.
-    fn loss(
-        &mut self,
-        file: &FitFile,
-        objective: &mut Objective<f32>,
-        how: (Axis, Change),
-        watch: &mut Watch<'_>,
-    ) -> Result<Option<f64>> {
-        let nodes = nodes(file);
-        let solution = self.beside(false, objective, |objective, frames| {
-            solve_frames(&Of { file, objective, how, nodes, seed: None }, frames, watch)
-        })?;
-        if solution.ending == Ending::Cancelled {
-            return Ok(None);
-        }
-        let emission = solution.parameters();
-        let loss = self.beside(true, objective, |objective, frames| {
-            misfit(&Of { file, objective, how, nodes, seed: None }, frames, &emission)
-        })?;
-        Ok(Some(loss))
-    }
+    misfit(of, out, &solution.parameters()).map(Some)
 }
 
 /// Nodes along each axis of the voxels that frames judge: those of the fit, or of its start.

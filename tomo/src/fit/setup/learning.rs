@@ -187,7 +187,6 @@ pub fn training(
         ramp: chosen.ramp,
         batch: chosen.batch,
         occupancy,
-        penalties: file.penalties()?,
         change: price(file, times)?,
         region: file.region.limits(),
         keep_every: 50,

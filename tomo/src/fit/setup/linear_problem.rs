@@ -109,10 +109,7 @@ impl Of<'_> {
     ) -> Result<R> {
         let Of { file, objective, how: (axis, change), nodes, .. } = *self;
         let settings = linear(file)?;
-        let mut priors = priors(settings);
-        if file.representation.kind == Kind::LinearGrid {
-            priors.extend(file.priors()?);
-        }
+        let priors = priors(settings);
         let voxels = Voxels::cube(nodes, file.region.r_max, settings.degree);
         let gaussian = self.gaussian(&voxels)?;
         solve(&LinearProblem {

@@ -109,7 +109,6 @@ impl Measured {
             LossKind::ClosurePhases => ("closure phases", false),
             LossKind::PolarizedVisibilities => ("polarized visibilities", self.gains.is_none()),
             LossKind::PolarimetricRatios => ("polarimetric ratios", false),
-            LossKind::ClosureTraces => ("closure traces", false),
             _ => ("log closure amplitudes", false),
         };
         let scans: Vec<Option<Scan<T>>> =

@@ -40,31 +40,6 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// The visibilities of some baselines alone, which are numbered in the order of their stations.
-    #[must_use]
-    pub(super) fn of_baselines(&self, keep: impl Fn(usize) -> bool) -> Self {
-        let mut copy = self.without_truth();
-        let baselines = self.baselines();
-        if let Some((observation, frames)) = &mut copy.visibilities {
-            let kept = |stations: &[u16; 2]| baselines.binary_search(stations).is_ok_and(&keep);
-            let kept: Vec<bool> = observation.rows.iter().map(|row| kept(&row.stations)).collect();
-            let mut of_rows = kept.iter();
-            observation.rows.retain(|_| of_rows.next() == Some(&true));
-            let mut of_frames = kept.iter();
-            frames.retain(|_| of_frames.next() == Some(&true));
-        }
-        copy
-    }
-
-    /// Pairs of stations with visibilities, in their order.
-    pub(super) fn baselines(&self) -> Vec<[u16; 2]> {
-        let rows = self.visibilities.iter().flat_map(|(observation, _)| &observation.rows);
-        let mut all: Vec<[u16; 2]> = rows.map(|row| row.stations).collect();
-        all.sort_unstable();
-        all.dedup();
-        all
-    }
-
     pub(super) fn empty() -> Self {
         Self {
             times: Vec::new(),

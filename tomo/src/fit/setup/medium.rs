@@ -24,8 +24,8 @@ pub(super) fn correct(
     let Some(variability) = variability else { return Ok(()) };
     if is_polarized(losses) {
         refuse!(
-            "data.visibilities.variability is that of total intensity: it is not for polarized-visibilities, \
-             polarimetric-ratios or closure-traces"
+            "data.visibilities.variability is that of total intensity: it is not for polarized-visibilities or \
+             polarimetric-ratios"
         );
     }
     for row in &mut observation.rows {

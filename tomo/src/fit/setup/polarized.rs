@@ -26,7 +26,7 @@ pub(super) fn images(losses: &[Loss]) -> usize {
 pub(super) fn check(file: &FitFile) -> Result<()> {
     if is_polarized(&file.loss) && file.unknown_world()?.is_some() {
         refuse!(
-            "numbers with a prior are not searched with polarized-visibilities, polarimetric-ratios or closure-traces"
+            "numbers with a prior are not searched with polarized-visibilities or polarimetric-ratios"
         );
     }
     let solves = file.instrument.as_ref().is_some_and(|instrument| instrument.leakage.is_some());
@@ -36,9 +36,9 @@ pub(super) fn check(file: &FitFile) -> Result<()> {
     if solves && !products {
         refuse!("instrument.leakage needs a loss with data = \"polarized-visibilities\"");
     }
-    if draws && !products && !has(LossKind::ClosureTraces) {
+    if draws && !products {
         refuse!(
-            "simulation.observation.leakage needs a loss with data = \"polarized-visibilities\" or \"closure-traces\""
+            "simulation.observation.leakage needs a loss with data = \"polarized-visibilities\""
         );
     }
     if solves && has(LossKind::PolarimetricRatios) {

@@ -3,8 +3,7 @@
 use super::{Measured, Result};
 use crate::fit::Scan;
 use crate::fit::settings::{Loss, LossKind};
-use kerrlight_vlbi::Error as VlbiError;
-use kerrlight_vlbi::data_terms::{DataTerm, DataTermError, PolarizedTerm, RatioTerm, TraceTerm};
+use kerrlight_vlbi::data_terms::{DataTerm, PolarizedTerm, RatioTerm};
 use kerrlight_vlbi::operator::{Float, Method, Operator, Transform};
 use kerrlight_vlbi::polarimetry::MODELLED;
 use num_complex::Complex;
@@ -39,28 +38,14 @@ impl Measured {
         frame: usize,
         loss: &Loss,
     ) -> Result<Option<Scan<T>>> {
-        let least_snr = loss.least_snr.unwrap_or(0.0);
-        match loss.data {
-            LossKind::PolarimetricRatios => return self.ratios(frame, least_snr),
-            LossKind::ClosureTraces => return self.traces(frame, least_snr),
-            _ => {}
+        if loss.data == LossKind::PolarimetricRatios {
+            return self.ratios(frame, loss.least_snr.unwrap_or(0.0));
         }
         let scan = |(transform, term)| {
             let term: Box<dyn DataTerm<T> + Send> = Box::new(term);
             Scan { transform, term }
         };
         Ok(self.products(frame)?.map(scan))
-    }
-
-    fn traces<T: Float>(&self, frame: usize, least_snr: f64) -> Result<Option<Scan<T>>> {
-        let (part, sky) = self.part(frame)?;
-        let term = match TraceTerm::new(&part, least_snr) {
-            Err(VlbiError::DataTerm(DataTermError::Empty)) => return Ok(None),
-            term => Box::new(term?),
-        };
-        let images = vec![TraceTerm::uv(&part, least_snr); MODELLED];
-        let transform = Transform::new(sky, self.pulse, &images, Method::Direct, MEMORY)?;
-        Ok(Some(Scan { transform, term }))
     }
 
     fn ratios<T: Float>(&self, frame: usize, least_snr: f64) -> Result<Option<Scan<T>>> {

@@ -68,7 +68,7 @@ fn polarized(file: &FitFile) -> Result<Option<Seen>> {
     let image = file.loss.iter().any(|loss| loss.data == LossKind::Image);
     if image || !file.has_visibilities() {
         refuse!(
-            "a loss of polarized-visibilities, polarimetric-ratios or closure-traces stands with other visibilities alone: images are not allowed"
+            "a loss of polarized-visibilities or polarimetric-ratios stands with other visibilities alone: images are not allowed"
         );
     }
     Ok(Some(Seen::StokesImages(PARAMETERS.to_vec())))

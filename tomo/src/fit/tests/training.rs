@@ -19,7 +19,6 @@ pub(super) fn settings() -> Training {
             warm_up: 10,
             every: 7,
         }),
-        penalties: None,
         change: None,
         region: Region { r_min: 3.0, r_max: 6.0, z_width: 4.0 },
         keep_every: 8,

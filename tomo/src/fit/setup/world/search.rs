@@ -6,9 +6,7 @@ use super::tangent::Anchor;
 use crate::fit::journal::{Journal, Memory};
 use crate::fit::settings::{FieldKind, FitFile, Linear, UnknownWorld};
 use crate::fit::setup::{Measured, Result};
-use crate::fit::world::{
-    Estimate, Exploration, Explored, Spread, World, WorldProblem, WorldWatch,
-};
+use crate::fit::world::{Estimate, Exploration, Explored, Spread, World, WorldProblem, WorldWatch};
 
 use rayon::prelude::*;
 
