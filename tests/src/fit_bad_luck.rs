@@ -117,7 +117,7 @@ fn movie(folder: &Path, pixel: &str) -> Vec<String> {
     };
     std::fs::write(folder.join("frame.csv"), (0..20).map(row).collect::<String>()).unwrap();
     changed(folder, |text| {
-        let (before, rest) = text.split_once("[[simulation.truth.spot]]").unwrap();
+        let (before, rest) = text.split_once("[simulation").unwrap();
         let (_, after) = rest.split_once("[[loss]]").unwrap();
         format!(
             "{before}[data.movie]\npath = \"frame.csv\"\nfrom = 0.0\nto = 0.0\n\n[[loss]]{after}"

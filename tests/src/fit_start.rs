@@ -20,7 +20,7 @@ fn fit(folder: &Path) {
         &law,
         "motion.axis=[0.5,0.3,0.8]",
         "motion.injection_time=-8.0",
-        "movie={frames=5,from=-5.0,to=60.0}",
+        "simulation.movie={frames=5,from=-5.0,to=60.0}",
         "representation=linear-grid",
         "representation.nodes=24",
         "training.start=drawn",

@@ -101,7 +101,7 @@ fn exact_a_dark_start_without_slope_is_refused() {
 #[test]
 fn exact_data_without_light_and_axes_that_are_all_alike_fail() {
     let folder = tempfile::tempdir().unwrap();
-    let dark = r#"truth={spot=[{center=[5.5,0.0,0.0],sigma=0.7,amplitude=0.0}]}"#;
+    let dark = r#"simulation.truth={spot=[{center=[5.5,0.0,0.0],sigma=0.7,amplitude=0.0}]}"#;
     let failed = |sets: &[&str], name: &str| {
         let output = kerrlight(folder.path(), &with(&small(sets), &["-o", name]));
         let said = String::from_utf8_lossy(&output.stderr).into_owned();

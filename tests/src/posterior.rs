@@ -80,7 +80,7 @@ fn exact_draws_of_a_right_model_predict_the_data() {
         "screen.pixels=12".to_owned(),
         "screen.jy_per_pixel=0.007".to_owned(),
         format!(
-            "truth={{spot=[],field={{{field},negative=\"lifted\",nodes=12,degree=\"linear\"}}}}"
+            "simulation.truth={{spot=[],field={{{field},negative=\"lifted\",nodes=12,degree=\"linear\"}}}}"
         ),
         "simulation.observation.scans=5".to_owned(),
         "representation=linear-grid".to_owned(),

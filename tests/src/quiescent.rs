@@ -72,7 +72,7 @@ fn exact_what_excludes_a_quiescent_image_is_refused() {
         (
             &[
                 "loss=[{data=\"closure-phases\",weight=1.0}]",
-                "observation={array=\"ngEHT\",source=\"sgra\",mjd=57851,utc=[10.0,11.0],scans=4,integration_s=30.0,frequency_ghz=230.0,bandwidth_ghz=2.0,elevation_deg=[10.0,85.0],noise=\"none\",first_time=0.0}",
+                "simulation.observation={array=\"ngEHT\",source=\"sgra\",mjd=57851,utc=[10.0,11.0],scans=4,integration_s=30.0,frequency_ghz=230.0,bandwidth_ghz=2.0,elevation_deg=[10.0,85.0],noise=\"none\",first_time=0.0}",
                 "linear.flux_jy=3.0",
                 "linear.sparsity=0.0",
             ],

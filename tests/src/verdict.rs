@@ -61,7 +61,7 @@ fn regress_a_fit_with_right_settings_explains_its_data() {
 fn regress_a_fit_with_wrong_settings_says_so() {
     let folder = tempfile::tempdir().unwrap();
     for wrong in ["observer.inclination_deg=30.0", "hole.spin=0.9", "motion.axis=[0.0,0.0,-1.0]"] {
-        let wrong = format!("world.{wrong}");
+        let wrong = format!("simulation.{wrong}");
         let found = verdict(folder.path(), &[&["fit"], &SMALL[..], &["--set", &wrong]].concat());
         assert_eq!(found["outcome"], "unexplained", "{wrong}: {found}");
         assert!(chi2(&found, 0) > 2.0, "{wrong}: {found}");

@@ -185,7 +185,7 @@ fn add_background(
         if !matches!(parameter, StokesParameter::Q | StokesParameter::U) {
             continue;
         }
-        let light = background.drawn(&minutes, &normal).within("light_curve.background")?;
+        let light = background.drawn(&minutes, &normal).within("simulation.light_curve.background")?;
         let own = fluxes.iter_mut().skip(place).step_by(parameters.len());
         own.zip(light).for_each(|(flux, light)| *flux += light);
     }
@@ -197,10 +197,10 @@ fn hours(settings: &SimulatedCurve) -> Result<Vec<f64>> {
     if hours.is_empty() {
         let why =
             "give `times_h = [ … ]`, hours of UTC, or `times = \"FILE.csv\"` with such a column";
-        return Err(FitError::missing("light_curve.times_h", why).into());
+        return Err(FitError::missing("simulation.light_curve.times_h", why).into());
     }
     if !hours.is_sorted() || hours.iter().any(|h| !(-1e4..=1e4).contains(h)) {
-        refuse!("light_curve.times_h: hours of UTC in growing order");
+        refuse!("simulation.light_curve.times_h: hours of UTC in growing order");
     }
     Ok(hours)
 }
@@ -212,12 +212,12 @@ fn measure(
     settings: &SimulatedCurve,
     seed: u64,
 ) -> Result<Vec<Option<FluxDatum>>> {
-    let sigmas = checked(settings.sigma, "light_curve.sigma")?;
+    let sigmas = checked(settings.sigma, "simulation.light_curve.sigma")?;
     let mut random = Pcg64Mcg::seed_from_u64(seed ^ 0x1165_c04e);
     let mut one = |k: usize| {
         let parameter = parameters[k % parameters.len()];
         let missing = || {
-            let key = format!("light_curve.sigma.{}", parameter.name());
+            let key = format!("simulation.light_curve.sigma.{}", parameter.name());
             FitError::missing(&key, "its standard deviation in Jy")
         };
         let sigma = sigmas.of(parameter).ok_or_else(missing)?;

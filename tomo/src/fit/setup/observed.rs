@@ -29,7 +29,7 @@ pub(super) fn schedule_of(seen: &Seen, array: Option<&Array>) -> Result<(Observa
         ut1: Ut1::Table,
         frame: Frame::Catalogue,
     };
-    let missing = || FitError::missing("observation.array", "an observation needs its stations");
+    let missing = || FitError::missing("simulation.observation.array", "an observation needs its stations");
     let array = array.ok_or_else(missing)?;
     let mut observation = schedule::observe_affordable(array, source.position, &schedule, &setup)
         .within("observation")?;
@@ -43,10 +43,10 @@ fn clock(seen: &Seen) -> Result<(Clock, [f64; 2])> {
         (Some(hours), None) => Ok((Clock::Utc, hours)),
         (None, Some(hours)) => Ok((Clock::Gmst, hours)),
         (Some(_), Some(_)) => refuse!(
-            "observation.gmst is not allowed together with observation.utc"
+            "simulation.observation.gmst is not allowed together with simulation.observation.utc"
         ),
         (None, None) => Err(FitError::missing(
-            "observation.utc",
+            "simulation.observation.utc",
             "give `utc = [FROM, TO]`, hours of UTC of the first scan and of one after the last, or `gmst = [FROM, TO]`, \
              the same in sidereal time, in [observation]",
         ).into()),
@@ -68,11 +68,11 @@ pub(super) fn spoil(
 ) -> Result<Spoiled> {
     let gains = seen.gains.as_ref();
     if let Some(name) = gains.and_then(|gains| gains.unknown_station(observation)) {
-        refuse!("observation.gains.stations.{name}: {} has no such station", seen.array);
+        refuse!("simulation.observation.gains.stations.{name}: {} has no such station", seen.array);
     }
     let drawn = seen.leakage.map(|amplitude| apply_leakage(observation, amplitude, file.seed));
     let observes = observing(observation);
-    let leakage = drawn.transpose().within("observation.leakage")?.map(|leakage| {
+    let leakage = drawn.transpose().within("simulation.observation.leakage")?.map(|leakage| {
         let exact = vec![[0.0; 2]; leakage.len()];
         LeakageTable::new(&observation.stations, &leakage, &exact, |k| observes[k])
     });
@@ -81,7 +81,7 @@ pub(super) fn spoil(
         add_thermal_noise(observation, file.seed);
     }
     if let Some(part) = seen.systematic {
-        add_systematic("observation.systematic", part, (observation, &fit.loss))?;
+        add_systematic("simulation.observation.systematic", part, (observation, &fit.loss))?;
     }
     Ok(Spoiled { gains, leakage })
 }

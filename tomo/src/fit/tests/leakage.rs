@@ -80,7 +80,7 @@ fn exact_refusals() {
     assert!(refused(&[intensity], false).contains("instrument.leakage needs a loss"));
     let both =
         "loss=[{data=\"polarized-visibilities\",weight=1.0},{data=\"image\",weight=1.0,sigma=1.0}]";
-    assert!(refused(&[both], false).contains("a loss of images"));
+    assert!(refused(&[both], false).contains("images are not allowed"));
     let drawn = ["representation={kind=\"grid\",nodes=8,activation=\"linear\"}"];
     assert!(!refused(&drawn, false).is_empty());
 }
