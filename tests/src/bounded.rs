@@ -259,7 +259,7 @@ fn exact_a_sequence_of_images_is_a_movie() {
     let inputs = std::fs::read_to_string(at.join("by_folder/inputs.json")).unwrap();
     assert_eq!(inputs.matches("frame_0000.exr").count(), 1, "{inputs}");
     std::fs::remove_file(at.join("frames/frame_0003.exr")).unwrap();
-    let path = "data.movie.path=frames/frame_%04d.exr";
+    let path = "data.movie={path=\"frames/frame_%04d.exr\",from=0.0,to=120.0}";
     let words = ["fit", "data.toml", "-o", "gap", "--set", path];
     let message = fail(at, &[&words[..], &set].concat());
     assert!(message.contains("frame_0002.exr is followed by frame_0004.exr"), "{message}");

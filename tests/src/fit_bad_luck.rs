@@ -116,13 +116,17 @@ fn movie(folder: &Path, pixel: &str) -> Vec<String> {
         (0..20).map(flux).collect::<Vec<_>>().join(",") + "\n"
     };
     std::fs::write(folder.join("frame.csv"), (0..20).map(row).collect::<String>()).unwrap();
-    changed(folder, |text| {
+    let mut words = changed(folder, |text| {
         let (before, rest) = text.split_once("[simulation").unwrap();
         let (_, after) = rest.split_once("[[loss]]").unwrap();
         format!(
             "{before}[data.movie]\npath = \"frame.csv\"\nfrom = 0.0\nto = 0.0\n\n[[loss]]{after}"
         )
-    })
+    });
+    let simulated = |word: &String| word.starts_with("simulation.");
+    let at = words.iter().position(simulated).unwrap();
+    words.drain(at - 1..=at);
+    words
 }
 
 #[test]
