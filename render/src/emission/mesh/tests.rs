@@ -205,6 +205,13 @@ fn exact_statements_of_obj_that_are_not_read_say_where() {
         library("newmtl a\nKd spectral x.rfl\n")
             .contains("`paint.mtl`, to which it refers: line 2: Kd spectral")
     );
+    for (text, said) in [
+        ("newmtl a\nKe 1 0 0\nnewmtl a\nKe 0 1 0\n", "line 3: a second material is named `a`"),
+        ("newmtl a\nKe 1 0 0\nke 0 1 0\n", "line 3: a second ke of one material"),
+        ("Ke 1 0 0\nnewmtl a\n", "line 1: Ke before newmtl"),
+    ] {
+        assert!(library(text).contains(said), "{}", library(text));
+    }
     assert!(library("newmtl a\nmap_Kd -mm 0 2 x.png\n").contains("option -mm 0 2 is not read"));
     assert!(library("newmtl a\nmap_Kd no.png\n").contains("`no.png`, to which it refers"));
     assert!(error(b"ply\nformat ascii 1.0\n", &[]).contains("PLY files are not read"));
