@@ -157,7 +157,9 @@ fn each_number<R: Read, E: From<Error>>(
         }
         match rest.read(&mut [0]) {
             Ok(0) => Ok(()),
-            Ok(_) => Err(damaged(format!("there are more bytes than the shape {shape:?} has")).into()),
+            Ok(_) => {
+                Err(damaged(format!("there are more bytes than the shape {shape:?} has")).into())
+            }
             Err(error) => Err(damaged(error.to_string()).into()),
         }
     }
