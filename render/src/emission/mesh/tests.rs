@@ -96,6 +96,24 @@ fn exact_gltf_against_its_specification_says_why() {
     assert!(with(r#""material":0"#, r#""material":0,"indices":0"#).contains("Scalar of [U8"));
     let sparse = r#""count":3,"sparse":{"count":2,"indices":{"bufferView":0,"componentType":5125},"values":{"bufferView":0,"byteOffset":24}}"#;
     assert!(with(r#""count":3"#, sparse).contains("sparse accessor 0"));
+    // The bytes of a 1.0 in front of the values are no index of a point.
+    let one = r#""count":3,"sparse":{"count":1,"indices":{"bufferView":0,"byteOffset":12,"componentType":5125},"values":{"bufferView":0,"byteOffset":24}}"#;
+    let said = with(r#""count":3"#, one);
+    assert!(
+        said.contains("sparse accessor 0 (counted from 0) replaces point 1065353216 of 3"),
+        "{said}"
+    );
+    assert!(
+        with(r#""version":"2.0""#, r#""version":"2.0","minVersion":"2.1""#).contains("\"2.1\"")
+    );
+    let matrix = |last: &str, more: &str| {
+        with(
+            r#""translation":[0,0,5]"#,
+            &format!(r#""matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,5,{last}]{more}"#),
+        )
+    };
+    assert!(matrix("2", "").contains("last row of [0.0, 0.0, 0.0, 2.0]"));
+    assert!(matrix("1", r#","scale":[1,1,1]"#).contains("has a matrix as well as"));
 }
 
 /// A triangle in a buffer inside the text, raised by its node, half as bright as white.
