@@ -130,7 +130,7 @@ impl Observe {
         }
         let times_h = schedule.hours_utc(setup.ut1)?;
         let (movie, frames_h, said) = self.movie(&files, &times_h)?;
-        if let Some(warning) = odd(&movie.i.pixels) {
+        if let Some(warning) = odd(&movie) {
             eprintln!("warning: {}: {warning}", self.shown());
         }
         let fill =
@@ -275,7 +275,8 @@ impl Observe {
 }
 
 /// What is allowed of pixels and most probably not meant.
-fn odd(pixels: &[f64]) -> Option<String> {
+fn odd(movie: &StokesMovie) -> Option<String> {
+    let pixels = &movie.i.pixels;
     let least = pixels.iter().fold(f64::INFINITY, |least, x| least.min(*x));
     let most = pixels.iter().fold(f64::NEG_INFINITY, |most, x| most.max(*x));
     match (least, most) {
@@ -283,6 +284,19 @@ fn odd(pixels: &[f64]) -> Option<String> {
         _ if least < 0.0 => {
             Some(format!("pixels below 0 (down to {least:e} Jy): no total intensity"))
         }
-        _ => None,
+        _ => overpolarised(movie).map(|count| {
+            let all = pixels.len();
+            format!("√(Q² + U² + V²) exceeds Stokes I in {count} of {all} pixels: no light is polarised so much")
+        }),
     }
+}
+
+/// How many pixels are polarised by more than all of their light, beyond what single precision rounds.
+fn overpolarised(movie: &StokesMovie) -> Option<usize> {
+    let [q, u, v] = movie.polarized.each_ref().map(|plane| plane.as_deref().unwrap_or_default());
+    let at = |plane: &[f64], k: usize| plane.get(k).copied().unwrap_or(0.0);
+    let exceeds =
+        |(k, i): &(usize, &f64)| at(q, *k).hypot(at(u, *k)).hypot(at(v, *k)) > *i * (1.0 + 1e-5);
+    let count = movie.i.pixels.iter().enumerate().filter(exceeds).count();
+    (count > 0).then_some(count)
 }

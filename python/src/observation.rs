@@ -3,7 +3,7 @@
 use crate::call::{detached, refused};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::Error;
-use kerrlight_vlbi::array::{FeedRotation, MOST_STATIONS, Station};
+use kerrlight_vlbi::array::{FeedRotation, MOST_STATIONS, Station, check_position};
 use kerrlight_vlbi::earth::{self, SourcePosition, Ut1};
 use kerrlight_vlbi::files::{EhtTable, decode, to_csv, to_eht_table, to_obs_text, write_uvfits};
 use kerrlight_vlbi::observation::{Averaging, Basis, Channel, Observation, Row};
@@ -91,17 +91,23 @@ impl Metadata {
             bandwidth_hz: self.bandwidth_hz,
             channels: self.channels.iter().map(channel).collect(),
             basis: if self.circular { Basis::Circular } else { Basis::Stokes },
-            stations: self.stations.into_iter().map(station).collect(),
+            stations: self
+                .stations
+                .into_iter()
+                .map(station)
+                .collect::<Result<_, _>>()
+                .map_err(refused)?,
             rows: Vec::new(),
             history: self.history,
         })
     }
 }
 
-/// The station with these numbers.
-pub fn station((name, position, sefd, feed, leakage): Telescope) -> Station {
+/// The station with these numbers, whose position is one in metres.
+pub fn station((name, position, sefd, feed, leakage): Telescope) -> Result<Station, Error> {
+    check_position(&name, position.unwrap_or_default())?;
     let feed_rotation = FeedRotation::told(feed);
-    Station { position, sefd, feed_rotation, leakage, ..Station::named(&name) }
+    Ok(Station { position, sefd, feed_rotation, leakage, ..Station::named(&name) })
 }
 
 /// Its numbers.

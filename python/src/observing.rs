@@ -87,7 +87,8 @@ impl Plan {
         movie: &StokesMovie,
         pulse: Pulse,
     ) -> Result<Observation, Error> {
-        let array = Array::new(self.stations.iter().cloned().map(station).collect())?;
+        let array =
+            Array::new(self.stations.iter().cloned().map(station).collect::<Result<_, _>>()?)?;
         let (schedule, setup) = (self.schedule(), self.setup());
         let mut observation = observe_affordable(&array, source.position, &schedule, &setup)?;
         observation.source.clone_from(&source.name);

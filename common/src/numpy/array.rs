@@ -18,7 +18,7 @@ pub type Headed<R> = Chain<Cursor<Vec<u8>>, R>;
 /// Shape of an array of numbers of any type, and its numbers in C's order.
 ///
 /// # Errors
-/// If the bytes are no array of numbers, or fewer than its shape says.
+/// If the bytes are no array of numbers, or fewer or more than its shape says.
 pub fn read_array(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f64>), Error> {
     let file = open(bytes)?;
     let in_fortran = file.order() == npyz::Order::Fortran;
@@ -117,7 +117,7 @@ impl<R: Read> Stream<R> {
     /// Hands over all numbers, `length` at a time.
     ///
     /// # Errors
-    /// Those of `take`; if there are fewer numbers than the shape says.
+    /// Those of `take`; if there are fewer or more numbers than the shape says.
     pub fn chunks<E: From<Error>>(
         self,
         length: usize,
@@ -148,10 +148,20 @@ fn each_number<R: Read, E: From<Error>>(
         take: &mut dyn FnMut(f64) -> Result<(), E>,
     ) -> Result<(), E> {
         let damaged = |message: String| Error::from(NumpyError::content(message));
+        let header = file.header().clone();
+        let shape = header.shape().to_vec();
+        let mut rest = file.into_inner();
+        let file = npyz::NpyFile::with_header(header, &mut rest);
         for x in file.data::<T>().map_err(|error| damaged(error.to_string()))? {
             take(value(x.map_err(|error| damaged(error.to_string()))?))?;
         }
-        Ok(())
+        match rest.read(&mut [0]) {
+            Ok(0) => Ok(()),
+            Ok(_) => {
+                Err(damaged(format!("there are more bytes than the shape {shape:?} has")).into())
+            }
+            Err(error) => Err(damaged(error.to_string()).into()),
+        }
     }
     let kind = match file.dtype() {
         npyz::DType::Plain(plain) => Some((plain.type_char(), plain.size_field())),
@@ -206,6 +216,18 @@ mod tests {
         let error = read_array(&bytes).unwrap_err().to_string();
         assert!(error.contains("200 brackets"), "{error}");
         assert!(Stream::new(bytes.as_slice()).is_err());
+    }
+
+    /// Two arrays in one file: the second is not left out silently.
+    #[test]
+    fn exact_bytes_behind_an_array_are_errors() {
+        let mut bytes = write_array(&[2, 2], [1.0; 4]);
+        assert!(read_array(&bytes).is_ok());
+        bytes.extend(write_array(&[2, 2], [2.0; 4]));
+        let error = read_array(&bytes).unwrap_err().to_string();
+        assert!(error.contains("more bytes than the shape [2, 2]"), "{error}");
+        let stream = Stream::new(bytes.as_slice()).unwrap();
+        assert!(stream.chunks::<Error>(4, |_| Ok(())).is_err());
     }
 
     /// An array and its transpose in the other order are the same bytes of numbers.

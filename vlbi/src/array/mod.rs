@@ -144,6 +144,30 @@ impl Array {
     }
 }
 
+/// Coordinates of a station on the Earth or near it, metres.
+const FARTHEST: f64 = 1e9;
+
+/// The radius of the Earth, polar and equatorial with mountains, in kilometres.
+const EARTH_KM: core::ops::Range<f64> = 6350.0..6390.0;
+
+/// Refuses a position that cannot be one in metres.
+///
+/// # Errors
+/// If a coordinate is beyond 1e9 m, or the distance from the Earth's centre is the radius of the Earth in kilometres.
+pub fn check_position(name: &str, position: [f64; 3]) -> Result<(), ArrayError> {
+    let unfit = |message: String| Err(ArrayError::Unfit { name: name.to_owned(), message });
+    if let Some(far) = position.iter().find(|x| !(-FARTHEST..=FARTHEST).contains(*x)) {
+        return unfit(format!("{far:e} m is not allowed: [-{FARTHEST:e}, {FARTHEST:e}]"));
+    }
+    let radius = position.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if EARTH_KM.contains(&radius) {
+        return unfit(format!(
+            "{radius:.0} m from the centre of the Earth: kilometres? metres are expected"
+        ));
+    }
+    Ok(())
+}
+
 fn position(station: &Station) -> Result<[f64; 3], ArrayError> {
     let unfit = |message: &str| {
         Err(ArrayError::Unfit { name: station.name.clone(), message: message.to_owned() })

@@ -1,7 +1,7 @@
 //! The text format of eht-imaging's arrays: a line a station, columns separated by blanks,
 //! `name x y z SEFD` or `name x y z SEFD_R SEFD_L fr_par fr_el fr_off D_R(re im) D_L(re im)`.
 
-use super::{Array, ArrayError, FeedRotation, MOST_STATIONS, Station};
+use super::{Array, ArrayError, FeedRotation, MOST_STATIONS, Station, check_position};
 use crate::Complex64;
 use crate::Error;
 use core::fmt::Write;
@@ -29,9 +29,6 @@ pub fn parse(text: &str) -> Result<Array, Error> {
     Array::new(stations)
 }
 
-/// Coordinates of a station on the Earth or near it, metres.
-const FARTHEST: f64 = 1e9;
-
 /// A station of 5 or 13 cells.
 pub(crate) fn station(cells: &[&str]) -> Result<Station, String> {
     let count = cells.len();
@@ -49,12 +46,7 @@ pub(crate) fn station(cells: &[&str]) -> Result<Station, String> {
             })?;
     }
     let [x, y, z, sefd_r, sefd_l, parallactic, elevation, offset_deg, rr, ri, lr, li] = values;
-    if let Some(far) = [x, y, z].iter().find(|x| x.abs() > FARTHEST) {
-        return Err(format!(
-            "{far:e} m of station {} is not allowed: [-{FARTHEST:e}, {FARTHEST:e}]",
-            cells[0]
-        ));
-    }
+    check_position(cells[0], [x, y, z]).map_err(|error| error.to_string())?;
     let sefd = [sefd_r, if count == 5 { sefd_r } else { sefd_l }];
     if let Some(bad) = sefd.iter().find(|sefd| **sefd < 0.0) {
         return Err(format!("SEFD = {bad} Jy of station {} must not be negative", cells[0]));
@@ -127,6 +119,9 @@ mod tests {
         assert!(fail("A 1 2 3 70\nA 1 2 4 70\n").contains("A is listed twice"));
         assert!(fail("A 1 2 3 70\n").contains("at least 2"));
         assert!(fail("A 1 2 inf 70\nB 1 2 3 4\n").contains("line 1"));
-        assert!(fail("A 1 2 -1e10 70\nB 1 2 3 4\n").starts_with("line 1: -1e10 m of station A"));
+        assert!(fail("A 1 2 -1e10 70\nB 1 2 3 4\n").starts_with("line 1: station A: -1e10 m"));
+        // Kilometres: SPT is 6359.6 km from the centre.
+        let spt = fail("SPT 0 0 -6359.6097 9\nB 1 2 3 4\n");
+        assert!(spt.starts_with("line 1: station SPT: 6360 m from the centre"), "{spt}");
     }
 }

@@ -91,6 +91,7 @@ fn read_heading(
             }
         }
         "time" => {
+            check_columns(line, &words)?;
             observation.basis = match words.get(11) {
                 Some(&"Iamp") => Basis::Stokes,
                 Some(&"RRamp") => Basis::Circular,
@@ -101,6 +102,21 @@ fn read_heading(
         _ => read_station(&words, names)?,
     }
     Ok(false)
+}
+
+/// Refuses columns in another order, or in other units.
+fn check_columns(line: &str, words: &[&str]) -> Result<(), String> {
+    let (start, wanted) = (words.get(7..11).unwrap_or_default(), "U (lambda) V (lambda)");
+    if start.join(" ") != wanted {
+        return Err(format!("`{}` is not allowed: {wanted}", super::shortened(&start.join(" "))));
+    }
+    let mut units = line.split('(').skip(1).filter_map(|rest| rest.split(')').next());
+    match units.find(|unit| !["hr", "lambda", "Jy", "d"].contains(unit)) {
+        Some(unit) => {
+            Err(format!("unit `{}` is not allowed: hr, lambda, Jy, d", super::shortened(unit)))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Takes in a station; lines of other headings are passed over.
@@ -325,5 +341,9 @@ mod tests {
         assert!(message.starts_with(&format!("line {}: 3 columns", last + 1)), "{message}");
         assert!(fail(&good.replace(" AA CC ", " AA XX ")).contains("station `XX`"));
         assert!(fail(&good.replace("time (hr)", "times (hr)")).contains("before the heading"));
+        let swapped = good.replace("U (lambda) V (lambda)", "V (lambda) U (lambda)");
+        assert!(fail(&swapped).contains("is not allowed: U (lambda) V (lambda)"));
+        let milli = good.replace("sigma (Jy)", "sigma (mJy)");
+        assert!(fail(&milli).contains("unit `mJy` is not allowed"), "{}", fail(&milli));
     }
 }

@@ -8,9 +8,9 @@ use kerrlight_common::memory;
 /// Refuses a file that its readers would not bear.
 pub(super) fn check(document: &Document, buffers: &[Vec<u8>]) -> Result<(), MeshError> {
     check_version(document)?;
-    check_rotations(document)?;
+    check_transforms(document)?;
     check_views(document, buffers)?;
-    document.accessors().try_for_each(|accessor| check_accessor(&accessor))?;
+    document.accessors().try_for_each(|accessor| check_accessor(&accessor, buffers))?;
     check_types(document)?;
     check_pictures(document)?;
     check_trees(document)
@@ -33,18 +33,37 @@ fn fail(why: String) -> Result<(), MeshError> {
 }
 
 fn check_version(document: &Document) -> Result<(), MeshError> {
-    let version = &document.as_json().asset.version;
-    match version.split('.').next() {
-        Some("2") => Ok(()),
-        _ => fail(format!("version {version:?} of glTF is not read: 2.0")),
+    let asset = &document.as_json().asset;
+    let version = asset.min_version.as_ref().unwrap_or(&asset.version);
+    // A later version of 2 may be read as 2.0 unless the file asks for more.
+    let is_read = match &asset.min_version {
+        Some(least) => least == "2.0",
+        None => version.split('.').next() == Some("2"),
+    };
+    match is_read {
+        true => Ok(()),
+        false => fail(format!("version {version:?} of glTF is not read: 2.0")),
     }
 }
 
-/// Refuses rotations that would change sizes, too.
-fn check_rotations(document: &Document) -> Result<(), MeshError> {
-    let rotations = document.as_json().nodes.iter().map(|node| node.rotation);
-    for (k, rotation) in rotations.enumerate() {
-        let Some(rotation) = rotation else { continue };
+/// Refuses rotations that would change sizes, too, and matrices that are none of an affine map or one of two transforms.
+fn check_transforms(document: &Document) -> Result<(), MeshError> {
+    for (k, node) in document.as_json().nodes.iter().enumerate() {
+        if let Some(matrix) = node.matrix {
+            let [.., bottom] =
+                [0, 1, 2, 3].map(|row| [0, 4, 8, 12].map(|column| matrix[column + row]));
+            if bottom != [0.0, 0.0, 0.0, 1.0] {
+                return fail(format!(
+                    "node {k} (counted from 0): matrix with a last row of {bottom:?}: 0, 0, 0, 1"
+                ));
+            }
+            if node.translation.is_some() || node.rotation.is_some() || node.scale.is_some() {
+                return fail(format!(
+                    "node {k} (counted from 0) has a matrix as well as a translation, rotation or scale: one of both"
+                ));
+            }
+        }
+        let Some(rotation) = node.rotation else { continue };
         let length = rotation.0.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
         let is_unit = (length - 1.0).abs() <= UNIT;
         if !is_unit {
@@ -79,7 +98,7 @@ fn holds(view: &gltf::buffer::View<'_>, offset: usize, count: usize, size: usize
     step >= size && end.is_some_and(|end| end <= view.length())
 }
 
-fn check_accessor(accessor: &Accessor<'_>) -> Result<(), MeshError> {
+fn check_accessor(accessor: &Accessor<'_>, buffers: &[Vec<u8>]) -> Result<(), MeshError> {
     let (count, size) = (accessor.count(), accessor.size());
     match accessor.view() {
         Some(view) if !holds(&view, accessor.offset(), count, size) => {
@@ -103,7 +122,25 @@ fn check_accessor(accessor: &Accessor<'_>) -> Result<(), MeshError> {
     let count = sparse.count();
     let holds_all = holds(&indices.view(), indices.offset(), count, of_index)
         && holds(&values.view(), values.offset(), count, size);
-    if holds_all { Ok(()) } else { beyond("sparse accessor", accessor.index()) }
+    if !holds_all {
+        return beyond("sparse accessor", accessor.index());
+    }
+    let view = indices.view();
+    let step = view.stride().unwrap_or(of_index);
+    let buffer = buffers.get(view.buffer().index()).map_or(&[][..], Vec::as_slice);
+    let index = |k: usize| {
+        let start = view.offset() + indices.offset() + k * step;
+        let bytes = buffer.get(start..start + of_index).unwrap_or_default();
+        bytes.iter().rev().fold(0, |index, byte| index << 8 | usize::from(*byte))
+    };
+    match (0..count).map(index).find(|index| *index >= accessor.count()) {
+        Some(k) => fail(format!(
+            "sparse accessor {} (counted from 0) replaces point {k} of {}",
+            accessor.index(),
+            accessor.count()
+        )),
+        None => Ok(()),
+    }
 }
 
 /// Positions, coordinates in textures and indices have the types that glTF allows.

@@ -4,7 +4,7 @@ use super::MeshError;
 use super::file::{Layer, Material, Resources, needed};
 use super::text::{Line, lines};
 use super::texture::{Placement, Texture};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// The materials of all files that an OBJ file names.
 #[derive(Default)]
@@ -12,6 +12,8 @@ pub(super) struct Materials {
     pub all: Vec<Material>,
     pub warnings: Vec<String>,
     numbers: HashMap<String, u32>,
+    /// Files that were read.
+    pub files: Vec<String>,
 }
 
 impl Materials {
@@ -45,28 +47,41 @@ impl Described {
     }
 }
 
-/// Adds the materials of a file.
+/// Adds the materials of a file. Keywords may be in lower case, as some programs write them.
 pub(super) fn decode(
     bytes: &[u8],
     resources: &Resources<'_>,
     materials: &mut Materials,
 ) -> Result<(), MeshError> {
     let mut current: Option<Described> = None;
+    let mut described: HashSet<String> = materials.numbers.keys().cloned().collect();
     let mut unread: Vec<String> = Vec::new();
     for line in lines(bytes)? {
-        if line.keyword() == "newmtl" {
+        let keyword = line.keyword().to_ascii_lowercase();
+        if keyword == "newmtl" {
             finish(current.take(), materials);
-            current = Some(Described { name: line.rest().to_owned(), ..Described::default() });
+            let name = line.rest().to_owned();
+            if !described.insert(name.clone()) {
+                return Err(line.fails(format!("a second material is named `{name}`")));
+            }
+            current = Some(Described { name, ..Described::default() });
             continue;
         }
-        let Some(material) = &mut current else { continue };
-        match line.keyword() {
-            "Kd" => material.diffuse = Some(color(&line)?),
-            "Ke" => material.emissive = Some(color(&line)?),
-            "map_Kd" | "map_kd" => material.diffuse_texture = Some(texture(&line, resources)?),
-            "map_Ke" | "map_ke" => material.emissive_texture = Some(texture(&line, resources)?),
-            keyword if changes_light(&line) && !unread.iter().any(|k| k == keyword) => {
-                unread.push(keyword.to_owned());
+        let Some(material) = &mut current else {
+            if matches!(&*keyword, "kd" | "ke" | "map_kd" | "map_ke") {
+                return Err(line.fails(format!("{} before newmtl", line.keyword())));
+            }
+            continue;
+        };
+        match &*keyword {
+            "kd" => once(&line, &mut material.diffuse, color(&line)?)?,
+            "ke" => once(&line, &mut material.emissive, color(&line)?)?,
+            "map_kd" => once(&line, &mut material.diffuse_texture, texture(&line, resources)?)?,
+            "map_ke" => once(&line, &mut material.emissive_texture, texture(&line, resources)?)?,
+            _ if changes_light(&keyword, &line)
+                && !unread.iter().any(|k| k.eq_ignore_ascii_case(&keyword)) =>
+            {
+                unread.push(line.keyword().to_owned());
             }
             _ => {}
         }
@@ -89,13 +104,21 @@ fn finish(material: Option<Described>, materials: &mut Materials) {
     }
 }
 
+/// Takes what a statement says, which no other said before.
+fn once<T>(line: &Line<'_>, place: &mut Option<T>, said: T) -> Result<(), MeshError> {
+    match place.replace(said) {
+        None => Ok(()),
+        Some(_) => Err(line.fails(format!("a second {} of one material", line.keyword()))),
+    }
+}
+
 /// Whether a statement that is not read would show something of the surface that is not there, or hide something.
-fn changes_light(line: &Line<'_>) -> bool {
+fn changes_light(keyword: &str, line: &Line<'_>) -> bool {
     let number = || line.words().last().and_then(|word| word.parse::<f64>().ok());
-    match line.keyword() {
+    match keyword {
         "d" => number() != Some(1.0),
-        "Tr" => number() != Some(0.0),
-        "map_d" | "map_Tr" | "disp" | "decal" => true,
+        "tr" => number() != Some(0.0),
+        "map_d" | "map_tr" | "disp" | "decal" => true,
         _ => false,
     }
 }

@@ -186,6 +186,10 @@ impl Reader {
         bytes: Option<Vec<u8>>,
         resources: &Resources<'_>,
     ) -> Result<(), MeshError> {
+        if self.materials.files.iter().any(|file| file == name) {
+            return Ok(());
+        }
+        self.materials.files.push(name.to_owned());
         let Some(bytes) = bytes else {
             let number = line.number;
             self.file.warn(format!(

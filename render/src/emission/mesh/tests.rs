@@ -96,6 +96,24 @@ fn exact_gltf_against_its_specification_says_why() {
     assert!(with(r#""material":0"#, r#""material":0,"indices":0"#).contains("Scalar of [U8"));
     let sparse = r#""count":3,"sparse":{"count":2,"indices":{"bufferView":0,"componentType":5125},"values":{"bufferView":0,"byteOffset":24}}"#;
     assert!(with(r#""count":3"#, sparse).contains("sparse accessor 0"));
+    // The bytes of a 1.0 in front of the values are no index of a point.
+    let one = r#""count":3,"sparse":{"count":1,"indices":{"bufferView":0,"byteOffset":12,"componentType":5125},"values":{"bufferView":0,"byteOffset":24}}"#;
+    let said = with(r#""count":3"#, one);
+    assert!(
+        said.contains("sparse accessor 0 (counted from 0) replaces point 1065353216 of 3"),
+        "{said}"
+    );
+    assert!(
+        with(r#""version":"2.0""#, r#""version":"2.0","minVersion":"2.1""#).contains("\"2.1\"")
+    );
+    let matrix = |last: &str, more: &str| {
+        with(
+            r#""translation":[0,0,5]"#,
+            &format!(r#""matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,5,{last}]{more}"#),
+        )
+    };
+    assert!(matrix("2", "").contains("last row of [0.0, 0.0, 0.0, 2.0]"));
+    assert!(matrix("1", r#","scale":[1,1,1]"#).contains("has a matrix as well as"));
 }
 
 /// A triangle in a buffer inside the text, raised by its node, half as bright as white.
@@ -205,6 +223,13 @@ fn exact_statements_of_obj_that_are_not_read_say_where() {
         library("newmtl a\nKd spectral x.rfl\n")
             .contains("`paint.mtl`, to which it refers: line 2: Kd spectral")
     );
+    for (text, said) in [
+        ("newmtl a\nKe 1 0 0\nnewmtl a\nKe 0 1 0\n", "line 3: a second material is named `a`"),
+        ("newmtl a\nKe 1 0 0\nke 0 1 0\n", "line 3: a second ke of one material"),
+        ("Ke 1 0 0\nnewmtl a\n", "line 1: Ke before newmtl"),
+    ] {
+        assert!(library(text).contains(said), "{}", library(text));
+    }
     assert!(library("newmtl a\nmap_Kd -mm 0 2 x.png\n").contains("option -mm 0 2 is not read"));
     assert!(library("newmtl a\nmap_Kd no.png\n").contains("`no.png`, to which it refers"));
     assert!(error(b"ply\nformat ascii 1.0\n", &[]).contains("PLY files are not read"));

@@ -10,6 +10,8 @@ struct Column {
     offset: usize,
     repeat: usize,
     code: char,
+    /// TSCAL and TZERO.
+    scale: [f64; 2],
 }
 
 /// A binary table.
@@ -77,17 +79,22 @@ impl<'a> Table<'a> {
         let size = size_of(column.code)?;
         let start = row * self.row_size + column.offset + index * size;
         let cell = self.data.get(start..start + size)?;
-        match (column.code, cell) {
-            ('B', &[a]) => Some(a.into()),
-            ('I', &[a, b]) => Some(i16::from_be_bytes([a, b]).into()),
-            ('J', cell) => Some(i32::from_be_bytes(cell.try_into().ok()?).into()),
-            ('K', cell) => Some(i64::from_be_bytes(cell.try_into().ok()?) as f64),
-            ('E', cell) => Some(f32::from_be_bytes(cell.try_into().ok()?).into()),
-            ('D', cell) => Some(f64::from_be_bytes(cell.try_into().ok()?)),
-            _ => None,
-        }
+        let stored: f64 = match (column.code, cell) {
+            ('B', &[a]) => a.into(),
+            ('I', &[a, b]) => i16::from_be_bytes([a, b]).into(),
+            ('J', cell) => i32::from_be_bytes(cell.try_into().ok()?).into(),
+            ('K', cell) => i64::from_be_bytes(cell.try_into().ok()?) as f64,
+            ('E', cell) => f32::from_be_bytes(cell.try_into().ok()?).into(),
+            ('D', cell) => f64::from_be_bytes(cell.try_into().ok()?),
+            _ => return None,
+        };
+        let [scale, zero] = column.scale;
+        Some(stored * scale + zero)
     }
 }
+
+/// Units that are multiples of those in which tables are read: metres, Hz, degrees.
+const MULTIPLES: [&str; 8] = ["KM", "CM", "MM", "KHZ", "MHZ", "GHZ", "RADIANS", "RAD"];
 
 fn columns(header: &Header<'_>, row_size: usize) -> Result<Vec<Column>, FileError> {
     let count = header.count("TFIELDS", 0, 999)?;
@@ -107,7 +114,15 @@ fn columns(header: &Header<'_>, row_size: usize) -> Result<Vec<Column>, FileErro
         };
         let end = size.and_then(|size| offset.checked_add(size)).filter(|end| *end <= row_size);
         let name = header.text(&format!("TTYPE{k}")).unwrap_or_default();
-        columns.push(Column { name, offset, repeat, code });
+        let unit = format!("TUNIT{k}");
+        if MULTIPLES.contains(&&*header.text(&unit).unwrap_or_default().to_ascii_uppercase()) {
+            return Err(header.error(&unit, "METERS, HZ, DEGREES and other units of AIPS"));
+        }
+        let number = |name: &str, default| {
+            header.number(&format!("{name}{k}")).map(|value| value.unwrap_or(default))
+        };
+        let scale = [number("TSCAL", 1.0)?, number("TZERO", 0.0)?];
+        columns.push(Column { name, offset, repeat, code, scale });
         offset = end.ok_or_else(bad)?;
     }
     Ok(columns)

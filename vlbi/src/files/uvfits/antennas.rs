@@ -3,7 +3,7 @@
 use super::super::fits::{Table, Unit};
 use super::super::{FileError, Names};
 use super::mounts::{self, Mount};
-use crate::array::Station;
+use crate::array::{Station, check_position};
 use crate::polarimetry::published_rotation;
 use std::collections::HashMap;
 
@@ -39,6 +39,8 @@ impl AntennaTables {
                 let number = number.ok_or_else(|| fail(row, "no antenna number (NOSTA)"))?;
                 let station = station(unit, &table, row)?
                     .ok_or_else(|| fail(row, "no name (ANNAME) or no finite position (STABXYZ)"))?;
+                check_position(&station.name, station.position.unwrap_or_default())
+                    .map_err(|error| fail(row, &error.to_string()))?;
                 remarks.extend(unknown_mount(&table, row, &station.name));
                 let k = names.number(&station.name).map_err(|message| fail(row, &message))?;
                 names.stations[usize::from(k)] = station;

@@ -239,7 +239,9 @@ fn products(header: &Header<'_>, axis: &Axis) -> Result<([Option<usize>; 4], Bas
             let message = "Stokes I, Q, U, V (1 to 4) or circular RR, LL, RL, LR (-1 to -4)";
             return Err(header.error(&format!("CRVAL{k}"), message));
         };
-        products[product as usize - 1] = Some(index * axis.stride);
+        if products[product as usize - 1].replace(index * axis.stride).is_some() {
+            return Err(header.error(&format!("CDELT{k}"), "-1 or 1: each product once"));
+        }
     }
     Ok((products, if circular { Basis::Circular } else { Basis::Stokes }))
 }

@@ -12,6 +12,9 @@ use crate::Error;
 use crate::earth::SourcePosition;
 use crate::observation::{Observation, Row};
 
+/// The longest integration of a group, seconds.
+const LONGEST_INTEGRATION_S: f64 = 1e9;
+
 /// JD of MJD 0.
 const MJD_ZERO: f64 = 2_400_000.5;
 
@@ -315,10 +318,16 @@ impl Reader<'_> {
             return Err(format!("{time_h:e} h after the first day: up to {MOST_HOURS:e} h"));
         }
         let positive = |x: f64| if x.is_finite() && x > 0.0 { x } else { 0.0 };
+        let integration_s = positive(layout.integration.map_or(0.0, value));
+        if integration_s > LONGEST_INTEGRATION_S {
+            return Err(format!(
+                "INTTIM = {integration_s:e} s is not allowed: up to {LONGEST_INTEGRATION_S:e} s"
+            ));
+        }
         let opacity = layout.opacity.map_or([0.0; 2], |both| both.map(|p| positive(value(p))));
         Ok(Some(Row {
             time_h,
-            integration_s: positive(layout.integration.map_or(0.0, value)),
+            integration_s,
             stations,
             uv: [0.0; 2],
             products: [Complex64::new(0.0, 0.0); 4],

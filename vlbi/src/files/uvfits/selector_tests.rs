@@ -1,6 +1,7 @@
 //! What a file says of its data and is not read: refused, with its name and value.
 
 use super::super::fits::{Cards, ColumnData, binary_table, padded};
+use super::tests::small;
 use super::*;
 use crate::observation::Observation;
 
@@ -189,6 +190,37 @@ fn exact_coordinates_and_units_of_others_are_refused() {
         binary_table("AIPS SN", 1, &[("SOURCE", "", ColumnData::Integers(1, vec![1]))], |_| ());
     let history = read_made(&Made { tables: vec![gains], ..plain() }).history;
     assert_eq!(history, ["AIPS SN: calibration that is not applied"]);
+}
+
+/// Positions in kilometres, scaled columns, products and integrations that cannot be.
+#[test]
+fn exact_cards_of_tables_are_honoured_or_refused() {
+    let place = ("RAEPO", "DEGREES", ColumnData::Doubles(1, vec![187.5]));
+    let columns = [
+        ("ID. NO.", "", ColumnData::Integers(1, vec![1])),
+        place,
+        ("DECEPO", "DEGREES", ColumnData::Doubles(1, vec![12.4])),
+    ];
+    let table = binary_table("AIPS SU", 1, &columns, |cards| {
+        cards.number("TSCAL2", 0.5).number("TZERO2", 15.0);
+    });
+    let scaled = Made { parameters: vec![("SOURCE", [1.0; 2])], tables: vec![table], ..plain() };
+    assert_eq!(read_made(&scaled).position.unwrap().ra_hours, (0.5 * 187.5 + 15.0) / 15.0);
+    let replaced = |mut file: Vec<u8>, from: &str, to: &str| {
+        let at = file.windows(from.len()).position(|part| part == from.as_bytes()).unwrap();
+        file[at..at + to.len()].copy_from_slice(to.as_bytes());
+        read(&file).unwrap_err().to_string()
+    };
+    let message = replaced(bytes(&plain()), "'METERS  '", "'KM      '");
+    assert!(message.contains("TUNIT2 = 'KM      ' is not allowed"), "{message}");
+    let message = replaced(write(&small()).unwrap(), "CDELT3  = ", "CDELT3  =  0 /");
+    assert!(message.contains("each product once"), "{message}");
+    let long = Made { parameters: vec![("INTTIM", [1.0, 1e30])], ..plain() };
+    assert!(refused(&long).contains("s is not allowed: up to 1e9 s"), "{}", refused(&long));
+    let mut km = small();
+    km.stations[0].position = Some([0.0, 0.0, -6359.61]);
+    let message = read(&write(&km).unwrap()).unwrap_err().to_string();
+    assert!(message.contains("kilometres?"), "{message}");
 }
 
 /// TAI was 37 s ahead of UTC in 2017 (IERS Bulletin C 52).
