@@ -85,11 +85,6 @@ impl PowerLaw {
         Stokes { i, q: p * view.direction[0], u: p * view.direction[1], v }
     }
 
-    /// What a stretch of a ray adds per Σ dτ: g^{2+α} j.
-    pub fn of_volume(&self, view: &SynchrotronView) -> Stokes {
-        self.emissivity(view) * power(view.redshift, 2.0 + self.index)
-    }
-
     /// What a thin layer parallel to the equatorial plane adds per thickness:
     /// g^{3+α} (ℓ_p/H) j (Narayan et al. 2021, eqs. 18 and 19). `None` where the ray runs along the layer.
     pub fn of_layer(&self, view: &SynchrotronView) -> Option<Stokes> {
