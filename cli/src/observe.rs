@@ -51,9 +51,6 @@ pub struct Observe {
     /// faster
     #[arg(long, value_name = "TRANSFORM", default_value = "auto")]
     transform: TransformName,
-    /// Bound of the fast transform's errors as a share of the flux
-    #[arg(long, value_name = "SHARE", default_value_t = 1e-12, allow_negative_numbers = true)]
-    accuracy: f64,
     /// Noise that is added; errors are those of thermal noise in any case
     #[arg(long, value_name = "NOISE", default_value = "none")]
     noise: Noise,
@@ -80,6 +77,9 @@ pub struct Observe {
     output: PathBuf,
 }
 
+/// Bound of the fast transform's errors as a part of the flux.
+const ACCURACY: f64 = 1e-12;
+
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
 enum Noise {
     /// None
@@ -94,7 +94,7 @@ enum TransformName {
     Auto,
     /// The sum over pixels
     Direct,
-    /// Fast Fourier transform and a kernel, within --accuracy
+    /// Fast Fourier transform and a kernel, within 1e-12 of the flux
     Fast,
 }
 
@@ -221,9 +221,9 @@ impl Observe {
 
     fn method(&self) -> Method {
         match self.transform {
-            TransformName::Auto => Method::Cheaper(self.accuracy),
+            TransformName::Auto => Method::Cheaper(ACCURACY),
             TransformName::Direct => Method::Direct,
-            TransformName::Fast => Method::Fast(self.accuracy),
+            TransformName::Fast => Method::Fast(ACCURACY),
         }
     }
 

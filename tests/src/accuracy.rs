@@ -1,6 +1,6 @@
 //! Error estimates and hard rays, against numbers of twice the precision.
 
-use crate::support::{fail, kerrlight, succeed};
+use crate::support::{fail, kerrlight};
 use kerrlight_geodesic::Integrator;
 use kerrlight_validation::accuracy::estimates;
 use kerrlight_validation::accuracy::hard;
@@ -23,35 +23,6 @@ fn code_hard_rays_come_out_right() {
             assert!(tally.unresolved[0] * 200 <= tally.rays, "{tally:?}");
         }
     }
-}
-
-/// Three parts of four batches, in any order and one of them twice: the report is that of all rays at once.
-#[test]
-fn exact_parts_of_hard_rays_are_the_whole() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let run = |output: &str, more: &[&str]| {
-        let words = ["accuracy", "--hard", "7000", "--seed", "3", "-o", output];
-        succeed(at, &[&words, more].concat());
-    };
-    run("whole", &[]);
-    for part in ["3/3", "1/3", "3/3"] {
-        run("parts", &["--part", part]);
-    }
-    assert!(!at.join("parts/hard.json").exists());
-    let read = |path: &str| std::fs::read(at.join(path)).unwrap();
-    let kept = read("parts/hard_3_of_3.toml");
-    // The second part is missing, and traced.
-    run("parts", &[]);
-    assert_eq!(read("parts/hard_3_of_3.toml"), kept);
-    for name in ["hard.json", "hard.csv"] {
-        assert!(read(&format!("parts/{name}")) == read(&format!("whole/{name}")), "{name}");
-    }
-    let words = ["accuracy", "--hard", "7000", "-o", "parts", "--part"];
-    let error = fail(at, &[&words[..], &["1/3"]].concat());
-    assert!(error.contains("has seed = \"3\", and these rays have seed = \"1\""), "{error}");
-    let error = fail(at, &[&words[..], &["4/3"]].concat());
-    assert!(error.contains("K/N with 1 ≤ K ≤ N ≤ 100000"), "{error}");
 }
 
 /// Every estimate bounds the error for 99 % of rays, and is not more than a hundred times too

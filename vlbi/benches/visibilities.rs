@@ -66,7 +66,7 @@ fn single(criterion: &mut Criterion, pixels: usize, visibilities: usize) {
     let uv = vec![(0..visibilities).map(at).collect::<Vec<_>>()];
     let movie: Vec<f64> = (0..grid.pixels()).map(|k| (k as f64).sin() + 1.0).collect();
     let mut back = vec![0.0; movie.len()];
-    let mut run = |name: &str, operator: &dyn Operator<f64, Datum = Complex<f64>>| {
+    let mut run = |name: &str, operator: &dyn Operator<f64>| {
         let mut data = vec![Complex::new(0.0, 0.0); visibilities];
         let name = format!("{pixels} x {pixels} pixels, {visibilities} visibilities, {name}");
         criterion.bench_function(&name, |bencher| {

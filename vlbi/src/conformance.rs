@@ -62,34 +62,30 @@ fn moved<T: Float, D: Datum<T>>(a: &[D], b: &[D], s: f64) -> Vec<D> {
 
 /// ⟨F x, y⟩ = ⟨x, Fᵀ y⟩ within `tolerance` of ‖F x‖ ‖y‖; central differences of F along a
 /// direction are F of that direction; `forward` overwrites and `adjoint` adds.
-pub(super) fn operator<T, D>(name: &str, operator: &impl Operator<T, Datum = D>, tolerance: f64)
-where
-    T: Float,
-    D: Datum<T>,
-{
+pub(super) fn operator<T: Float>(name: &str, operator: &impl Operator<T>, tolerance: f64) {
     let forward = |movie: &[T]| {
-        let mut data: Vec<D> = random(operator.data(), 9);
+        let mut data: Vec<Complex<T>> = random(operator.data(), 9);
         operator.forward(movie, &mut data);
         data
     };
     let pixels = operator.frames() * operator.pixels();
     let (x, direction) = (random::<T, T>(pixels, 1), random::<T, T>(pixels, 2));
-    let y: Vec<D> = random(operator.data(), 3);
+    let y: Vec<Complex<T>> = random(operator.data(), 3);
     let data = forward(&x);
     let start = random::<T, T>(pixels, 4);
     let mut back = start.clone();
     operator.adjoint(&y, &mut back);
     let gained = moved::<T, T>(&back, &start, -1.0);
-    let (left, right) = (dot::<T, D>(&data, &y), dot::<T, T>(&gained, &x));
-    let scale = norm::<T, D>(&data) * norm::<T, D>(&y);
+    let (left, right) = (dot::<T, _>(&data, &y), dot::<T, T>(&gained, &x));
+    let scale = norm::<T, _>(&data) * norm::<T, _>(&y);
     assert!(scale > 0.0, "{name} measures nothing");
     assert!((left - right).abs() <= tolerance * scale, "{name}: {left} {right}, of {scale}");
     // The map is linear: a step of 1 is as good as any.
     let ahead = forward(&moved::<T, T>(&x, &direction, 1.0));
     let behind = forward(&moved::<T, T>(&x, &direction, -1.0));
     let exact = forward(&direction);
-    let difference = moved::<T, D>(&moved::<T, D>(&ahead, &behind, -1.0), &exact, -2.0);
-    let error = norm::<T, D>(&difference) / norm::<T, D>(&exact);
+    let difference = moved::<T, _>(&moved::<T, _>(&ahead, &behind, -1.0), &exact, -2.0);
+    let error = norm::<T, _>(&difference) / norm::<T, _>(&exact);
     assert!(error <= 20.0 * tolerance, "{name}: differences are off by {error}");
 }
 
@@ -135,7 +131,7 @@ pub(super) fn data_term<T: Float>(
 /// against central differences along random directions.
 pub(super) fn chain<T: Float>(
     name: &str,
-    operator: &impl Operator<T, Datum = Complex<T>>,
+    operator: &impl Operator<T>,
     term: &dyn DataTerm<T>,
     movie: &[T],
     h: f64,

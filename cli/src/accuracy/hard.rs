@@ -1,10 +1,8 @@
 //! Millions of random rays that look for trouble.
 
 use super::Accuracy;
-use super::part::Part;
 use crate::answer::Answer;
 use crate::interrupt::{Interrupted, Keeper};
-use crate::output::Output;
 use crate::progress;
 use anyhow::anyhow;
 use kerrlight_validation::accuracy::hard::{self, Tally};
@@ -70,58 +68,18 @@ fn describe(ray: &Draw) -> String {
     format!("spin {spin:e}, inclination {angle}, observer {radius}, alpha {alpha:e}, beta {beta:e}")
 }
 
-/// Traces some parts that have no file; all of them in order, and how many rays they are.
-fn traced(arguments: &Accuracy, rays: u64, parts: &[Part]) -> anyhow::Result<(Vec<Tally>, u64)> {
-    let wanted = parts.iter().map(|part| part.rays(rays)).sum();
-    let (bar, keeper) = (progress::bar(wanted), Keeper::saving("stopping"));
-    let progress = |done| {
-        bar.inc(done);
-        !keeper.stopped()
-    };
-    let kind = (arguments.integrator, arguments.tolerance);
-    let one = |part: &Part| {
-        if let Some(tallies) = part.load(arguments, rays)? {
-            bar.inc(part.rays(rays));
-            return Ok(tallies);
-        }
-        let batches = part.batches(rays);
-        anyhow::Ok(hard::run_part(kind, (rays, arguments.seed), batches, progress)?)
-    };
-    let tallies = parts.iter().map(one).collect::<anyhow::Result<Vec<_>>>()?;
-    bar.finish_and_clear();
-    let tallies = hard::add_up(tallies);
-    let done = tallies.iter().map(|tally| tally.rays).sum();
-    Ok((tallies, done))
-}
-
-/// Traces a part and writes its file; one that is there is not traced again.
-pub fn part(arguments: &Accuracy, rays: u64, part: Part) -> anyhow::Result<Answer> {
-    let file = part.output(arguments)?;
-    let (tallies, done) = traced(arguments, rays, &[part])?;
-    if done < part.rays(rays) {
-        return Err(Interrupted("stopped: nothing is written".to_owned()).into());
-    }
-    if part.load(arguments, rays)?.is_none() {
-        part.write(arguments, rays, &tallies)?;
-    }
-    let answer = Answer::lines(&format!("{done} rays"), &file.shown().display().to_string());
-    Ok(judged(answer.outputs([&file]).with("rays", done), &tallies, &file))
-}
-
-/// Fails if a ray went wrong.
-fn judged(answer: Answer, tallies: &[Tally], file: &Output) -> Answer {
-    match tallies.iter().all(Tally::passes) {
-        true => answer,
-        false => answer.failing(anyhow!("some rays went wrong: see {}", file.shown().display())),
-    }
-}
-
-/// Traces those that are in no part's file, writes hard.json and hard.csv, and fails if a ray went wrong.
+/// Traces them, writes hard.json and hard.csv, and fails if a ray went wrong.
 pub fn run(arguments: &Accuracy, rays: u64) -> anyhow::Result<Answer> {
     let csv = arguments.place("hard.csv", "csv")?;
     let json = arguments.place("hard.json", "json")?;
     let (integrator, tolerance) = (arguments.integrator, arguments.tolerance);
-    let (tallies, done) = traced(arguments, rays, &Part::all(&arguments.output)?)?;
+    let (bar, keeper) = (progress::bar(rays), Keeper::saving("stopping"));
+    let tallies = hard::run(integrator, tolerance, rays, arguments.seed, |done| {
+        bar.inc(done);
+        !keeper.stopped()
+    })?;
+    bar.finish_and_clear();
+    let done = tallies.iter().map(|tally| tally.rays).sum();
     let document = Document {
         version: env!("CARGO_PKG_VERSION"),
         integrator: integrator.name(),
@@ -142,7 +100,10 @@ pub fn run(arguments: &Accuracy, rays: u64) -> anyhow::Result<Answer> {
         let said = format!("interrupted after {done} of {rays} rays; what they gave is written");
         return Ok(answer.failing(Interrupted(said)));
     }
-    Ok(judged(answer, &tallies, &json))
+    Ok(match tallies.iter().all(Tally::passes) {
+        true => answer,
+        false => answer.failing(anyhow!("some rays went wrong: see {}", json.shown().display())),
+    })
 }
 
 fn table(document: &Document) -> String {

@@ -1,7 +1,6 @@
 //! `kerrlight accuracy`: what a digit costs, and whether hard rays come out right.
 
 mod hard;
-mod part;
 mod picture;
 mod table;
 
@@ -11,7 +10,6 @@ use crate::progress;
 use anyhow::Context;
 use clap::Args;
 use kerrlight_validation::accuracy::sweep::{self, Sweep};
-use part::Part;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `kerrlight accuracy`.
@@ -31,10 +29,6 @@ pub struct Accuracy {
     /// parameters from 1e-12 to 1e6 M, rays up to 1e-14 beside the critical curve
     #[arg(long, num_args = 0..=1, default_missing_value = "10000000", value_name = "RAYS", value_parser = clap::value_parser!(u64).range(1..=10_000_000_000))]
     hard: Option<u64>,
-    /// Trace part K of N of the hard rays alone, into a file beside those of the other parts; without this option the
-    /// parts that are there count, and what is missing is traced
-    #[arg(long, value_name = "K/N", requires = "hard")]
-    part: Option<Part>,
     /// Integrator of the hard rays
     #[arg(long, default_value = "taylor-mino", requires = "hard", value_parser = crate::trace::integrators())]
     integrator: kerrlight_geodesic::Integrator,
@@ -50,10 +44,9 @@ impl Accuracy {
             kerrlight_geodesic::Tracer::new(self.tolerance).context("--tolerance")?;
         }
         make_folder(&self.output)?;
-        match (self.hard, self.part) {
-            (Some(rays), Some(part)) => hard::part(self, rays, part),
-            (Some(rays), None) => hard::run(self, rays),
-            (None, _) => self.sweep(),
+        match self.hard {
+            Some(rays) => hard::run(self, rays),
+            None => self.sweep(),
         }
     }
 

@@ -191,11 +191,6 @@ impl AngularVelocity {
     pub fn angle(&self, point: [f64; 3], time: f64, reference: f64) -> f64 {
         -self.rate(radius(point)) * (time - reference)
     }
-
-    /// Derivative of [`Self::angle`] with respect to the radius, in radians per M.
-    pub fn angle_slope(&self, point: [f64; 3], time: f64, reference: f64) -> f64 {
-        -self.slope(radius(point)) * (time - reference)
-    }
 }
 
 /// The way that the matter at a point has come.

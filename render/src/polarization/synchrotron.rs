@@ -58,11 +58,6 @@ impl PowerLaw {
         self.index
     }
 
-    /// Π, the degree of linear polarisation in a uniform field.
-    pub fn linear_fraction(&self) -> f64 {
-        self.linear
-    }
-
     /// The emissivity in the gas frame, the direction of its polarisation that on the screen,
     /// relative to that of a field of strength 1 normal to the ray. No power of g is in it.
     ///
@@ -83,11 +78,6 @@ impl PowerLaw {
             i * (self.circular * cot * (view.redshift * across).sqrt()).clamp(-most, most)
         };
         Stokes { i, q: p * view.direction[0], u: p * view.direction[1], v }
-    }
-
-    /// What a stretch of a ray adds per Σ dτ: g^{2+α} j.
-    pub fn of_volume(&self, view: &SynchrotronView) -> Stokes {
-        self.emissivity(view) * power(view.redshift, 2.0 + self.index)
     }
 
     /// What a thin layer parallel to the equatorial plane adds per thickness:
@@ -129,7 +119,7 @@ mod tests {
     fn exact_linear_fractions() {
         for (alpha, fraction) in [(1.0, 0.75), (0.5, 9.0 / 13.0), (0.0, 0.6)] {
             let law = PowerLaw::new(alpha, None).unwrap();
-            assert!((law.linear_fraction() - fraction).abs() < 1e-15);
+            assert!((law.linear - fraction).abs() < 1e-15);
         }
     }
 

@@ -9,12 +9,10 @@ use kerrlight_geodesic::{
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use std::ops::Range;
 
 /// What kind of trouble a ray looks for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Impact parameters of the hole's size.
     Strong,
@@ -42,7 +40,7 @@ impl Kind {
 }
 
 /// What became of the rays of one kind.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Tally {
     /// The kind.
     pub kind: Kind,
@@ -108,7 +106,7 @@ impl Tally {
 }
 
 /// Rays that share one seed and are done together.
-pub const BATCH: u64 = 2000;
+const BATCH: u64 = 2000;
 
 /// Traces `rays` random rays, held against the oracle; `progress` hears how many more are done
 /// and says whether to go on. What was traced before it says no counts.
@@ -122,21 +120,7 @@ pub fn run(
     seed: u64,
     progress: impl Fn(u64) -> bool + Sync,
 ) -> Result<Vec<Tally>, Error> {
-    let all = 0..rays.div_ceil(BATCH);
-    run_part((integrator, tolerance), (rays, seed), all, progress)
-}
-
-/// The same for some of the batches of `rays` random rays: [`add_up`] makes all of them.
-///
-/// # Errors
-/// If the tolerance is out of its range.
-pub fn run_part(
-    (integrator, tolerance): (Integrator, f64),
-    (rays, seed): (u64, u64),
-    batches: Range<u64>,
-    progress: impl Fn(u64) -> bool + Sync,
-) -> Result<Vec<Tally>, Error> {
-    batches
+    (0..rays.div_ceil(BATCH))
         .into_par_iter()
         .map_init(Oracle::default, |oracle, batch| {
             if !progress(0) {
@@ -163,11 +147,6 @@ fn nothing() -> Vec<Tally> {
 
 fn add(all: Vec<Tally>, more: &[Tally]) -> Vec<Tally> {
     all.into_iter().zip(more).map(|(a, b)| a.add(b)).collect()
-}
-
-/// What parts in the order of their batches come to together: the same as at once.
-pub fn add_up(parts: impl IntoIterator<Item = Vec<Tally>>) -> Vec<Tally> {
-    parts.into_iter().fold(nothing(), |all, part| add(all, &part))
 }
 
 fn any_of<T: Copy>(rng: &mut impl Rng, values: &[T]) -> T {

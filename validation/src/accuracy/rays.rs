@@ -3,7 +3,6 @@
 use kerrlight_geodesic::analytic::CriticalCurve;
 use kerrlight_geodesic::{Error, Inclination, Kerr, Observer};
 use rand::{Rng, RngExt};
-use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
 /// A kind of ray.
@@ -44,7 +43,7 @@ impl Class {
 }
 
 /// An angle as it was given.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Angle {
     /// In radians.
     Radians(f64),
@@ -66,7 +65,7 @@ impl Angle {
 }
 
 /// A ray by what the user gives.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Draw {
     /// Spin.
     pub spin: f64,

@@ -3,24 +3,22 @@
 mod dtft;
 mod grid;
 mod nufft;
-mod plain;
 mod transform;
 
 pub use dtft::Dtft;
 pub use grid::{ImageGrid, Pulse};
 pub use nufft::Nufft;
-pub use plain::{FullImage, LightCurve};
 pub use transform::{Method, Transform};
 
 pub use kerrlight_common::simd::Float;
+use num_complex::Complex;
 
 /// A linear map from movies to data.
 ///
 /// A movie is `frames` images one after the other, each of `pixels` values in Jy/pixel, row by row
 /// from the top (north), each row from the left (east).
 ///
-/// [`Transform`] chooses between the direct sum ([`Dtft`]) and the non-uniform FFT ([`Nufft`]) by cost;
-/// [`LightCurve`] and [`FullImage`] have the same interface, so that a fit does not see which it has.
+/// [`Transform`] chooses between the direct sum ([`Dtft`]) and the non-uniform FFT ([`Nufft`]) by cost.
 /// Lengths that do not fit together are bugs and panic.
 ///
 /// ```
@@ -47,9 +45,6 @@ pub use kerrlight_common::simd::Float;
 /// # Ok::<(), kerrlight_vlbi::Error>(())
 /// ```
 pub trait Operator<T: Float>: Sync {
-    /// A number of the data: `T` or `Complex<T>`.
-    type Datum;
-
     /// Images of a movie.
     fn frames(&self) -> usize;
 
@@ -60,12 +55,12 @@ pub trait Operator<T: Float>: Sync {
     fn data(&self) -> usize;
 
     /// data = F movie; what was in `data` is overwritten.
-    fn forward(&self, movie: &[T], data: &mut [Self::Datum]);
+    fn forward(&self, movie: &[T], data: &mut [Complex<T>]);
 
     /// movie += Fᵀ data, the adjoint under the inner products Σ x y of movies and Re Σ x̄ y of
     /// data.
     ///
     /// With the gradient of a function of the data, defined by df = Re Σ ḡ dV, this adds its
     /// gradient with respect to the pixels.
-    fn adjoint(&self, data: &[Self::Datum], movie: &mut [T]);
+    fn adjoint(&self, data: &[Complex<T>], movie: &mut [T]);
 }

@@ -98,8 +98,6 @@ fn is_fast_cheaper(grid: ImageGrid, frames: &[Vec<[f64; 2]>], accuracy: f64) -> 
 }
 
 impl<T: Float> Operator<T> for Transform<T> {
-    type Datum = Complex<T>;
-
     fn frames(&self) -> usize {
         match self {
             Transform::Direct(direct) => direct.frames(),

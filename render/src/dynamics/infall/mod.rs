@@ -9,8 +9,7 @@ mod tests;
 mod trajectory;
 
 pub use profile::Profile;
-pub use trajectory::Table;
-pub use trajectory::Trajectory;
+pub use trajectory::{Table, Trajectory};
 
 use crate::Error;
 use kerrlight_geodesic::infall::{Infall, Mixture};
@@ -49,8 +48,8 @@ pub struct Falling {
     law: Law,
     /// What angular velocities are multiplied by.
     factor: f64,
-    flow: Option<Infall<Along<f64>>>,
-    table: Trajectory<f64>,
+    flow: Option<Infall<Along>>,
+    table: Trajectory,
     /// From this radius on matter stays where it is, M.
     circular: f64,
 }
@@ -77,13 +76,11 @@ impl Origin {
     }
 }
 
-/// Numbers of the family, with or without derivatives.
+/// Numbers of the family.
 #[derive(Clone, Copy)]
-pub struct Family<N> {
-    /// Spin of the hole.
-    pub spin: N,
-    /// Shares of circular motion and of free fall.
-    pub mixture: Mixture<N>,
+struct Family {
+    spin: f64,
+    mixture: Mixture,
 }
 
 impl Falling {
@@ -116,7 +113,7 @@ impl Falling {
     }
 
     /// The same with the derivatives with respect to r.
-    pub fn slopes(&self, r: f64) -> [Along<f64>; 2] {
+    pub fn slopes(&self, r: f64) -> [Along; 2] {
         let r = Along::parameter(r, 0);
         let [fall, turn] = match (&self.law, &self.flow) {
             (Law::Profile(profile), _) => profile.rates(r),
@@ -129,18 +126,8 @@ impl Falling {
     /// The same with all angular velocities multiplied by a factor.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
-        let table = self.table.lift(factor);
+        let table = self.table.turned(factor);
         Self { factor: factor * self.factor, table, ..self.clone() }
-    }
-
-    /// From this radius on matter stays where it is, M.
-    pub fn circular_from(&self) -> f64 {
-        self.circular
-    }
-
-    /// The table, of numbers that may have derivatives.
-    pub fn lifted<N: Elementary>(&self) -> Trajectory<N> {
-        self.table.lift(N::constant(1.0))
     }
 
     /// The table, number by number.
@@ -174,62 +161,47 @@ impl Falling {
     }
 }
 
-/// dr/dt and Ω of the family.
-pub struct Flow<N>(Infall<N>);
-
-impl<N: Elementary> Flow<N> {
-    /// At a radius; next to the horizon, where it is not outside of it.
-    pub fn rates(&self, r: N) -> [N; 2] {
-        self.0.rates(outside(&self.0, r))
-    }
-}
-
-impl<N: Elementary> Family<N> {
-    fn flow<M: Elementary>(&self, lift: impl Fn(N) -> M) -> Result<Infall<M>, Error> {
+impl Family {
+    fn flow(&self) -> Result<Infall<Along>, Error> {
+        let s = Along::constant;
         let Mixture { xi, beta_r, beta_phi } = self.mixture;
-        let mixture = Mixture { xi: lift(xi), beta_r: lift(beta_r), beta_phi: lift(beta_phi) };
+        let mixture = Mixture { xi: s(xi), beta_r: s(beta_r), beta_phi: s(beta_phi) };
         // Derivatives end where the horizons meet.
-        let spin = self.spin.value();
+        let spin = self.spin;
         let is_extremal = spin.abs() > EXTREMAL && spin.abs() <= 1.0;
-        let spin = if is_extremal { N::constant(EXTREMAL.copysign(spin)) } else { self.spin };
-        Ok(Infall::new(&Kerr::from_spin(lift(spin))?, mixture)?)
+        let spin = if is_extremal { EXTREMAL.copysign(spin) } else { spin };
+        Ok(Infall::new(&Kerr::from_spin(s(spin))?, mixture)?)
     }
 
     /// From where on matter stays at its radius, M.
-    pub fn circular_from(&self) -> Result<f64, Error> {
-        Ok(if self.is_still() { self.flow(|x| x)?.isco().value() } else { f64::INFINITY })
-    }
-
-    /// Its dr/dt and Ω.
-    pub fn flowing(&self) -> Result<Flow<N>, Error> {
-        Ok(Flow(self.flow(|x| x)?))
+    fn circular_from(&self) -> Result<f64, Error> {
+        Ok(if self.is_still() { self.flow()?.isco().value } else { f64::INFINITY })
     }
 
     fn is_still(&self) -> bool {
-        1.0 - self.mixture.beta_r.value() < STILL
+        1.0 - self.mixture.beta_r < STILL
     }
 
     /// The fall from far away, or from the innermost stable orbit where matter stays on circles outside of it, to next
     /// to the horizon.
-    pub fn trajectory(&self) -> Result<Trajectory<N>, Error> {
-        let lift = |x: N| Along { value: x, slope: [N::constant(0.0)] };
-        let (flow, s) = (self.flow(lift)?, |x: f64| Along::<N>::constant(x));
+    fn trajectory(&self) -> Result<Trajectory, Error> {
+        let (flow, s) = (self.flow()?, Along::constant);
         let (isco, horizon) = (flow.isco(), flow.hole().horizon());
         let gap = isco - horizon;
         // Of extremal holes there are no digits for what lies inside of the orbit.
         let is_narrow = gap.value() < NARROW;
         let gap = if is_narrow { s(NARROW) } else { gap };
         let (half, flow) = (gap * s(0.5), &flow);
-        let at = move |r: Along<N>| -> Point<Along<N>> {
+        let at = move |r: Along| -> Point<Along> {
             let [fall, turn] = flow.rates(r);
             [r, fall, turn]
         };
-        let below = move |part: Along<N>| -> Point<Along<N>> {
+        let below = move |part: Along| -> Point<Along> {
             let [fall, turn] = flow.rates_below(part * half.sqrt());
             [isco - half * part * part, fall, turn]
         };
-        let far = move |part: Along<N>| at(isco + gap * (part - s(1.0)));
-        let near = move |part: Along<N>| at(horizon + half * part);
+        let far = move |part: Along| at(isco + gap * (part - s(1.0)));
+        let near = move |part: Along| at(horizon + half * part);
         let least = if is_narrow { 1.01 } else { 1.0 };
         let outside = Way {
             marks: falling(geometric(least, FARTHEST / gap.value())),
@@ -249,7 +221,7 @@ impl<N: Elementary> Family<N> {
 
     /// Whether nothing leaves the innermost stable orbit: a plunge from it has begun long ago.
     fn is_eternal(&self) -> bool {
-        self.is_still() && self.mixture.xi.value() == 1.0
+        self.is_still() && self.mixture.xi == 1.0
     }
 
     /// Marks below the innermost stable orbit: roots of the part of the half way to the horizon.
@@ -259,20 +231,18 @@ impl<N: Elementary> Family<N> {
             false => core::iter::once(0.0).chain(geometric(1e-8, 1.0)).collect(),
         }
     }
-}
 
-impl Family<f64> {
     fn falling(self, law: Law) -> Result<Falling, Error> {
-        let flow = self.flow(Along::constant)?;
+        let flow = self.flow()?;
         let circular = self.circular_from()?;
         Ok(Falling { law, factor: 1.0, table: self.trajectory()?, flow: Some(flow), circular })
     }
 }
 
 /// A radius, or that of the horizon where it is not outside of it.
-fn outside<N: Elementary>(flow: &Infall<N>, r: N) -> N {
-    let least = flow.hole().horizon() * N::constant(1.0 + 1e-9);
-    if r.value() > least.value() { r } else { least }
+fn outside(flow: &Infall<Along>, r: Along) -> Along {
+    let least = flow.hole().horizon() * Along::constant(1.0 + 1e-9);
+    if r.value > least.value { r } else { least }
 }
 
 fn falling(mut marks: Vec<f64>) -> Vec<f64> {

@@ -79,8 +79,8 @@ impl Profile {
     }
 
     /// The fall from the farthest radius to inside of any horizon, or the rise from there.
-    pub fn trajectory(&self) -> Trajectory<f64> {
-        let at = move |r: Along<f64>| -> Point<Along<f64>> {
+    pub fn trajectory(&self) -> Trajectory {
+        let at = move |r: Along| -> Point<Along> {
             let [fall, turn] = self.rates(r);
             [r, fall, turn]
         };
@@ -89,7 +89,7 @@ impl Profile {
         let ends: Vec<f64> =
             core::iter::once(inner).chain(knots).chain([super::FARTHEST]).collect();
         let falls = self.radial[0][0] < 0.0;
-        let mut ways: Vec<Way<'_, f64>> = ends
+        let mut ways: Vec<Way<'_>> = ends
             .windows(2)
             .map(|pair| {
                 let mut marks = super::geometric(pair[0], pair[1]);

@@ -1,59 +1,58 @@
 //! One fall from far away: radius and azimuth as functions of time. All matter of a steady flow has the same, but for
 //! when and where it began, so that to carry matter along is to read this table twice.
 
-use kerrlight_geodesic::{Dual, Elementary, quadrature::gauss_legendre};
+use kerrlight_geodesic::{Dual, quadrature::gauss_legendre};
 
 /// Radius, dr/dt and Ω somewhere on the way.
 pub(super) type Point<N> = [N; 3];
 
 /// A number with its derivative along a way.
-pub(super) type Along<N> = Dual<N, 1>;
+pub(super) type Along = Dual<f64, 1>;
 
 /// A way from the first to the last of some marks; where it is between them comes from a smooth function.
-pub(super) struct Way<'a, N> {
+pub(super) struct Way<'a> {
     /// Growing or falling.
     pub marks: Vec<f64>,
     /// The point at a mark, with its derivative along the way.
-    pub at: Box<dyn Fn(Along<N>) -> Point<Along<N>> + 'a>,
+    pub at: Box<dyn Fn(Along) -> Point<Along> + 'a>,
     /// Whether rates have no derivative at the first mark, where dr/dt grows like a root.
     pub rough: bool,
 }
 
 /// A mark with what is known there.
 #[derive(Clone, Copy)]
-struct Knot<N> {
-    radius: N,
+struct Knot {
+    radius: f64,
     /// First and second derivative of the radius with respect to time.
-    motion: [N; 2],
+    motion: [f64; 2],
     /// The same of the azimuth.
-    turn: [N; 2],
+    turn: [f64; 2],
 }
 
 /// Between two marks: quintic polynomials of the part of the time that has passed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Cell<N> {
-    start: N,
-    per_time: N,
-    radius: [N; 6],
-    azimuth: [N; 6],
+struct Cell {
+    start: f64,
+    per_time: f64,
+    radius: [f64; 6],
+    azimuth: [f64; 6],
 }
 
-/// Radius (M) and azimuth (radians) of falling or rising matter by time (M). `N` is `f64`, or a number with
-/// derivatives, all of which are those of the table itself.
+/// Radius (M) and azimuth (radians) of falling or rising matter by time (M).
 #[derive(Clone, Debug, PartialEq)]
-pub struct Trajectory<N> {
+pub struct Trajectory {
     /// When each cell begins, and when the last one ends.
     times: Vec<f64>,
     /// Radii then.
     radii: Vec<f64>,
-    cells: Vec<Cell<N>>,
+    cells: Vec<Cell>,
     /// Radius, azimuth and angular velocity at both ends.
-    ends: [Point<N>; 2],
+    ends: [Point<f64>; 2],
 }
 
-impl<N: Elementary> Trajectory<N> {
+impl Trajectory {
     /// Of ways that follow each other in time; time and azimuth are 0 where way number `origin` begins.
-    pub(super) fn new(ways: &[Way<'_, N>], origin: usize) -> Self {
+    pub(super) fn new(ways: &[Way<'_>], origin: usize) -> Self {
         let rule = gauss_legendre(8);
         let (mut spans, mut first) = (Vec::new(), 0);
         for (k, way) in ways.iter().enumerate() {
@@ -69,8 +68,8 @@ impl<N: Elementary> Trajectory<N> {
         Self::of(&spans, first)
     }
 
-    fn of(spans: &[Span<N>], first: usize) -> Self {
-        let mut starts = vec![[N::constant(0.0); 2]; spans.len() + 1];
+    fn of(spans: &[Span], first: usize) -> Self {
+        let mut starts = vec![[0.0; 2]; spans.len() + 1];
         // Sums from the origin on: times are exact where they are short.
         for k in first..spans.len() {
             starts[k + 1] = [0, 1].map(|c| starts[k][c] + spans[k].steps[c]);
@@ -78,17 +77,17 @@ impl<N: Elementary> Trajectory<N> {
         for k in (0..first).rev() {
             starts[k] = [0, 1].map(|c| starts[k + 1][c] - spans[k].steps[c]);
         }
-        let cells: Vec<Cell<N>> =
+        let cells: Vec<Cell> =
             spans.iter().zip(&starts).map(|(span, start)| span.cell(*start)).collect();
-        let radii = spans.iter().map(|span| span.ends[0].radius.value());
-        let last = spans.last().map(|span| span.ends[1].radius.value());
-        let end = |start: [N; 2], knot: &Knot<N>| [knot.radius, start[1], knot.turn[0]];
+        let radii = spans.iter().map(|span| span.ends[0].radius);
+        let last = spans.last().map(|span| span.ends[1].radius);
+        let end = |start: [f64; 2], knot: &Knot| [knot.radius, start[1], knot.turn[0]];
         let ends = [
             end(starts[0], &spans[0].ends[0]),
             end(starts[spans.len()], &spans[spans.len() - 1].ends[1]),
         ];
         Self {
-            times: starts.iter().map(|start| start[0].value()).collect(),
+            times: starts.iter().map(|start| start[0]).collect(),
             radii: radii.chain(last).collect(),
             cells,
             ends,
@@ -96,10 +95,10 @@ impl<N: Elementary> Trajectory<N> {
     }
 
     /// Radius and azimuth at a time. Before the first and after the last time matter stays at its radius and turns.
-    pub fn at(&self, time: N) -> [N; 2] {
-        let number = self.times.partition_point(|start| *start <= time.value());
-        let beyond = |[radius, azimuth, rate]: Point<N>, since: f64| {
-            [radius, azimuth + rate * (time - N::constant(since))]
+    pub fn at(&self, time: f64) -> [f64; 2] {
+        let number = self.times.partition_point(|start| *start <= time);
+        let beyond = |[radius, azimuth, rate]: Point<f64>, since: f64| {
+            [radius, azimuth + rate * (time - since)]
         };
         match (number.checked_sub(1), self.times.last()) {
             (None, _) => beyond(self.ends[0], self.times[0]),
@@ -116,13 +115,6 @@ impl<N: Elementary> Trajectory<N> {
         let cell = self.cells.get(k)?;
         Some(cell.time_at(radius, [self.times[k], self.times[k + 1]]))
     }
-
-    /// dr/dt at a time, without its derivatives; 0 beyond both ends.
-    pub fn speed(&self, time: f64) -> f64 {
-        let number = self.times.partition_point(|start| *start <= time);
-        let cell = number.checked_sub(1).and_then(|k| self.cells.get(k));
-        cell.map_or(0.0, |cell| cell.speed(time))
-    }
 }
 
 /// The numbers of a [`Trajectory`], for devices.
@@ -135,53 +127,42 @@ pub struct Table {
     pub ends: [[f64; 3]; 2],
 }
 
-impl Trajectory<f64> {
+impl Trajectory {
     /// Its numbers.
     pub fn numbers(&self) -> Table {
-        let numbers = |cell: &Cell<f64>| (cell.start, cell.per_time, [cell.radius, cell.azimuth]);
+        let numbers = |cell: &Cell| (cell.start, cell.per_time, [cell.radius, cell.azimuth]);
         Table {
             cells: self.cells.iter().map(numbers).collect(),
             last: self.times.last().copied().unwrap_or(0.0),
             ends: self.ends,
         }
     }
-}
 
-impl Trajectory<f64> {
-    /// The same without derivatives, but for a factor on all angular velocities.
-    pub fn lift<N: Elementary>(&self, factor: N) -> Trajectory<N> {
-        let s = N::constant;
-        let cell = |cell: &Cell<f64>| Cell {
-            start: s(cell.start),
-            per_time: s(cell.per_time),
-            radius: cell.radius.map(s),
-            azimuth: cell.azimuth.map(|x| factor * s(x)),
-        };
-        let end = |[radius, azimuth, rate]: Point<f64>| {
-            [s(radius), factor * s(azimuth), factor * s(rate)]
-        };
-        Trajectory {
-            times: self.times.clone(),
-            radii: self.radii.clone(),
+    /// The same with all angular velocities multiplied by a factor.
+    pub fn turned(&self, factor: f64) -> Self {
+        let cell = |cell: &Cell| Cell { azimuth: cell.azimuth.map(|x| factor * x), ..*cell };
+        let end = |[radius, azimuth, rate]: Point<f64>| [radius, factor * azimuth, factor * rate];
+        Self {
             cells: self.cells.iter().map(cell).collect(),
             ends: self.ends.map(end),
+            ..self.clone()
         }
     }
 }
 
-impl<N: Elementary> Way<'_, N> {
+impl Way<'_> {
     /// Time and azimuth between two marks.
-    fn steps(&self, [from, to]: [f64; 2], rule: &[(f64, f64)]) -> [N; 2] {
-        rule.iter().fold([N::constant(0.0); 2], |[time, azimuth], (place, weight)| {
-            let mark = N::constant(from + (to - from) * place);
+    fn steps(&self, [from, to]: [f64; 2], rule: &[(f64, f64)]) -> [f64; 2] {
+        rule.iter().fold([0.0; 2], |[time, azimuth], (place, weight)| {
+            let mark = from + (to - from) * place;
             let [radius, fall, turn] = (self.at)(Along::parameter(mark, 0));
-            let step = radius.slope[0] * N::constant(weight * (to - from)) / fall.value;
+            let step = radius.slope[0] * (weight * (to - from)) / fall.value;
             [time + step, azimuth + turn.value * step]
         })
     }
 
-    fn knot(&self, mark: f64) -> Knot<N> {
-        let [radius, fall, turn] = (self.at)(Along::parameter(N::constant(mark), 0));
+    fn knot(&self, mark: f64) -> Knot {
+        let [radius, fall, turn] = (self.at)(Along::parameter(mark, 0));
         let per_mark = fall.value / radius.slope[0];
         Knot {
             radius: radius.value,
@@ -192,16 +173,16 @@ impl<N: Elementary> Way<'_, N> {
 }
 
 /// What lies between two marks.
-struct Span<N> {
-    steps: [N; 2],
-    ends: [Knot<N>; 2],
+struct Span {
+    steps: [f64; 2],
+    ends: [Knot; 2],
     rough: bool,
 }
 
-impl<N: Elementary> Span<N> {
-    fn cell(&self, [start, azimuth]: [N; 2]) -> Cell<N> {
+impl Span {
+    fn cell(&self, [start, azimuth]: [f64; 2]) -> Cell {
         let ([time, turned], [a, b]) = (self.steps, self.ends);
-        let one = N::constant(1.0);
+        let one = 1.0;
         let azimuths = [azimuth, azimuth + turned];
         let (radius, azimuth) = if self.rough {
             // Too short for anything but a straight line to be seen.
@@ -216,26 +197,26 @@ impl<N: Elementary> Span<N> {
     }
 }
 
-impl<N: Elementary> Cell<N> {
+impl Cell {
     #[inline(always)]
-    fn at(&self, time: N) -> [N; 2] {
+    fn at(&self, time: f64) -> [f64; 2] {
         let part = (time - self.start) * self.per_time;
-        let sum = |[a, b, c, d, e, f]: [N; 6]| {
+        let sum = |[a, b, c, d, e, f]: [f64; 6]| {
             a + part * (b + part * (c + part * (d + part * (e + part * f))))
         };
         [sum(self.radius), sum(self.azimuth)]
     }
 
     fn speed(&self, time: f64) -> f64 {
-        let per_time = self.per_time.value();
-        let part = (time - self.start.value()) * per_time;
-        let [_, b, c, d, e, f] = self.radius.map(Elementary::value);
+        let per_time = self.per_time;
+        let part = (time - self.start) * per_time;
+        let [_, b, c, d, e, f] = self.radius;
         per_time * (b + part * (2.0 * c + part * (3.0 * d + part * (4.0 * e + part * 5.0 * f))))
     }
 
     /// By Newton's steps, halved where they would leave what is left of the cell.
     fn time_at(&self, radius: f64, [mut from, mut to]: [f64; 2]) -> f64 {
-        let at = |time: f64| self.at(N::constant(time))[0].value() - radius;
+        let at = |time: f64| self.at(time)[0] - radius;
         let falls = at(from) > at(to);
         let mut time = 0.5 * (from + to);
         for _ in 0..60 {
@@ -260,24 +241,23 @@ impl<N: Elementary> Cell<N> {
     }
 }
 
-fn line<N: Elementary>([a, b]: [N; 2]) -> [N; 6] {
-    let zero = N::constant(0.0);
+fn line([a, b]: [f64; 2]) -> [f64; 6] {
+    let zero = 0.0;
     [a, b - a, zero, zero, zero, zero]
 }
 
 /// Coefficients of the polynomial with these values, slopes and curvatures at the ends of a time.
-fn quintic<N: Elementary>(values: [N; 2], slopes: [[N; 2]; 2], time: N) -> [N; 6] {
-    let s = N::constant;
-    let [[v0, a0], [v1, a1]] = slopes.map(|[v, a]| [v * time, a * time * time * s(0.5)]);
+fn quintic(values: [f64; 2], slopes: [[f64; 2]; 2], time: f64) -> [f64; 6] {
+    let [[v0, a0], [v1, a1]] = slopes.map(|[v, a]| [v * time, a * time * time * 0.5]);
     let rise = values[1] - values[0] - v0 - a0;
-    let slope = v1 - v0 - s(2.0) * a0;
+    let slope = v1 - v0 - 2.0 * a0;
     let bend = a1 - a0;
     [
         values[0],
         v0,
         a0,
-        s(10.0) * rise - s(4.0) * slope + bend,
-        s(7.0) * slope - s(15.0) * rise - s(2.0) * bend,
-        s(6.0) * rise - s(3.0) * slope + bend,
+        10.0 * rise - 4.0 * slope + bend,
+        7.0 * slope - 15.0 * rise - 2.0 * bend,
+        6.0 * rise - 3.0 * slope + bend,
     ]
 }

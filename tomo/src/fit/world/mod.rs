@@ -1,29 +1,23 @@
 //! What a fit may not know of the world beside the emission: the hole, the view of it, and how matter moves.
 //!
-//! [`World`] is a point in the space of these parameters, [`WorldModel`] makes a forward model of it, and
-//! [`Tangents`] say how each node moves with each parameter, so that images, χ² and gradients follow exactly.
+//! [`World`] is a point in the space of these parameters, and [`WorldModel`] makes a forward model of it.
 
 mod covariance;
-mod derivative;
 mod discretisation;
 mod envelope;
 mod explore;
-mod fall;
 mod model;
 mod polish;
 mod prior;
 mod problem;
 mod reach;
-mod redshift;
 mod spread;
 mod surroundings;
-mod tangents;
 mod twin;
 
 #[cfg(test)]
 mod tests;
 
-pub use derivative::WorldBuffers;
 pub use discretisation::{ModelError, Refined, Refinement, Standing};
 pub use envelope::Envelope;
 pub use explore::{Exploration, Explored, Sample, WorldWatch};
@@ -33,11 +27,9 @@ pub use prior::Prior;
 pub use problem::{Effort, Estimate, Free, Span, WorldProblem};
 pub use spread::Spread;
 pub use surroundings::Surroundings;
-pub use tangents::Tangents;
 
 use crate::Error;
 use core::f64::consts::{PI, TAU};
-use kerrlight_geodesic::Dual;
 
 /// A parameter of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -58,9 +50,6 @@ pub enum Parameter {
 
 /// Number of parameters.
 pub const PARAMETERS: usize = 6;
-
-/// A number with its derivatives with respect to all parameters.
-pub(super) type Number = Dual<f64, PARAMETERS>;
 
 impl Parameter {
     /// All of them, in the order of [`World`].
@@ -195,10 +184,5 @@ impl World {
             }
         }
         Ok(self)
-    }
-
-    /// All values, each the parameter of its own derivative.
-    pub(super) fn numbers(&self) -> [Number; PARAMETERS] {
-        core::array::from_fn(|k| Number::parameter(self.0[k], k))
     }
 }

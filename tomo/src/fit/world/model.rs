@@ -1,7 +1,6 @@
 //! From a world to the forward model of a fit.
 
-use super::tangents::Tangents;
-use super::{Number, PARAMETERS, Parameter, World};
+use super::{Parameter, World};
 use crate::Error;
 use crate::fit::pixel_rays::{PixelRays, near_the_ring};
 use crate::fit::{
@@ -10,9 +9,7 @@ use crate::fit::{
 };
 use kerrlight_common::simd::Float;
 use kerrlight_geodesic::infall::Mixture;
-use kerrlight_geodesic::node_gradients;
-use kerrlight_geodesic::simd::{NodeRequest, PanelRule};
-use kerrlight_geodesic::{Inclination, Kerr, Observer, Quantities};
+use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use kerrlight_render::dynamics::infall::{self, Falling};
 use kerrlight_render::dynamics::{AngularVelocity, Axis};
 use kerrlight_render::polarization::PolarizationLaw;
@@ -44,16 +41,6 @@ impl Law {
             Law::Fixed(law) => law.clone(),
             _ => AngularVelocity::Keplerian { drag: spin },
         }
-    }
-
-    /// The angular velocity of matter that stays at its radius, with the derivatives that radius and spin (along the
-    /// axis) have.
-    pub(super) fn rate(&self, r: Number, spin: Number) -> Number {
-        let law = self.circular(spin.value);
-        let (rate, slope) = (law.rate(r.value), law.slope(r.value));
-        let by_spin = if *self == Law::CircularOrbits { -rate * rate } else { 0.0 };
-        let bend = core::array::from_fn(|k| slope * r.slope[k] + by_spin * spin.slope[k]);
-        Number { value: rate, slope: bend }
     }
 }
 
@@ -103,9 +90,6 @@ pub struct WorldModel {
     pub seen: Seen,
 }
 
-/// Tolerance of rays with derivatives.
-const TOLERANCE: f64 = 1e-11;
-
 impl WorldModel {
     /// Nodes on the rays of a world.
     ///
@@ -119,9 +103,8 @@ impl WorldModel {
             delay: self.slow_light,
             momentum: self.redshift.is_some() || self.polarization.is_some(),
         };
-        let (rays, numbers) = (self.rays(world, (&hole, &observer)), world.numbers());
-        let screen = |place| self.place(&numbers, place).map(|number| number.value);
-        let mut lines = Sightlines::of_pixels((&hole, &observer), &rays, screen, &request)?;
+        let (rays, turn) = (self.rays(world, (&hole, &observer)), turn(world));
+        let mut lines = Sightlines::of_pixels((&hole, &observer), &rays, turn, &request)?;
         lines.weight.iter_mut().for_each(|weight| *weight *= self.jy);
         Ok(lines)
     }
@@ -131,50 +114,12 @@ impl WorldModel {
     /// # Errors
     /// If a parameter is out of its range.
     pub fn forward<T: Float>(&self, world: &World) -> Result<ForwardModel<T>, Error> {
-        self.forward_of(world, &self.sightlines(world)?)
-    }
-
-    /// The same with the derivatives of every node with respect to these parameters. About 0.2 ms a ray.
-    ///
-    /// # Errors
-    /// If a parameter is out of its range.
-    pub fn differentiated<T: Float>(
-        &self,
-        world: &World,
-        free: &[Parameter],
-    ) -> Result<(ForwardModel<T>, Tangents), Error> {
-        if self.polarization.is_some() || self.seen != Seen::Images {
-            let allowed = "images of total intensity: others have no derivatives";
-            return Err(Error::out_of_range("polarization", 1.0, allowed));
-        }
-        let (hole, observer) = self.observed(world)?;
-        let (rays, numbers) = (self.rays(world, (&hole, &observer)), world.numbers());
-        let places = rays.places.iter().map(|place| {
-            let [alpha, beta] = self.place(&numbers, *place);
-            (alpha.value, beta.value)
-        });
-        let (alpha, beta): (Vec<f64>, Vec<f64>) = places.unzip();
-        let request = NodeRequest {
-            radius: self.region.r_max,
-            rule: PanelRule::new(self.order),
-            split: self.split,
-            quantities: Quantities { azimuth: true, time: self.slow_light, velocity: true },
-        };
-        let nodes = node_gradients::trace(&hole, &observer, &alpha, &beta, TOLERANCE, &request)?;
-        let (lines, tangents) = Tangents::new(self, (world, &rays), free, &nodes)?;
-        Ok((self.forward_of(world, &lines)?, tangents))
-    }
-
-    fn forward_of<T: Float>(
-        &self,
-        world: &World,
-        lines: &Sightlines,
-    ) -> Result<ForwardModel<T>, Error> {
+        let lines = self.sightlines(world)?;
         let (hole, _) = self.observed(world)?;
         let motion = self.motion_of(world)?;
-        let model = ForwardModel::new(lines, &motion, &hole, self.redshift)?;
+        let model = ForwardModel::new(&lines, &motion, &hole, self.redshift)?;
         let view = self.polarized(world);
-        let factors = view.map(|view| view.factors(lines, &hole, &motion.velocity)).transpose()?;
+        let factors = view.map(|view| view.factors(&lines, &hole, &motion.velocity)).transpose()?;
         let mut model = model.seen(factors.as_deref(), &self.seen)?;
         model.weigh(self.axis);
         Ok(model)
@@ -183,12 +128,9 @@ impl WorldModel {
     /// How polarised light is seen in a world.
     pub fn polarized(&self, world: &World) -> Option<PolarizedView> {
         let law = self.polarization?;
-        let numbers = world.numbers();
-        let place = |(x, y): (&f64, &f64)| {
-            let [alpha, beta] = self.place(&numbers, [*x, *y]);
-            (alpha.value, beta.value)
-        };
-        let (alpha, beta) = self.x.iter().zip(&self.y).map(place).unzip();
+        let turn = turn(world);
+        let places = self.x.iter().zip(&self.y).map(|(x, y)| turn([*x, *y]).into());
+        let (alpha, beta): (Vec<f64>, Vec<f64>) = places.unzip();
         Some(PolarizedView {
             law,
             axis: self.axis,
@@ -229,19 +171,16 @@ impl WorldModel {
     /// If a parameter is out of its range.
     pub fn ring_pixels(&self, world: &World, limit: f64) -> Result<Vec<bool>, Error> {
         let (hole, observer) = self.observed(world)?;
-        let numbers = world.numbers();
-        let place =
-            |(x, y): (&f64, &f64)| self.place(&numbers, [*x, *y]).map(|number| number.value);
-        let places: Vec<[f64; 2]> = self.x.iter().zip(&self.y).map(place).collect();
+        let turn = turn(world);
+        let pairs = self.x.iter().zip(&self.y);
+        let places: Vec<[f64; 2]> = pairs.map(|(x, y)| turn([*x, *y])).collect();
         Ok(near_the_ring((&hole, &observer), &places, limit))
     }
 
     /// The rays of all pixels of a world.
     fn rays(&self, world: &World, seen: (&Kerr, &Observer)) -> PixelRays {
-        let numbers = world.numbers();
-        let screen = |place| self.place(&numbers, place).map(|number| number.value);
         let rays = match self.ring {
-            Some(ring) => PixelRays::new(ring, seen, [&self.x, &self.y], screen),
+            Some(ring) => PixelRays::new(ring, seen, [&self.x, &self.y], turn(world)),
             None => PixelRays::single(&self.x, &self.y),
         };
         match self.quartered {
@@ -249,13 +188,10 @@ impl WorldModel {
             None => rays,
         }
     }
+}
 
-    /// α and β of a place on the screen (M to the right and upwards), M: α across the spin's projection, β along it.
-    pub(super) fn place(&self, numbers: &[Number; PARAMETERS], place: [f64; 2]) -> [Number; 2] {
-        use kerrlight_geodesic::{Elementary, Scalar};
-        let of = |parameter: Parameter| numbers[parameter.index()];
-        let (sin, cos) = of(Parameter::PositionAngle).sin_cos();
-        let [x, y] = place.map(Number::constant);
-        [x * cos + y * sin, y * cos - x * sin]
-    }
+/// From a place on the screen (M to the right and upwards) to α and β, M: α across the spin's projection, β along it.
+pub(super) fn turn(world: &World) -> impl Fn([f64; 2]) -> [f64; 2] + Copy {
+    let (sin, cos) = world.get(Parameter::PositionAngle).sin_cos();
+    move |[x, y]| [x * cos + y * sin, y * cos - x * sin]
 }

@@ -131,11 +131,6 @@ impl Nufft {
         self.sites.len() * size_of::<Site>()
     }
 
-    /// Bytes that are needed while it works: grids of one frame, whatever the number of threads.
-    pub fn memory_working(&self) -> usize {
-        self.columns * (self.column_length() + self.grid.height) * size_of::<Complex<f64>>()
-    }
-
     /// A column with its first cells repeated at its end.
     fn column_length(&self) -> usize {
         self.rows + self.kernel.width
@@ -330,8 +325,6 @@ impl Nufft {
 }
 
 impl<T: Float> Operator<T> for Nufft {
-    type Datum = Complex<T>;
-
     fn frames(&self) -> usize {
         self.frames.len()
     }

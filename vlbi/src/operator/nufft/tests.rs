@@ -67,7 +67,7 @@ fn conforms<T: Float>(accuracy: f64, tolerance: f64) {
     for (width, height) in [(13, 80), (64, 64)] {
         let grid = ImageGrid::new(width, height, 1e-9).unwrap();
         let fast = Nufft::new(grid, Pulse::Triangle, &frames(grid), accuracy).unwrap();
-        conformance::operator::<T, _>("fast transform", &fast, tolerance);
+        conformance::operator::<T>("fast transform", &fast, tolerance);
     }
 }
 
