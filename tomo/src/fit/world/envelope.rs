@@ -124,7 +124,7 @@ fn few(count: f64) -> f64 {
 }
 
 /// Covariances in the parameters' own units, row by row.
-fn in_own_units(free: &[Free], whole: &DMatrix<f64>) -> Vec<f64> {
+pub(super) fn in_own_units(free: &[Free], whole: &DMatrix<f64>) -> Vec<f64> {
     let (n, scale) = (free.len(), |k: usize| free[k].parameter.scale());
     (0..n * n).map(|k| whole[(k / n, k % n)] * scale(k / n) * scale(k % n)).collect()
 }

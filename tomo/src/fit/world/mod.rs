@@ -26,7 +26,7 @@ mod twin;
 mod tests;
 
 pub use derivative::WorldBuffers;
-pub use discretisation::{ModelError, Refined, Refinement, Standing};
+pub use discretisation::{ModelError, ModelErrors, Refined, Refinement, Standing};
 pub use envelope::Envelope;
 pub use explore::{Exploration, Explored, Sample, WorldWatch};
 pub use model::{Law, WorldModel};
