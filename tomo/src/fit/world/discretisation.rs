@@ -116,7 +116,8 @@ impl Standing {
             let step = step * (kind.onwards * (0.5 * gain.min(0.0)).exp());
             own(kind.source, &(&step * step.transpose()))
         };
-        let explained: f64 = refined.iter().map(|refined| refined.gain.max(0.0)).sum();
+        // Several may explain the same.
+        let explained = refined.iter().fold(0.0f64, |most, refined| most.max(refined.gain));
         let left = 2.0 * (self.excess - explained).max(0.0);
         let unexplained = covariance(free, &self.best.world, &self.bowl.bends, left)
             .filter(|_| left > 0.0)

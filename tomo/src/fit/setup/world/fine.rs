@@ -162,7 +162,7 @@ fn quick<'a>(problem: &WorldProblem<'a, f32>) -> WorldProblem<'a, f32> {
 }
 
 /// Whether steps along differences of images follow a search: χ² has to be smooth, and they know one volume.
-fn is_stepped(seen: &Seen, problem: &WorldProblem<'_, f32>) -> bool {
+pub(super) fn is_stepped(seen: &Seen, problem: &WorldProblem<'_, f32>) -> bool {
     (problem.model.ring.is_some() || seen.is_images()) && !problem.change.is_any()
 }
 
