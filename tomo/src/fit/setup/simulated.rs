@@ -1,14 +1,16 @@
 //! Data that are simulated from a truth.
 
+use super::drawn::{FINER, OtherModel, binned, fine_images, is_drawn_elsewhere};
 use super::gains;
 use super::imported::frames;
 use super::leakage;
 use super::light_curve;
 use super::observed::{Spoiled, schedule_of, spoil};
 use super::polarized::{self, is_polarized};
-use super::world::seen_in_truth;
+use super::world::{seen_in_truth, true_world};
 use super::{Instrument, Measured, Result, Truth, hours_per_m, motion, sky};
 use crate::fit::settings::{FitFile, PixelShape, Within, refuse};
+use crate::fit::world::World;
 use kerrlight_common::frames::Frames;
 use kerrlight_vlbi::array::Array;
 use kerrlight_vlbi::observation::Observation;
@@ -26,12 +28,30 @@ impl Measured {
         array: Option<&Array>,
     ) -> Result<Self> {
         if !file.is_simulated_elsewhere() {
-            return simulate(file, file, instrument, array);
+            return simulate(file, file, instrument, (array, None));
         }
         let world = file.simulated()?;
         let instrument = Instrument::new(&world).within("world")?;
         let instrument = seen_in_truth(file, &world, instrument)?;
-        simulate(&world, file, &instrument, array)
+        simulate(&world, file, &instrument, (array, None))
+    }
+
+    /// The same, where a world that is drawn is one of matter on circular geodesics by another forward model than that of the
+    /// fit: images as means over many rays, visibilities as sums over as many fine pixels.
+    ///
+    /// # Errors
+    /// As [`simulated`](Self::simulated), and those of the other model.
+    pub fn simulated_by(
+        other: OtherModel<'_>,
+        file: &FitFile,
+        instrument: &Instrument,
+        array: Option<&Array>,
+    ) -> Result<Self> {
+        if !is_drawn_elsewhere(file)? {
+            return Self::simulated(file, instrument, array);
+        }
+        let world = true_world(file)?;
+        simulate(&file.simulated()?, file, instrument, (array, Some((other, world))))
     }
 }
 
@@ -39,7 +59,7 @@ fn simulate(
     file: &FitFile,
     fit: &FitFile,
     instrument: &Instrument,
-    array: Option<&Array>,
+    (array, other): (Option<&Array>, Option<(OtherModel<'_>, World)>),
 ) -> Result<Measured> {
     if let Some(settings) = &file.light_curve {
         return light_curve::simulate(file, fit, instrument, settings);
@@ -47,7 +67,14 @@ fn simulate(
     let truth = Truth::new(file)?;
     let Some(seen) = &file.observation else {
         let times = frames(file)?;
-        let movie = Some(lit(&truth, truth.movie(file, instrument, &times)?)?);
+        let movie = match other {
+            None => truth.movie(file, instrument, &times)?,
+            Some((model, world)) => {
+                let images = fine_images(file, &world, (&truth, &times), model)?;
+                binned(&images, file.screen.pixels)
+            }
+        };
+        let movie = Some(lit(&truth, movie)?);
         let sky = sky(file).ok();
         return Ok(Measured { times, movie, sky, truth: Some(truth), ..Measured::empty() });
     };
@@ -55,7 +82,22 @@ fn simulate(
     let (mut observation, hours) = schedule_of(seen, array)?;
     let per_m = hours_per_m(file)?;
     let times: Vec<f64> = hours.iter().map(|h| seen.first_time + (h - hours[0]) / per_m).collect();
-    let movie = fill(&mut observation, (file, fit, instrument), &truth, (&hours, &times), sky)?;
+    let (movie, pulse) = match other {
+        None => {
+            let from = (file, fit, instrument);
+            (fill(&mut observation, from, &truth, (&hours, &times), sky)?, pulse(fit))
+        }
+        Some((model, world)) => {
+            let images = fine_images(file, &world, (&truth, &times), model)?;
+            let pixels = FINER * file.screen.pixels;
+            let pixel_rad = sky.pixel_rad / FINER as f64;
+            let grid = ImageGrid { width: pixels, height: pixels, pixel_rad };
+            let fine = Frames::of(images.concat(), pixels * pixels);
+            simulate::fill_from(&mut observation, (grid, &fine), Pulse::Delta, &hours)?;
+            let movie = lit(&truth, binned(&images, file.screen.pixels))?;
+            (movie, fit.screen.pulse.map_or(Pulse::Delta, PixelShape::pulse))
+        }
+    };
     let Spoiled { gains: true_gains, leakage: true_leakage } =
         spoil((file, fit), seen, &mut observation)?;
     let gains = gains::priors(fit.instrument.as_ref(), &fit.loss, &observation)?;
@@ -69,7 +111,7 @@ fn simulate(
         movie,
         visibilities,
         sky,
-        pulse: pulse(fit),
+        pulse,
         truth,
         gains,
         true_gains,

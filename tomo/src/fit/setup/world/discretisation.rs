@@ -2,6 +2,7 @@
 
 use super::seen::{BESIDE_THE_RING, Seen};
 use crate::fit::settings::{UnknownWorld, WorldView};
+use crate::fit::setup::drawn::is_drawn_elsewhere;
 use crate::fit::setup::{CoarseView, Result};
 use crate::fit::world::{
     Effort, ModelErrors, Refined, Refinement, Spread, Standing, WorldModel, WorldProblem,
@@ -29,15 +30,16 @@ pub(super) fn errors(
         let known = spread.unexplained(problem.excess(reduced), reduced).into_iter().collect();
         return Ok(ModelErrors { known, left_out: Some(why) });
     }
-    let is_read = seen.view.file.data.is_some();
-    if !is_read && problem.excess(reduced) == 0.0 {
+    let file = &seen.view.file;
+    let is_foreign = file.data.is_some() || is_drawn_elsewhere(file)?;
+    if !is_foreign && problem.excess(reduced) == 0.0 {
         return Ok(ModelErrors::default());
     }
     let world = spread.world;
     seen.smoothly(problem, (world, BESIDE_THE_RING[1]), |problem| {
         let standing = problem.standing(world)?;
         let mut refined = Vec::new();
-        if is_read {
+        if is_foreign {
             refined.extend(voxels(&standing, problem)?);
             refined.extend(sums(&standing, problem)?);
             refined.extend(pixels((seen, view), (unknown, width), &standing, problem)?);
