@@ -1,8 +1,12 @@
 //! Worlds whose movies another forward model has made: its own rays, pixels that are means over many of them, emission and
 //! motion in closed form.
 
-use crate::support::succeed;
-use kerrlight_validation::sky::{Arc, Screen, Sky, add_noise};
+use crate::support::{root, succeed};
+use kerrlight_render::dynamics::Velocity;
+use kerrlight_tomo::fit::settings::{FitFile, PriorSettings};
+use kerrlight_tomo::fit::setup::{Drawn, Instrument, Measured};
+use kerrlight_validation::sky::{Arc, Screen, Sky, add_noise, shining};
+use kerrlight_vlbi::array::built_in;
 use kerrlight_vlbi::files::images::movie_archive;
 use serde_json::Value;
 use std::path::Path;
@@ -13,7 +17,7 @@ const LAST: f64 = 80.0;
 const SCREEN: Screen = Screen { width: 26.0, pixels: 32, rays: 4 };
 
 /// Six filaments of a spiral, as thin as half a voxel of the search.
-fn filaments() -> Sky {
+fn filaments() -> (Sky, Vec<Arc>) {
     let filament = |(k, pitch): (usize, f64)| {
         let k = k as f64;
         let (radius, azimuth) = (4.6 + 0.9 * k, 2.3 * k + 0.4);
@@ -21,11 +25,11 @@ fn filaments() -> Sky {
         Arc { radius, azimuth, pitch, length, sigma, amplitude: 1.0 - 0.08 * k }
     };
     let arcs = [0.8, -0.6].into_iter().cycle().take(6).enumerate().map(filament).collect();
-    Sky { spin: 0.6, inclination_deg: 35.0, position_angle_deg: 0.0, arcs }
+    (Sky::new(0.6, 35.0, 0.0), arcs)
 }
 
 /// Two spots and an arc.
-fn spots_and_arc() -> Sky {
+fn spots_and_arc() -> (Sky, Vec<Arc>) {
     let spot = |radius, azimuth, sigma, amplitude| Arc {
         radius,
         azimuth,
@@ -37,13 +41,13 @@ fn spots_and_arc() -> Sky {
     let arc =
         Arc { radius: 9.5, azimuth: 4.4, pitch: 0.3, length: 4.0, sigma: 0.7, amplitude: 0.5 };
     let arcs = vec![spot(5.5, 0.3, 0.8, 1.0), spot(7.8, 2.6, 0.9, 0.8), arc];
-    Sky { spin: -0.5, inclination_deg: 65.0, position_angle_deg: 40.0, arcs }
+    (Sky::new(-0.5, 65.0, 40.0), arcs)
 }
 
 /// Writes a movie whose first frame has 1 Jy and whose noise is this part of the brightest pixel, which is returned in Jy.
-fn film(path: &Path, sky: &Sky, noise: f64) -> f64 {
+fn film(path: &Path, (sky, arcs): &(Sky, Vec<Arc>), noise: f64) -> f64 {
     let times: Vec<f64> = (0..FRAMES).map(|k| LAST * k as f64 / (FRAMES - 1) as f64).collect();
-    let mut movie = sky.movie(SCREEN, &times).expect("a sky");
+    let mut movie = sky.movie(SCREEN, &times, shining(arcs)).expect("a sky");
     let total: f64 = movie[0].iter().sum();
     movie.iter_mut().flatten().for_each(|x| *x /= total);
     let sigma = noise * movie.iter().flatten().fold(0.0f64, |most, x| most.max(*x));
@@ -55,7 +59,7 @@ fn film(path: &Path, sky: &Sky, noise: f64) -> f64 {
 }
 
 /// What a search finds in a movie of the sky.
-fn found(folder: &Path, sky: &Sky, noise: f64) -> Value {
+fn found(folder: &Path, sky: &(Sky, Vec<Arc>), noise: f64, [starts, worlds]: [usize; 2]) -> Value {
     let sigma = film(&folder.join("film.npz"), sky, noise);
     succeed(folder, &["fit", "--init", "film.npz", "-o", "fit.toml"]);
     let view = |worlds: usize, nodes: usize, iterations: usize, pixels: usize| {
@@ -63,8 +67,8 @@ fn found(folder: &Path, sky: &Sky, noise: f64) -> Value {
             "{{worlds={worlds},nodes={nodes},iterations={iterations},pixels={pixels},frames=20}}"
         )
     };
-    let (coarse, fine) = (view(250, 16, 30, 16), view(48, 24, 60, 32));
-    let angle = sky.position_angle_deg;
+    let (coarse, fine) = (view(worlds, 16, 30, 16), view(48, 24, 60, 32));
+    let angle = sky.0.position_angle_deg;
     let sets = [
         "hole.spin={uniform=[-0.95,0.95]}".to_owned(),
         "observer.inclination_deg={isotropic=[0.0,90.0]}".to_owned(),
@@ -82,7 +86,7 @@ fn found(folder: &Path, sky: &Sky, noise: f64) -> Value {
         "linear.iterations=10".to_owned(),
         "linear.rounds=1".to_owned(),
         "output.nodes=24".to_owned(),
-        format!("search={{starts=2,coarse={coarse},fine={fine}}}"),
+        format!("search={{starts={starts},coarse={coarse},fine={fine}}}"),
     ];
     let mut words = vec!["fit", "fit.toml", "-o", "run"];
     sets.iter().for_each(|set| words.extend(["--set", set]));
@@ -98,9 +102,9 @@ fn exact_a_distant_spot_is_where_its_orbit_is() {
     let (radius, sigma) = (12.0, 1.0);
     let spot = Arc { radius, azimuth: 1.0, pitch: 0.0, length: sigma, sigma, amplitude: 1.0 };
     let seen = |position_angle_deg: f64| {
-        let sky = Sky { spin: 0.0, inclination_deg: 0.01, position_angle_deg, arcs: vec![spot] };
+        let sky = Sky::new(0.0, 0.01, position_angle_deg);
         let screen = Screen { width: 36.0, pixels: 36, rays: 1 };
-        let image = sky.movie(screen, &[0.0]).expect("a sky").remove(0);
+        let image = sky.movie(screen, &[0.0], shining(&[spot])).expect("a sky").remove(0);
         let place = |k: usize| [(k % 36) as f64 - 17.5, 17.5 - (k / 36) as f64];
         // Without the images of light that goes around the hole.
         let far = |k: &usize| place(*k)[0].hypot(place(*k)[1]) > 8.0;
@@ -118,25 +122,73 @@ fn exact_a_distant_spot_is_where_its_orbit_is() {
     assert!((turned[0] + upright[1]).abs() < 0.05 && (turned[1] - upright[0]).abs() < 0.05);
 }
 
+/// A world that is drawn for calibration looks as the fit's own rays see it, with its view, azimuth and time: spots so wide
+/// that pixels resolve them, and rays in the middle of pixels.
+#[test]
+fn code_drawn_worlds_look_alike_through_both_forward_models() {
+    let text = std::fs::read_to_string(root().join("cli/src/fit/built_in.toml")).expect("a file");
+    let mut file: FitFile = kerrlight_common::toml_file::read(&text).expect("settings");
+    let simulation = file.simulation.as_mut().expect("a simulation");
+    simulation.truth.spot[0].sigma = 1.2;
+    simulation.observation.as_mut().expect("an observation").scans = 4;
+    simulation.drawn = true;
+    file.motion.velocity = Velocity::Keplerian { drag: None };
+    (file.motion.reference_time, file.screen.pixels) = (20.0, 24);
+    file.hole.spin = PriorSettings::Uniform([0.5, 0.9]).into();
+    file.observer.inclination_deg = PriorSettings::Uniform([40.0, 60.0]).into();
+    file.observer.position_angle_deg = PriorSettings::Uniform([20.0, 70.0]).into();
+    let instrument = Instrument::new(&file).expect("rays");
+    let other = |drawn: &Drawn<'_>, emission: &(dyn Fn([f64; 3]) -> f64 + Sync)| {
+        let [inclination, angle] = [drawn.inclination, drawn.position_angle].map(f64::to_degrees);
+        let sky = Sky {
+            power: drawn.redshift_power,
+            radii: drawn.radii,
+            height: drawn.height,
+            ..Sky::new(drawn.spin, inclination, angle)
+        };
+        let screen = Screen { width: drawn.width, pixels: drawn.pixels, rays: 1 };
+        let at = |[rho, phi, z]: [f64; 3]| emission([rho * phi.cos(), rho * phi.sin(), z]);
+        Ok(sky.movie(screen, drawn.times, at)?)
+    };
+    let array = built_in("ngEHT");
+    let own = Measured::simulated(&file, &instrument, array.as_ref()).expect("own");
+    let by = Measured::simulated_by(&other, &file, &instrument, array.as_ref()).expect("other");
+    let movies = [own, by].map(|measured| measured.movie.expect("images"));
+    for frame in 0..4 {
+        let [own, by] = movies.each_ref().map(|movie| movie.image(frame).expect("an image"));
+        let apart: f64 = own.iter().zip(by.iter()).map(|(a, b)| (a - b).powi(2)).sum();
+        let all: f64 = own.iter().map(|x| x * x).sum();
+        let apart = (apart / all).sqrt();
+        assert!(apart < 0.08, "{frame}: {apart}");
+    }
+}
+
 /// Voxels and pixels of the fit are too coarse for the filaments: χ² of 4 and errors of the data alone would claim a spin that
-/// is wrong by 300 of them.
+/// is wrong by 300 of them. A search of a single start that gives up early has to know as well.
 #[test]
 #[ignore = "long"]
 fn exact_intervals_hold_the_worlds_of_another_forward_model() {
-    for (sky, noise) in [(filaments(), 0.01), (spots_and_arc(), 0.02)] {
+    for (starts, (sky, noise)) in [
+        ([2, 250], (filaments(), 0.01)),
+        ([2, 250], (spots_and_arc(), 0.02)),
+        ([1, 100], (filaments(), 0.01)),
+        ([1, 100], (spots_and_arc(), 0.02)),
+    ] {
         let folder = tempfile::tempdir().expect("a folder");
-        let world = found(folder.path(), &sky, noise);
+        let world = found(folder.path(), &sky, noise, starts);
         for (name, truth, most) in [
-            ("spin", sky.spin, 0.4),
-            ("inclination_deg", sky.inclination_deg, 3.0),
-            ("position_angle_deg", sky.position_angle_deg, 3.0),
+            ("spin", sky.0.spin, 0.4),
+            ("inclination_deg", sky.0.inclination_deg, 3.0),
+            ("position_angle_deg", sky.0.position_angle_deg, 3.0),
         ] {
             let [found, sigma] = ["world", "sigma"].map(|of| world[of][name].as_f64().unwrap());
             let own = |source: &str| world["model_error"][source][name].as_f64().unwrap();
             let own = ["voxels", "pixels", "sums along rays"].map(own);
             println!("{name} = {found:.4} ± {sigma:.4}, {truth}: {own:?}");
-            assert!((found - truth).abs() < 3.0 * sigma && sigma < most, "{world}");
-            assert!(own.iter().all(|own| *own <= sigma * (1.0 + 1e-9)), "{world}");
+            let is_open = world["open"][name] == true;
+            let holds = (found - truth).abs() < 3.0 * sigma && sigma < most;
+            assert!(is_open || holds, "{world}");
+            assert!(own.iter().all(|own| *own <= sigma * (1.0 + 1e-9)) || is_open, "{world}");
         }
     }
 }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 const DISTANCE: f64 = 1e5;
 /// Points on each ray inside the outermost radius.
 const POINTS: usize = 240;
-/// Emission is looked for between these radii, M.
+/// Radii where nothing else is said, M.
 const RADII: [f64; 2] = [1.8, 16.0];
 
 /// A piece of a spiral tube about the spin axis that shines at time 0: a spot, an arc, a filament.
@@ -42,8 +42,13 @@ impl Arc {
     }
 }
 
+/// Emission of all pieces at (ρ, φ, z).
+pub fn shining(arcs: &[Arc]) -> impl Fn([f64; 3]) -> f64 + Sync {
+    |place| arcs.iter().map(|arc| arc.emission(place)).sum()
+}
+
 /// A hole with matter on circular geodesics about it, and who looks at it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Sky {
     /// Spin, M: below 0 where matter is retrograde.
     pub spin: f64,
@@ -51,8 +56,20 @@ pub struct Sky {
     pub inclination_deg: f64,
     /// Of the spin axis, degrees east of north.
     pub position_angle_deg: f64,
-    /// What shines.
-    pub arcs: Vec<Arc>,
+    /// Power of the redshift factor that emission goes with.
+    pub power: f64,
+    /// Matter shines between these radii, M.
+    pub radii: [f64; 2],
+    /// And up to this |z|, M.
+    pub height: f64,
+}
+
+impl Sky {
+    /// A hole in the middle of the screen whose matter shines at all radii up to 16 M, with g².
+    pub fn new(spin: f64, inclination_deg: f64, position_angle_deg: f64) -> Self {
+        let (power, radii, height) = (2.0, RADII, f64::INFINITY);
+        Self { spin, inclination_deg, position_angle_deg, power, radii, height }
+    }
 }
 
 /// A square screen.
@@ -74,17 +91,22 @@ struct Point {
     rate: f64,
     /// How long before it arrives its light was there, M, less what the whole way takes.
     before: f64,
-    /// g² dλ, M.
+    /// g to the sky's power, times dλ, M.
     weight: f64,
 }
 
 impl Sky {
-    /// Images at some times (M), rows from north, columns from east: g² times emission along the affine parameter, M. Light
-    /// takes its time.
+    /// Images at some times (M), rows from north, columns from east: emission at (ρ, φ, z) at time 0, which matter carries,
+    /// along the affine parameter, M. φ is that from the observer's meridian. Light takes its time.
     ///
     /// # Errors
     /// If spin or inclination is out of range.
-    pub fn movie(&self, screen: Screen, times: &[f64]) -> Result<Vec<Vec<f64>>, Error> {
+    pub fn movie(
+        &self,
+        screen: Screen,
+        times: &[f64],
+        emission: impl Fn([f64; 3]) -> f64 + Sync,
+    ) -> Result<Vec<Vec<f64>>, Error> {
         let Screen { width, pixels, rays } = screen;
         let (step, n) = (width / (pixels * rays) as f64, rays * rays);
         let pixel = |k: usize| -> Result<Vec<f64>, Error> {
@@ -96,7 +118,9 @@ impl Sky {
                 let [x, y] = [place(k % pixels, ray % rays), -place(k / pixels, ray / rays)];
                 for point in self.points([x, y])? {
                     for (seen, time) in seen.iter_mut().zip(times) {
-                        *seen += self.light(&point, *time) / n as f64;
+                        let [rho, phi, z] = point.place;
+                        let then = [rho, phi - point.rate * (time - point.before), z];
+                        *seen += point.weight * emission(then) / n as f64;
                     }
                 }
             }
@@ -105,12 +129,6 @@ impl Sky {
         let seen = (0..pixels * pixels).into_par_iter().map(pixel);
         let seen = seen.collect::<Result<Vec<_>, _>>()?;
         Ok((0..times.len()).map(|t| seen.iter().map(|pixel| pixel[t]).collect()).collect())
-    }
-
-    fn light(&self, point: &Point, time: f64) -> f64 {
-        let [rho, phi, z] = point.place;
-        let then = [rho, phi - point.rate * (time - point.before), z];
-        point.weight * self.arcs.iter().map(|arc| arc.emission(then)).sum::<f64>()
     }
 
     /// The points of the ray that arrives at a place of the screen, M to the west and to the north.
@@ -122,7 +140,7 @@ impl Sky {
         let (alpha, beta) = (x * cos + y * sin, y * cos - x * sin);
         let path = AffineTracer::new(1e-11)?.trace(&hole, &observer, alpha, beta)?;
         let mut pieces = Vec::new();
-        path.intervals_within(RADII[0], RADII[1], &mut pieces);
+        path.intervals_within(self.radii[0], self.radii[1], &mut pieces);
         let momentum = -alpha * self.inclination_deg.to_radians().sin();
         let mut points = Vec::new();
         for [from, to] in pieces {
@@ -130,12 +148,15 @@ impl Sky {
             for k in 0..POINTS {
                 let point = path.at(from + (k as f64 + 0.5) * step);
                 let (r, (sin, cos)) = (point.radius(), point.theta().sin_cos());
+                if (r * cos).abs() > self.height {
+                    continue;
+                }
                 let (rate, g) = self.matter([r, sin, cos], momentum);
                 points.push(Point {
                     place: [r * sin, point.azimuth, r * cos],
                     rate,
                     before: point.delay - DISTANCE - 2.0 * DISTANCE.ln(),
-                    weight: g * g * (r * r + (self.spin * cos).powi(2)) * step,
+                    weight: g.powf(self.power) * (r * r + (self.spin * cos).powi(2)) * step,
                 });
             }
         }

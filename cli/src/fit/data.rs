@@ -8,7 +8,8 @@ use kerrlight_common::frames::Frames;
 use kerrlight_common::numpy;
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{DataFiles, FitFile, Simulation, StaticImageFile};
-use kerrlight_tomo::fit::setup::{Instrument, Measured};
+use kerrlight_tomo::fit::setup::{Drawn, Instrument, Measured};
+use kerrlight_validation::sky::{Screen, Sky};
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::files::images::{WithSize, npy_frames, npz_frames};
 use kerrlight_vlbi::light_curve::LightCurve;
@@ -29,7 +30,7 @@ pub fn measure(
             let array = file.observation().map(|seen| {
                 arguments::array_near(&seen.array, base_dir).context("simulation.observation.array")
             });
-            Ok(Measured::simulated(file, instrument, array.transpose()?.as_ref())?)
+            Ok(Measured::simulated_by(&sky, file, instrument, array.transpose()?.as_ref())?)
         }
         Some(DataFiles::Movie { path, .. }) => {
             let path = base_dir.join(path);
@@ -46,6 +47,24 @@ pub fn measure(
             visibilities(&paths::of_data(path, base_dir)?, of)
         }
     }
+}
+
+/// A drawn world as the program's second forward model sees it.
+fn sky(
+    drawn: &Drawn<'_>,
+    emission: &(dyn Fn([f64; 3]) -> f64 + Sync),
+) -> Result<Vec<Vec<f64>>, Error> {
+    let sky = Sky {
+        spin: drawn.spin,
+        inclination_deg: drawn.inclination.to_degrees(),
+        position_angle_deg: drawn.position_angle.to_degrees(),
+        power: drawn.redshift_power,
+        radii: drawn.radii,
+        height: drawn.height,
+    };
+    let screen = Screen { width: drawn.width, pixels: drawn.pixels, rays: 1 };
+    let at = |[rho, phi, z]: [f64; 3]| emission([rho * phi.cos(), rho * phi.sin(), z]);
+    Ok(sky.movie(screen, drawn.times, at)?)
 }
 
 /// A light curve of a table, or of the baselines within a site of a UVFITS file.

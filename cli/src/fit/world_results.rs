@@ -2,7 +2,7 @@
 
 use kerrlight_tomo::fit::verdict::EXCESS;
 use kerrlight_tomo::fit::world::Parameter;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 /// χ²/2 above the best below which a search is taken to have ended at the same world, however few the data are.
 pub const ALIKE: f64 = 3.0;
@@ -115,11 +115,18 @@ pub fn sentences(results: &Value) -> Vec<String> {
     all
 }
 
-/// How much of the error of each parameter the model makes itself; nothing where that is not known.
+/// How much of the error of each parameter the model makes itself, and what errors leave out; nothing where data are
+/// simulated.
 fn own(results: &Value) -> Vec<String> {
-    let Some(parts) = results["model_error"].as_object().filter(|parts| !parts.is_empty()) else {
-        return Vec::new();
-    };
+    let left_out = results["model_error_left_out"].as_str().map(|data| {
+        format!("errors leave out those of voxels, pixels and sums along rays, which are not known for {data}")
+    });
+    let parts = results["model_error"].as_object().filter(|parts| !parts.is_empty());
+    let parts = parts.map_or_else(Vec::new, |parts| each_own(results, parts));
+    left_out.into_iter().chain(parts).collect()
+}
+
+fn each_own(results: &Value, parts: &Map<String, Value>) -> Vec<String> {
     let of = |parameter: Parameter| {
         let (words, unit) = parameter.label();
         let name = parameter.name();
@@ -218,7 +225,7 @@ fn has_own(results: &Value) -> bool {
 fn unexplained(results: &Value) -> Option<String> {
     let chi2 = results["chi2_per_datum"].as_f64().filter(|chi2| *chi2 > ROUGH)?;
     let means = match has_own(results) {
-        true => "and errors have grown by what finer models make of that",
+        true => "and errors have grown by what that can move the world by",
         false => "which pulls at the world more than its errors say",
     };
     Some(format!(
@@ -240,7 +247,6 @@ fn small_residuals(results: &Value) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::Map;
 
     fn found() -> Value {
         json!({
@@ -333,6 +339,10 @@ mod tests {
         // They are part of the interval, which then needs no model that is right.
         assert!(sentences(&results)[1].starts_with("The inclination is between"));
         assert!(lines(&results).iter().any(|line| line.contains("errors have grown by")));
+        results["model_error"] = json!({});
+        results["model_error_left_out"] = json!("amplitudes and closure quantities");
+        let said = "which are not known for amplitudes and closure quantities";
+        assert!(lines(&results).iter().any(|line| line.contains(said)));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use crate::output;
 use anyhow::{Context, bail};
 use kerrlight_tomo::fit::settings::{FitFile, Region, UnknownWorld};
 use kerrlight_tomo::fit::setup::{self, FoundWorld, Measured, Trial};
-use kerrlight_tomo::fit::world::{Free, ModelError, Parameter, Span, Spread, World};
+use kerrlight_tomo::fit::world::{Free, ModelError, ModelErrors, Parameter, Span, Spread, World};
 use kerrlight_tomo::recovery::{Choice, Problem, settled};
 use serde_json::{Map, Value, json};
 
@@ -121,6 +121,7 @@ fn results(
         "interval_68": intervals(&free, &found.world, &sigma, Span::ONE_SIGMA),
         "interval_95": intervals(&free, &found.world, &sigma, Span::NEARLY_ALL),
         "model_error": spread.map(|spread| own(&free, spread)),
+        "model_error_left_out": spread.and_then(|spread| spread.own.left_out),
         "correlation": spread.map(|spread| spread.correlation.clone()),
         "ripple": spread.map(|spread| spread.ripple),
         "bounds": priors.collect::<Map<String, Value>>(),
@@ -162,10 +163,11 @@ fn true_world(file: &FitFile, measured: &Measured) -> anyhow::Result<Option<Worl
 /// By what the model itself may have moved each free parameter, part by part, in its unit.
 fn own(free: &[Free], spread: &Spread) -> Map<String, Value> {
     let part = |error: &ModelError| {
-        let moved = values(free, |k, _| error.step.get(k).map(|step| step.abs()));
+        let variance = |k: usize| error.covariance.get(k * (free.len() + 1));
+        let moved = values(free, |k, _| variance(k).map(|variance| variance.sqrt()));
         (error.source.to_owned(), Value::Object(moved))
     };
-    spread.own.iter().map(part).collect()
+    spread.own.known.iter().map(part).collect()
 }
 
 /// Whether a search ended where the best one did: within the 95 % interval about it, or at a world that is as probable and
@@ -218,7 +220,15 @@ pub fn spread_of(free: &[Free], world: World, results: &Value) -> anyhow::Result
     if correlation.len() != free.len() * free.len() {
         bail!("the search for the world has no correlations");
     }
-    Ok(Spread { world, sigma, open, correlation, ripple: 0.0, worlds: 0, own: Vec::new() })
+    Ok(Spread {
+        world,
+        sigma,
+        open,
+        correlation,
+        ripple: 0.0,
+        worlds: 0,
+        own: ModelErrors::default(),
+    })
 }
 
 /// The world that a run has found.

@@ -185,7 +185,8 @@ fn add_background(
         if !matches!(parameter, StokesParameter::Q | StokesParameter::U) {
             continue;
         }
-        let light = background.drawn(&minutes, &normal).within("simulation.light_curve.background")?;
+        let light =
+            background.drawn(&minutes, &normal).within("simulation.light_curve.background")?;
         let own = fluxes.iter_mut().skip(place).step_by(parameters.len());
         own.zip(light).for_each(|(flux, light)| *flux += light);
     }

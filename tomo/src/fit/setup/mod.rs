@@ -4,6 +4,7 @@ mod band;
 mod change;
 mod coarse_view;
 mod curve;
+mod drawn;
 mod gains;
 mod glyph;
 mod held_out;
@@ -38,6 +39,7 @@ pub use band::{BandScan, BandWatch, BandWorld, band_motion, check_band, in_band_
 pub use change::{change, emission_times};
 pub use coarse_view::CoarseView;
 pub use curve::Curve;
+pub use drawn::{Drawn, OtherModel};
 pub use held_out::{Held, HeldWatch, best as best_held, check_folds, hold_out};
 pub use imprint::{Given, Imprinted, imprint};
 pub use instrument::Instrument;

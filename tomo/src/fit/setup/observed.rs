@@ -29,7 +29,8 @@ pub(super) fn schedule_of(seen: &Seen, array: Option<&Array>) -> Result<(Observa
         ut1: Ut1::Table,
         frame: Frame::Catalogue,
     };
-    let missing = || FitError::missing("simulation.observation.array", "an observation needs its stations");
+    let missing =
+        || FitError::missing("simulation.observation.array", "an observation needs its stations");
     let array = array.ok_or_else(missing)?;
     let mut observation = schedule::observe_affordable(array, source.position, &schedule, &setup)
         .within("observation")?;

@@ -24,7 +24,8 @@ impl RandomField {
     pub fn new(file: &FitFile, settings: &FieldSettings) -> Result<Self> {
         settings.check()?;
         let voxels = Voxels::cube(settings.nodes, file.region.r_max, settings.degree);
-        let factors = factors(settings, &voxels, file.seed ^ TRUTH).within("simulation.truth.field")?;
+        let factors =
+            factors(settings, &voxels, file.seed ^ TRUTH).within("simulation.truth.field")?;
         Ok(Self { splines: voxels.field().within("simulation.truth.field")?, factors })
     }
 

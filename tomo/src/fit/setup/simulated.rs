@@ -1,13 +1,15 @@
 //! Data that are simulated from a truth.
 
+use super::drawn::{FINER, OtherModel, binned, fine_images, is_drawn, is_drawn_elsewhere};
 use super::gains;
 use super::imported::even_times;
 use super::leakage;
 use super::light_curve;
 use super::observed::{Spoiled, schedule_of, spoil};
 use super::polarized::{self, is_polarized};
-use super::{Instrument, Measured, Result, Truth, hours_per_m, motion, sky};
-use crate::fit::settings::{FitError, FitFile, PixelShape, Simulation, Within, refuse};
+use super::{Instrument, Measured, Result, Truth, hours_per_m, known_world, motion, sky};
+use crate::fit::settings::{FitError, FitFile, PixelShape, Within, refuse};
+use crate::fit::world::World;
 use kerrlight_common::frames::Frames;
 use kerrlight_vlbi::array::Array;
 use kerrlight_vlbi::observation::Observation;
@@ -26,11 +28,30 @@ impl Measured {
     ) -> Result<Self> {
         let simulated = file.simulated()?;
         if simulated == *file {
-            return simulate(file, file, instrument, array);
+            return simulate(file, file, instrument, (array, None));
         }
         let seen = if is_drawn(file) { densely(&simulated) } else { simulated.clone() };
         let instrument = Instrument::new(&seen).within("simulation")?;
-        simulate(&simulated, file, &instrument, array)
+        simulate(&simulated, file, &instrument, (array, None))
+    }
+
+    /// The same, where a world that is drawn is one of matter on circular geodesics by another forward model than that of the
+    /// fit: images as means over many rays, visibilities as sums over as many fine pixels.
+    ///
+    /// # Errors
+    /// As [`simulated`](Self::simulated), and those of the other model.
+    pub fn simulated_by(
+        other: OtherModel<'_>,
+        file: &FitFile,
+        instrument: &Instrument,
+        array: Option<&Array>,
+    ) -> Result<Self> {
+        if !is_drawn_elsewhere(file)? {
+            return Self::simulated(file, instrument, array);
+        }
+        let drawn = file.simulated()?;
+        let world = known_world(&drawn);
+        simulate(&drawn, file, instrument, (array, Some((other, world))))
     }
 }
 
@@ -38,7 +59,7 @@ fn simulate(
     file: &FitFile,
     fit: &FitFile,
     instrument: &Instrument,
-    array: Option<&Array>,
+    (array, other): (Option<&Array>, Option<(OtherModel<'_>, World)>),
 ) -> Result<Measured> {
     if let Some(settings) = file.simulated_curve() {
         return light_curve::simulate(file, fit, instrument, settings);
@@ -46,7 +67,14 @@ fn simulate(
     let truth = Truth::new(file)?;
     let Some(seen) = file.observation() else {
         let times = times_of_images(file)?;
-        let movie = Some(lit(&truth, truth.movie(file, instrument, &times)?)?);
+        let movie = match other {
+            None => truth.movie(file, instrument, &times)?,
+            Some((model, world)) => {
+                let images = fine_images(file, &world, (&truth, &times), model)?;
+                binned(&images, file.screen.pixels)
+            }
+        };
+        let movie = Some(lit(&truth, movie)?);
         let sky = sky(file).ok();
         return Ok(Measured { times, movie, sky, truth: Some(truth), ..Measured::empty() });
     };
@@ -54,7 +82,22 @@ fn simulate(
     let (mut observation, hours) = schedule_of(seen, array)?;
     let per_m = hours_per_m(file)?;
     let times: Vec<f64> = hours.iter().map(|h| seen.first_time + (h - hours[0]) / per_m).collect();
-    let movie = fill(&mut observation, (file, fit, instrument), &truth, (&hours, &times), sky)?;
+    let (movie, pulse) = match other {
+        None => {
+            let from = (file, fit, instrument);
+            (fill(&mut observation, from, &truth, (&hours, &times), sky)?, pulse(fit))
+        }
+        Some((model, world)) => {
+            let images = fine_images(file, &world, (&truth, &times), model)?;
+            let pixels = FINER * file.screen.pixels;
+            let pixel_rad = sky.pixel_rad / FINER as f64;
+            let grid = ImageGrid { width: pixels, height: pixels, pixel_rad };
+            let fine = Frames::of(images.concat(), pixels * pixels);
+            simulate::fill_from(&mut observation, (grid, &fine), Pulse::Delta, &hours)?;
+            let movie = lit(&truth, binned(&images, file.screen.pixels))?;
+            (movie, fit.screen.pulse.map_or(Pulse::Delta, PixelShape::pulse))
+        }
+    };
     let Spoiled { gains: true_gains, leakage: true_leakage } =
         spoil((file, fit), seen, &mut observation)?;
     let gains = gains::priors(fit.instrument.as_ref(), &fit.loss, &observation)?;
@@ -68,7 +111,7 @@ fn simulate(
         movie,
         visibilities,
         sky,
-        pulse: pulse(fit),
+        pulse,
         truth,
         gains,
         true_gains,
@@ -103,10 +146,6 @@ fn densely(file: &FitFile) -> FitFile {
     let mut dense = file.clone();
     dense.screen.ring_rays = dense.screen.ring_rays.map(|rays| (DENSER * rays).min(MOST_RAYS));
     dense
-}
-
-fn is_drawn(file: &FitFile) -> bool {
-    file.simulation.as_ref().is_some_and(|Simulation { drawn, .. }| *drawn)
 }
 
 /// What the pixels of a simulation are to its visibilities.

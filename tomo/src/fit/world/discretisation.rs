@@ -1,18 +1,20 @@
-//! What finer models would move a world by: one Gauss–Newton step of each from the best world.
+//! What finer models would move a world by, one Gauss–Newton step of each from the best world, and what the χ² that they
+//! leave may.
 
 use super::covariance::covariance;
+use super::envelope::in_own_units;
 use super::polish::{Bowl, Polish};
 use super::problem::{Estimate, WorldProblem};
 use super::{Free, World};
 use crate::Error;
 use kerrlight_common::simd::Float;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// The best volume of a world, and the bowl there.
 pub struct Standing {
     best: Estimate,
     bowl: Bowl,
-    /// χ²/2 above that of a right model, by more than its scatter by chance.
+    /// χ²/2 above that of a right model.
     excess: f64,
 }
 
@@ -30,8 +32,7 @@ pub struct Refined {
     kind: Refinement,
     /// By what it moves the world, in units of scales.
     step: DVector<f64>,
-    /// By what that lowers χ²/2, and by what the refinement itself does.
-    fall: f64,
+    /// By what it lowers χ²/2.
     gain: f64,
 }
 
@@ -40,14 +41,26 @@ pub struct Refined {
 pub struct ModelError {
     /// What of the model makes it.
     pub source: &'static str,
-    /// By what it may have moved each free parameter, in its own unit.
-    pub step: Vec<f64>,
+    /// Its covariance row by row, in the free parameters' own units.
+    pub covariance: Vec<f64>,
+}
+
+impl ModelError {
+    /// Source of what no refinement explains of χ².
+    pub const UNEXPLAINED: &'static str = "unexplained χ²";
+}
+
+/// All of them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ModelErrors {
+    /// Those that are known.
+    pub known: Vec<ModelError>,
+    /// The kind of data for which finer models cannot be compared, so that errors leave out what they would say.
+    pub left_out: Option<&'static str>,
 }
 
 /// Standard deviations of χ², √(2 N) for N data, that count as chance.
 const BY_CHANCE: f64 = 2.0;
-/// The least part of an excess that refinements are taken to explain: below it they are no measure of it.
-const LEAST: f64 = 0.02;
 
 impl<T: Float + Default> WorldProblem<'_, T> {
     /// The best volume of a world.
@@ -57,10 +70,15 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     pub fn standing(&self, world: World) -> Result<Standing, Error> {
         let best = self.solve(world)?;
         let bowl = self.bowl(&best, Polish::default().following)?;
-        let data = best.chi2 / self.reduced(best.chi2);
-        let chance = BY_CHANCE * (2.0 * data).sqrt();
-        let excess = 0.5 * (self.scale * best.chi2 - data - chance).max(0.0);
+        let excess = self.excess(self.scale * self.left(&best)?);
         Ok(Standing { best, bowl, excess })
+    }
+
+    /// By what χ²/2 lies above that of a right model and above its scatter by chance, where it is this over the number of
+    /// data.
+    pub fn excess(&self, reduced_chi2: f64) -> f64 {
+        let data = self.data();
+        (0.5 * (data * (reduced_chi2 - 1.0) - BY_CHANCE * (2.0 * data).sqrt())).max(0.0)
     }
 }
 
@@ -80,28 +98,31 @@ impl Standing {
         let Some(covariance) = covariance else { return Ok(None) };
         // Slopes of the model itself are ripples beside the middle of its bowl.
         let step = -covariance * (bowl.slopes - &self.bowl.slopes);
-        let fall = 0.5 * step.dot(&(&bowl.bends * &step));
-        Ok(Some(Refined { kind, step, fall, gain: self.best.value - there.value }))
+        Ok(Some(Refined { kind, step, gain: self.best.value - there.value }))
     }
 
-    /// Errors that refinements make likely.
+    /// Errors that refinements make likely, each as much as the data do not contradict, and what the excess that they leave
+    /// can make.
     ///
-    /// A model that lacks something of size s moves the world in proportion to s, and χ² by s²: what refinements leave of an
-    /// excess of χ² moves the world further, as if they went on, but by no more than the excess can at all (Cauchy and
-    /// Schwarz). A refinement that the data contradict counts as little as they say it is likely.
+    /// Of that excess E no parameter explains anything. A discrepancy of the model with as much χ²/2 along the derivative of
+    /// a parameter moves it by √(2 E) times the standard deviation that the data leave it, and by no more in any other
+    /// direction (Cauchy and Schwarz): 2 E times their covariance.
     pub fn errors(&self, free: &[Free], refined: &[Refined]) -> Vec<ModelError> {
-        let gained: f64 = refined.iter().map(|refined| refined.gain.max(0.0)).sum();
-        let part = if self.excess > 0.0 { (gained / self.excess).clamp(LEAST, 1.0) } else { 1.0 };
-        let further = 1.0 / (1.0 - (1.0 - part).sqrt());
-        let error = |Refined { kind, step, fall, gain }: &Refined| {
-            let most = (self.excess / fall).sqrt();
-            let likely = (0.5 * gain.min(0.0)).exp();
-            let factor = likely * further.min(most).max(kind.onwards);
-            let own = |(free, step): (&Free, &f64)| factor * step * free.parameter.scale();
-            let step = free.iter().zip(step.iter()).map(own).collect();
-            ModelError { source: kind.source, step }
+        let own = |source, covariance: &DMatrix<f64>| ModelError {
+            source,
+            covariance: in_own_units(free, covariance),
         };
-        refined.iter().map(error).collect()
+        let of_refined = |Refined { kind, step, gain }: &Refined| {
+            let step = step * (kind.onwards * (0.5 * gain.min(0.0)).exp());
+            own(kind.source, &(&step * step.transpose()))
+        };
+        // Several may explain the same.
+        let explained = refined.iter().fold(0.0f64, |most, refined| most.max(refined.gain));
+        let left = 2.0 * (self.excess - explained).max(0.0);
+        let unexplained = covariance(free, &self.best.world, &self.bowl.bends, left)
+            .filter(|_| left > 0.0)
+            .map(|covariance| own(ModelError::UNEXPLAINED, &covariance));
+        refined.iter().map(of_refined).chain(unexplained).collect()
     }
 }
 
@@ -109,35 +130,79 @@ impl Standing {
 mod tests {
     use super::*;
     use crate::fit::world::{Parameter, Prior};
-    use nalgebra::DMatrix;
 
+    /// Of a bowl in which the data leave the spin a standard deviation of 0.001.
     fn standing(excess: f64) -> Standing {
         let best = Estimate { world: World::new(0.3, 1.0), x: Vec::new(), chi2: 0.0, value: 0.0 };
-        let (slopes, bends) = (DVector::zeros(1), DMatrix::identity(1, 1));
+        let bends = DMatrix::from_element(1, 1, (Parameter::Spin.scale() / 0.001).powi(2));
+        let slopes = DVector::zeros(1);
         Standing { best, bowl: Bowl { slopes, bends, responses: Vec::new() }, excess }
     }
 
-    /// The factor on a step of one unit that costs `fall`, of a refinement with this gain.
-    fn factor(excess: f64, gain: f64, fall: f64) -> f64 {
+    /// Standard deviations by a step of 0.01 of a refinement with this gain, and by what it leaves.
+    fn errors(excess: f64, gain: f64) -> Vec<f64> {
         let prior = Prior::Uniform { low: -0.9, high: 0.9 };
         let free = [Free { parameter: Parameter::Spin, prior }];
-        let kind = Refinement { source: "voxels", onwards: 1.0 };
-        let step = DVector::from_element(1, 1.0 / free[0].parameter.scale());
-        let refined = [Refined { kind, step, fall, gain }];
-        standing(excess).errors(&free, &refined)[0].step[0]
+        let kind = Refinement { source: "voxels", onwards: 1.5 };
+        let step = DVector::from_element(1, 0.01 / Parameter::Spin.scale());
+        let errors = standing(excess).errors(&free, &[Refined { kind, step, gain }]);
+        errors.iter().map(|error| error.covariance[0].sqrt()).collect()
     }
 
-    /// An error of size s that a refinement reduces to s/2 leaves a quarter of the excess, and moves the world by half of
-    /// what it moves it by in all.
+    fn assert_close(found: &[f64], expected: &[f64]) {
+        assert_eq!(found.len(), expected.len(), "{found:?}");
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+        }
+    }
+
     #[test]
-    fn exact_what_is_left_of_an_excess_moves_the_world_as_well() {
-        assert!((factor(100.0, 75.0, 1.0) - 2.0).abs() < 1e-12);
+    fn exact_what_refinements_leave_of_an_excess_is_an_error() {
         // All is explained, or there is nothing to explain.
-        assert!((factor(100.0, 120.0, 1.0) - 1.0).abs() < 1e-12);
-        assert!((factor(0.0, 5.0, 1.0) - 1.0).abs() < 1e-12);
-        // Nothing is: as much as the excess can do, which is a step √100 times as long.
-        assert!((factor(100.0, 0.0, 1.0) - 10.0).abs() < 1e-12);
+        assert_close(&errors(100.0, 120.0), &[0.015]);
+        assert_close(&errors(0.0, 5.0), &[0.015]);
         // Data speak against the refinement, by four standard deviations.
-        assert!((factor(0.0, -8.0, 1.0) - (-4.0f64).exp()).abs() < 1e-12);
+        assert_close(&errors(0.0, -8.0), &[0.015 * (-4.0f64).exp()]);
+        // What is left can move the spin by √200 of its standard deviations.
+        assert_close(&errors(150.0, 50.0), &[0.015, 0.001 * 200f64.sqrt()]);
+        // More than its prior is not an error.
+        let wide = errors(1e9, 0.0)[1];
+        assert!(wide < 1.8 / 12f64.sqrt() && wide > 0.99 * 1.8 / 12f64.sqrt(), "{wide}");
+    }
+
+    /// A model of images that lacks something: whatever that is, it moves no parameter by more than the errors say that
+    /// come of its χ².
+    #[test]
+    fn exact_no_discrepancy_moves_a_parameter_farther_than_its_chi2_allows() {
+        use rand::{RngExt, SeedableRng};
+        let mut random = rand_pcg::Pcg64::seed_from_u64(5);
+        let free = [Parameter::Spin, Parameter::Xi].map(|parameter| Free {
+            parameter,
+            prior: Prior::Uniform { low: -500.0, high: 500.0 },
+        });
+        let mut worst = 0.0f64;
+        for round in 0..400 {
+            let mut drawn = || random.random::<f64>() - 0.5;
+            let tangents = DMatrix::from_fn(40, 2, |_, _| 1e3 * drawn());
+            let bends = tangents.transpose() * &tangents;
+            let inverse = bends.clone().try_inverse().unwrap();
+            // Half of them along the derivative of the first parameter, the worst that there is.
+            let along = &tangents * inverse.column(0);
+            let missing = match round % 2 {
+                0 => DVector::from_fn(40, |_, _| drawn()),
+                _ => along,
+            };
+            let moved = &inverse * tangents.transpose() * &missing;
+            let standing = Standing {
+                bowl: Bowl { slopes: DVector::zeros(2), bends, responses: Vec::new() },
+                ..standing(0.5 * missing.norm_squared())
+            };
+            let [error] = &standing.errors(&free, &[])[..] else { panic!("one error") };
+            for k in 0..2 {
+                let sigma = error.covariance[3 * k].sqrt() / free[k].parameter.scale();
+                worst = worst.max(moved[k].abs() / sigma);
+            }
+        }
+        assert!((worst - 1.0).abs() < 1e-6, "{worst}");
     }
 }

@@ -94,10 +94,13 @@ impl<T: Float + Default> WorldProblem<'_, T> {
     ) -> Option<(World, Vec<f64>)> {
         let (inverse, outward) =
             (form.bends.clone().try_inverse()?, columns.clone().try_inverse()?);
-        let middles: Vec<DVector<f64>> =
-            form.slopes.iter().map(|g| near(-(&inverse * g))).collect();
+        let lowest: Vec<DVector<f64>> = form.slopes.iter().map(|g| -(&inverse * g)).collect();
+        let middles: Vec<DVector<f64>> = lowest.iter().cloned().map(near).collect();
         let count = middles.len() as f64;
-        let mean = middles.iter().fold(DVector::zeros(columns.ncols()), |sum, m| sum + m) / count;
+        let mean_of = |all: &[DVector<f64>]| {
+            all.iter().fold(DVector::zeros(columns.ncols()), |sum, m| sum + m) / count
+        };
+        let (mean, lowest) = (mean_of(&middles), mean_of(&lowest));
         let mut moved = &inverse * &form.uncertain * &inverse;
         if middles.len() > 1 {
             for middle in &middles {
@@ -105,9 +108,10 @@ impl<T: Float + Default> WorldProblem<'_, T> {
                 moved += &away * away.transpose() * (few(count) / (count * (count - 1.0)));
             }
         }
-        if is_wide {
-            // Far from the middle a form is not quadratic: the lowest world is as good a guess.
-            moved += &mean * mean.transpose();
+        if is_wide || lowest.norm() > 1.0 {
+            // Far from the middle a form is not quadratic: the lowest world is as good a guess. Where the middle lies beyond all
+            // worlds that were looked at, none of them is a minimum.
+            moved += &lowest * lowest.transpose();
         }
         let step = columns * &mean;
         let world = self.moved(&about, step.as_slice());
@@ -124,7 +128,7 @@ fn few(count: f64) -> f64 {
 }
 
 /// Covariances in the parameters' own units, row by row.
-fn in_own_units(free: &[Free], whole: &DMatrix<f64>) -> Vec<f64> {
+pub(super) fn in_own_units(free: &[Free], whole: &DMatrix<f64>) -> Vec<f64> {
     let (n, scale) = (free.len(), |k: usize| free[k].parameter.scale());
     (0..n * n).map(|k| whole[(k / n, k % n)] * scale(k / n) * scale(k % n)).collect()
 }

@@ -5,7 +5,7 @@
 use super::World;
 use super::problem::{Estimate, WorldProblem};
 use crate::Error;
-use cmaes::{CMAESOptions, DVector, TerminationReason};
+use cmaes::{CMAESOptions, DVector};
 use kerrlight_common::simd::Float;
 use std::sync::{Mutex, PoisonError, RwLock};
 
@@ -27,8 +27,7 @@ pub struct Explored {
     pub best: Estimate,
     /// All worlds that were evaluated.
     pub samples: Vec<Sample>,
-    /// Whether populations had shrunk to worlds or values that are alike: not where they reached the limit on worlds, or could
-    /// not go on.
+    /// Whether the best one is known to be a minimum: populations alone do not say so.
     pub converged: bool,
 }
 
@@ -97,21 +96,13 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             let allowed = "above 0, with at least one free parameter";
             Error::out_of_range("width of the population", how.width, allowed)
         })?;
-        let ended = loop {
-            if let Some(ended) = search.next_parallel() {
-                break ended;
-            }
+        while search.next_parallel().is_none() {
             followed.write().unwrap_or_else(PoisonError::into_inner).clone_from(&best_of(&log));
             let best = search.overall_best_individual().map_or(f64::INFINITY, |best| best.value);
             if !watch(search.function_evals(), best) {
                 return Ok(None);
             }
-        };
-        let shrunk = |reason: &TerminationReason| {
-            use TerminationReason::{TolFun, TolFunHist, TolX};
-            matches!(reason, TolFun | TolFunHist | TolX)
-        };
-        let converged = ended.reasons.iter().any(shrunk);
+        }
         drop(search);
         let log = log.into_inner().unwrap_or_else(PoisonError::into_inner);
         let Log { mut samples, error, best } = log;
@@ -124,7 +115,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             Some(best) => best,
             None => self.solve(samples.first().map_or(start, |best| best.world))?,
         };
-        Ok(Some(Explored { start, best, samples, converged }))
+        Ok(Some(Explored { start, best, samples, converged: false }))
     }
 
     fn look(&self, world: World, from: Option<&Estimate>, log: &Mutex<Log>) -> f64 {

@@ -18,7 +18,7 @@ mod twin;
 #[cfg(test)]
 mod tests;
 
-pub use discretisation::{ModelError, Refined, Refinement, Standing};
+pub use discretisation::{ModelError, ModelErrors, Refined, Refinement, Standing};
 pub use envelope::Envelope;
 pub use explore::{Exploration, Explored, Sample, WorldWatch};
 pub use model::{Law, WorldModel};

@@ -1,7 +1,7 @@
 //! How sure a world is: a quadratic form through the values of worlds near the best one.
 
 use super::covariance::covariance;
-use super::{Free, ModelError, Sample, World};
+use super::{Free, ModelError, ModelErrors, Sample, World};
 use nalgebra::{DMatrix, DVector};
 
 /// What the values near the best world say.
@@ -20,7 +20,7 @@ pub struct Spread {
     /// Worlds that the form was fitted to.
     pub worlds: usize,
     /// What of `sigma` the model makes itself.
-    pub own: Vec<ModelError>,
+    pub own: ModelErrors,
 }
 
 /// Worlds for each coefficient of the form, at least.
@@ -46,27 +46,46 @@ impl Spread {
         counts.filter_map(|count| Self::through(free, best, &samples[..count], reduced_chi2)).next()
     }
 
+    /// Whether a world lies within a standard deviation of every parameter.
+    pub fn holds(&self, free: &[Free], world: &World) -> bool {
+        free.iter().zip(&self.sigma).all(|(Free { parameter, .. }, sigma)| {
+            let apart = parameter.difference(world.get(*parameter), self.world.get(*parameter));
+            apart.abs() <= *sigma
+        })
+    }
+
     /// About another world near by: how far it is from this one is part of its error.
     #[must_use]
     pub fn moved(&self, free: &[Free], world: World) -> Self {
         let step = free.iter().map(|Free { parameter, .. }| {
             parameter.difference(world.get(*parameter), self.world.get(*parameter))
         });
-        Self { world, ..self.stepped(free, &step.collect::<Vec<_>>()) }
+        let step: Vec<f64> = step.collect();
+        let both: Vec<f64> = step.iter().flat_map(|a| step.iter().map(move |b| a * b)).collect();
+        Self { world, ..self.widened(free, &both) }
     }
 
     /// With errors that the model has of itself.
     #[must_use]
-    pub fn beside(self, free: &[Free], own: Vec<ModelError>) -> Self {
-        let whole = own.iter().fold(self, |spread, error| spread.stepped(free, &error.step));
+    pub fn beside(self, free: &[Free], own: ModelErrors) -> Self {
+        let known = own.known.iter();
+        let whole = known.fold(self, |spread, error| spread.widened(free, &error.covariance));
         Self { own, ..whole }
     }
 
-    /// With a step, in the parameters' own units, that is as likely to be one way as the other.
-    fn stepped(&self, free: &[Free], step: &[f64]) -> Self {
+    /// What χ²/2 above that of a right model can make of errors that have grown with χ²/N already; none if there is no excess.
+    pub fn unexplained(&self, excess: f64, reduced_chi2: f64) -> Option<ModelError> {
+        let (n, factor) = (self.sigma.len(), 2.0 * excess / reduced_chi2.max(1.0));
+        let of = |a: usize, b: usize| self.correlation[a * n + b] * self.sigma[a] * self.sigma[b];
+        let covariance = (0..n * n).map(|k| factor * of(k / n, k % n)).collect();
+        (excess > 0.0).then_some(ModelError { source: ModelError::UNEXPLAINED, covariance })
+    }
+
+    /// With errors of this covariance, row by row in the parameters' own units, beside its own.
+    fn widened(&self, free: &[Free], more: &[f64]) -> Self {
         let n = free.len();
         let covariance = |a: usize, b: usize| {
-            self.correlation[a * n + b] * self.sigma[a] * self.sigma[b] + step[a] * step[b]
+            self.correlation[a * n + b] * self.sigma[a] * self.sigma[b] + more[a * n + b]
         };
         let whole: Vec<f64> = (0..n).map(|k| covariance(k, k).sqrt()).collect();
         let correlation =
@@ -108,7 +127,7 @@ impl Spread {
             correlation: correlation.collect(),
             ripple: form.ripple,
             worlds: taken.len(),
-            own: Vec::new(),
+            own: ModelErrors::default(),
         })
     }
 }
@@ -183,7 +202,7 @@ mod tests {
             correlation: vec![1.0, 0.5, 0.5, 1.0],
             ripple: 0.0,
             worlds: 1,
-            own: Vec::new(),
+            own: ModelErrors::default(),
         };
         let names = free.map(|free| free.parameter);
         let first = spread.moved(&free, world.with(names[0], world.get(names[0]) + 0.04));

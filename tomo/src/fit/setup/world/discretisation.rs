@@ -2,9 +2,10 @@
 
 use super::seen::{BESIDE_THE_RING, Seen};
 use crate::fit::settings::{UnknownWorld, WorldView};
+use crate::fit::setup::drawn::is_drawn_elsewhere;
 use crate::fit::setup::{CoarseView, Result};
 use crate::fit::world::{
-    Effort, ModelError, Refined, Refinement, Standing, World, WorldModel, WorldProblem,
+    Effort, ModelErrors, Refined, Refinement, Spread, Standing, WorldModel, WorldProblem,
 };
 use kerrlight_vlbi::operator::Pulse;
 
@@ -17,26 +18,45 @@ fn finer(count: usize) -> usize {
     (FINER * count as f64).round() as usize
 }
 
-/// What finer models say of a world that is seen through pixels of this width, M; nothing where data are simulated by the
-/// same sums, and where no bowl of the data is known.
+/// Errors that the model has of itself in a world that a search has found with χ²/N of `reduced`, through pixels of this
+/// width, M. Data that are simulated by the same sums are not compared with finer ones.
 pub(super) fn errors(
     (seen, view): (&Seen, &WorldView),
     (unknown, width): (&UnknownWorld, f64),
     problem: &WorldProblem<'_, f32>,
-    world: World,
-) -> Result<Vec<ModelError>> {
-    let is_read = seen.view.file.data.is_some();
-    if !is_read || !problem.is_convex() || problem.change.is_any() {
-        return Ok(Vec::new());
+    (spread, reduced): (&Spread, f64),
+) -> Result<ModelErrors> {
+    if let Some(why) = left_out(seen, problem) {
+        let known = spread.unexplained(problem.excess(reduced), reduced).into_iter().collect();
+        return Ok(ModelErrors { known, left_out: Some(why) });
     }
+    let file = &seen.view.file;
+    let is_foreign = file.data.is_some() || is_drawn_elsewhere(file)?;
+    if !is_foreign && problem.excess(reduced) == 0.0 {
+        return Ok(ModelErrors::default());
+    }
+    let world = spread.world;
     seen.smoothly(problem, (world, BESIDE_THE_RING[1]), |problem| {
         let standing = problem.standing(world)?;
-        let voxels = voxels(&standing, problem)?;
-        let sums = sums(&standing, problem)?;
-        let pixels = pixels((seen, view), (unknown, width), &standing, problem)?;
-        let refined: Vec<Refined> = [voxels, sums, pixels].into_iter().flatten().collect();
-        Ok(standing.errors(problem.free, &refined))
+        let mut refined = Vec::new();
+        if is_foreign {
+            refined.extend(voxels(&standing, problem)?);
+            refined.extend(sums(&standing, problem)?);
+            refined.extend(pixels((seen, view), (unknown, width), &standing, problem)?);
+        }
+        Ok(ModelErrors { known: standing.errors(problem.free, &refined), left_out: None })
     })
+}
+
+/// Data of which no bowl is known, through which finer models could be compared.
+fn left_out(seen: &Seen, problem: &WorldProblem<'_, f32>) -> Option<&'static str> {
+    let has_gains = seen.view.measured.gains.is_some();
+    match (problem.change.is_any(), problem.is_convex(), has_gains) {
+        (true, _, _) => Some("emission that changes"),
+        (false, true, _) => None,
+        (false, false, true) => Some("visibilities with unknown gains"),
+        (false, false, false) => Some("amplitudes and closure quantities"),
+    }
 }
 
 /// None with a [prior](crate::fit::linear::GaussianField) of the voxels, which says what lies between them.

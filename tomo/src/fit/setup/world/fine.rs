@@ -47,7 +47,7 @@ impl Detail<'_> {
         })?;
         let Some((spread, reduced, world)) = found else { return Ok(None) };
         let Some(finest) = search.finest() else {
-            let spread = self.beside_its_own((&seen, &search.fine), errors, spread)?;
+            let spread = self.beside_its_own((&seen, &search.fine), errors, (spread, reduced))?;
             return Ok(Some(((spread, reduced, world), errors)));
         };
         let errors = (self.scale)(reduced / errors);
@@ -58,7 +58,7 @@ impl Detail<'_> {
         let free = self.unknown.free()?;
         // What finer voxels and pixels moved the world by is what finer ones still might.
         let spread = spread.map(|spread| spread.moved(&free, world));
-        let spread = self.beside_its_own((&seen, &finest), errors, spread)?;
+        let spread = self.beside_its_own((&seen, &finest), errors, (spread, reduced))?;
         Ok(Some(((spread, reduced, world), errors)))
     }
 
@@ -67,12 +67,12 @@ impl Detail<'_> {
         &self,
         (seen, view): (&Seen, &WorldView),
         scale: f64,
-        spread: Option<Spread>,
+        (spread, reduced): (Option<Spread>, f64),
     ) -> Result<Option<Spread>> {
         let Some(spread) = spread else { return Ok(None) };
         let about = (self.unknown, spacing(&self.file.screen)?);
         let own = self.through((seen, view), scale, |_, problem| {
-            discretisation::errors((seen, view), about, problem, spread.world)
+            discretisation::errors((seen, view), about, problem, (&spread, reduced))
         })?;
         Ok(Some(spread.beside(&self.unknown.free()?, own)))
     }
@@ -162,7 +162,7 @@ fn quick<'a>(problem: &WorldProblem<'a, f32>) -> WorldProblem<'a, f32> {
 }
 
 /// Whether steps along differences of images follow a search: χ² has to be smooth, and they know one volume.
-fn is_stepped(seen: &Seen, problem: &WorldProblem<'_, f32>) -> bool {
+pub(super) fn is_stepped(seen: &Seen, problem: &WorldProblem<'_, f32>) -> bool {
     (problem.model.ring.is_some() || seen.is_images()) && !problem.change.is_any()
 }
 

@@ -4,7 +4,7 @@ use super::seen::Seen;
 use crate::fit::settings::{FitFile, UnknownWorld};
 use crate::fit::setup::{Measured, Result};
 use crate::fit::world::{
-    Effort, Envelope, Estimate, Free, Polish, Polished, Spread, World, WorldProblem,
+    Effort, Envelope, Estimate, Free, ModelErrors, Polish, Polished, Spread, World, WorldProblem,
 };
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
@@ -66,7 +66,15 @@ pub(super) fn surely(
     let sigma = problem.free.iter().zip(whole).map(|(free, x)| x.min(free.prior.deviation()));
     let sigma: Vec<f64> = sigma.collect();
     let open = problem.free.iter().zip(&sigma).map(|(free, sigma)| free.is_open(*sigma)).collect();
-    Ok(Some(Spread { world, sigma, open, correlation, ripple, worlds, own: Vec::new() }))
+    Ok(Some(Spread {
+        world,
+        sigma,
+        open,
+        correlation,
+        ripple,
+        worlds,
+        own: ModelErrors::default(),
+    }))
 }
 
 /// Data through other pixels, and what of the world is not known; none where pixels are those of the data.

@@ -1,12 +1,14 @@
 //! The search for a world: from many starts with coarse voxels, then with fine ones.
 
-use super::fine::{Detail, PART, nearer};
-use super::seen::Seen;
+use super::fine::{Detail, PART, is_stepped, nearer};
+use super::seen::{BESIDE_THE_RING, Seen};
 use super::tangent::Anchor;
 use crate::fit::journal::{Journal, Memory};
 use crate::fit::settings::{FieldKind, FitFile, Linear, UnknownWorld};
 use crate::fit::setup::{Measured, Result};
-use crate::fit::world::{Estimate, Exploration, Explored, Spread, World, WorldProblem, WorldWatch};
+use crate::fit::world::{
+    Estimate, Exploration, Explored, Polish, Spread, World, WorldProblem, WorldWatch,
+};
 
 use rayon::prelude::*;
 
@@ -23,7 +25,8 @@ pub struct Trial {
     pub value: f64,
     /// Worlds that were evaluated.
     pub worlds: usize,
-    /// Whether the last populations were alike.
+    /// Whether that is a minimum: a further step, or the quadratic form through its surroundings, leads no farther away than a
+    /// standard deviation.
     pub converged: bool,
 }
 
@@ -51,6 +54,9 @@ const WIDTHS: [f64; 2] = [1.5, 0.4];
 
 /// Worlds of a search for each of that from the twin of its end.
 const TWIN: usize = 6;
+
+/// Worlds of a search for each that steps from its end take the time of.
+const STEPPED: usize = 4;
 
 /// Looks for the world from all starts, and again with finer voxels about the best end; none if it was cancelled. What the
 /// journal knows of an earlier search that was interrupted is not looked at again.
@@ -171,19 +177,46 @@ fn searched(
     how: &Exploration,
     watch: &mut WorldWatch<'_>,
 ) -> Result<Option<Explored>> {
+    let steps = if is_stepped(seen, problem) { how.worlds / STEPPED } else { 0 };
+    let how = &Exploration { worlds: how.worlds - steps, ..*how };
     let mut from = |problem: &WorldProblem<'_, f32>| -> Result<Option<Explored>> {
-        match problem.explore((start, None), how, watch)? {
-            Some(explored) => or_twin(problem, explored, how, watch),
-            None => Ok(None),
-        }
+        let Some(explored) = problem.explore((start, None), how, watch)? else { return Ok(None) };
+        let explored = or_twin(problem, explored, how, watch)?;
+        explored.map(|explored| ended(seen, problem, explored)).transpose()
     };
     let Some(lit) = lit else { return from(problem) };
     let about = seen.about(problem, &Anchor::of(problem, &lit), &mut from)?;
     let Some(explored) = about else { return from(problem) };
     let Some(explored) = explored else { return Ok(None) };
     let short = Exploration { width: WIDTHS[1], worlds: how.worlds / PART, ..*how };
-    let nearer = nearer(seen, problem, explored, &short, watch)?;
-    Ok(nearer.map(|explored| Explored { start, ..explored }))
+    let Some(nearer) = nearer(seen, problem, explored, &short, watch)? else { return Ok(None) };
+    let converged = is_lowest(problem, &nearer)?;
+    Ok(Some(Explored { start, converged, ..nearer }))
+}
+
+/// Whether the best world is, within its errors, the lowest point of the quadratic form through the others.
+fn is_lowest(problem: &WorldProblem<'_, f32>, explored: &Explored) -> Result<bool> {
+    let reduced = problem.scale * problem.left(&explored.best)?;
+    let form = Spread::of(problem.free, &explored.samples, reduced);
+    Ok(form.is_some_and(|form| form.holds(problem.free, &explored.best.world)))
+}
+
+/// The end of the valley in which populations have ended: steps lead there, where χ² is smooth enough.
+fn ended(seen: &Seen, problem: &WorldProblem<'_, f32>, mut explored: Explored) -> Result<Explored> {
+    if !is_stepped(seen, problem) {
+        let reduced = problem.scale * problem.left(&explored.best)?;
+        let form = Spread::of(problem.free, &explored.samples, reduced);
+        explored.converged =
+            form.is_some_and(|form| form.holds(problem.free, &explored.best.world));
+        return Ok(explored);
+    }
+    let how = Polish { following: problem.effort.patience.looking, ..Polish::default() };
+    let beside = (explored.best.world, BESIDE_THE_RING[0]);
+    let polished =
+        seen.smoothly(problem, beside, |problem| Ok(problem.polish(&explored.best, &how)?))?;
+    explored.best = problem.solve(polished.best.world)?;
+    explored.converged = polished.converged;
+    Ok(explored)
 }
 
 /// Where a search has ended, or a short one from the twin of that world, if that ends at a better one.
@@ -197,9 +230,10 @@ fn or_twin(
     let short = Exploration { width: WIDTHS[1], worlds: how.worlds / TWIN, ..*how };
     let Some(other) = problem.explore((twin, None), &short, watch)? else { return Ok(None) };
     if other.best.value < explored.best.value {
-        (explored.best, explored.converged) = (other.best, other.converged);
+        explored.best = other.best;
     }
     explored.samples.extend(other.samples);
+    explored.samples.sort_by(|a, b| a.value.total_cmp(&b.value));
     Ok(Some(explored))
 }
 
