@@ -6,7 +6,7 @@ use crate::fit::folder::Folder;
 use crate::report::{Axis, LinePlot, Marks, Series, Table};
 use kerrlight_common::frames::Frames;
 use kerrlight_tomo::fit::settings::LossKind;
-use kerrlight_tomo::fit::setup::Measured;
+use kerrlight_tomo::fit::setup::{Measured, station_of_file};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::gains::{GainDistance, GainTable, StationGain};
@@ -23,6 +23,18 @@ const CURVES: usize = 6;
 pub struct Gains {
     table: GainTable,
     distance: Option<GainDistance>,
+}
+
+/// The gains of the stations of one file of several, by their own names.
+fn of_file(table: &GainTable, measured: &Measured, file: usize) -> GainTable {
+    if measured.files.iter().all(|file| *file == 0) {
+        return table.clone();
+    }
+    let own = |gain: &StationGain| {
+        let (station, of) = station_of_file(&gain.station);
+        (of == file).then(|| StationGain { station: station.to_owned(), ..gain.clone() })
+    };
+    GainTable { gains: table.gains.iter().filter_map(own).collect() }
 }
 
 /// What the gains of a station are like.
@@ -65,7 +77,11 @@ impl Gains {
     }
 
     fn written(table: GainTable, measured: &Measured, folder: &Folder) -> anyhow::Result<Self> {
-        folder.file(TABLE)?.write(files::gains_to_csv(&table).as_bytes())?;
+        for file in 0..=measured.files.iter().copied().max().unwrap_or(0) {
+            let own = of_file(&table, measured, file);
+            let name = if file == 0 { TABLE.to_owned() } else { format!("gains_{}.csv", file + 1) };
+            folder.file(&name)?.write(files::gains_to_csv(&own).as_bytes())?;
+        }
         let distance = measured.true_gains.as_ref().and_then(|truth| table.distance(truth));
         Ok(Gains { table, distance })
     }

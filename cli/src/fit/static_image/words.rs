@@ -88,12 +88,19 @@ impl Found<'_> {
         let mut text = vec![format!(
             "{}: {rows} visibilities of Stokes I in {} frames of {} s; {} are fitted. {} % of each amplitude was added to its \
              error in quadrature.",
-            data.path.display(),
+            data.path.names(),
             self.measured.times.len(),
             data.average_s,
             kinds.join(", "),
             100.0 * data.systematic
         )];
+        if data.path.all().len() > 1 {
+            text.push(
+                "The files share the image alone: each has gains of its own, and nothing closes across them. From the second \
+                 on (2), (3) … stand behind the names of stations."
+                    .to_owned(),
+            );
+        }
         if let Some(least) = data.uv_min {
             text.push(format!("Baselines below {least:e} wavelengths are left out."));
         }

@@ -43,8 +43,8 @@ pub use recovery::{
 };
 pub use simulation::{GlyphShape, Movie, Noise, Observation, Ring, Shines, Spot, Truth, Tube};
 pub use static_image::{
-    EnvelopeSettings, ImageSettings, RingSettings, StartImage, StaticData, StaticImageFile,
-    StaticVisibilities, StrengthSettings,
+    DataPaths, EnvelopeSettings, ImageSettings, RingSettings, StartImage, StaticData,
+    StaticImageFile, StaticVisibilities, StrengthSettings,
 };
 pub use static_polarization::StaticPolarization;
 pub use unknown_world::{PriorSettings, UnknownWorld};
