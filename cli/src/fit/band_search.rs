@@ -250,6 +250,12 @@ fn flare(ln: f64) -> String {
     )
 }
 
+/// Whether data ask for a flare beside a background; none where there is no background, and nothing to ask.
+pub fn is_seen(results: &Value) -> Option<bool> {
+    let ln = results["ln_bayes_factor"].as_f64().filter(|_| results["background"].is_object())?;
+    Some(ln > SEEN)
+}
+
 /// ln of 20, above which a Bayes factor is called strong (Kass & Raftery 1995).
 const SEEN: f64 = 3.0;
 
@@ -265,6 +271,34 @@ fn place_of([median, low, high]: [f64; 3]) -> String {
         "its middle is at an azimuth of {median:.0}° (−{:.0}°, +{:.0}°)",
         median - low,
         high - median
+    )
+}
+
+/// Radii that were asked for, M.
+fn radii_of(results: &Value) -> Vec<f64> {
+    let all = results["radii"].as_array().into_iter().flatten();
+    all.filter_map(|pair| pair[0].as_f64()).collect()
+}
+
+/// Part of the radii that were asked for: a 95 % interval that is wider says no more than the prior.
+const OPEN: f64 = 0.75;
+
+/// Radius (M) and period (minutes) of an orbit, each as median and interval; a radius that may be almost any of those that were asked for
+/// is not constrained, nor is the period.
+fn orbit(
+    [radius, inner, outer]: [f64; 3],
+    [period, short, long]: [f64; 3],
+    asked: &[f64],
+) -> String {
+    let inner = inner.max(0.0);
+    let (Some(first), Some(last)) = (asked.first(), asked.last()) else { return String::new() };
+    if outer - inner > OPEN * (last - first) && asked.len() > 1 {
+        return format!(
+            "Radius and period of the orbit are not constrained: {inner:.1} to {outer:.1} M and {short:.0} to {long:.0} minutes at 95 %."
+        );
+    }
+    format!(
+        "The flare orbits at {radius:.1} M ({inner:.1} to {outer:.1} at 95 %), with a period of {period:.0} minutes ({short:.0} to {long:.0})."
     )
 }
 
@@ -287,18 +321,14 @@ pub fn sentences(results: &Value) -> Vec<String> {
             of("inclination_deg", "high"),
             of("inclination_deg", "median")
         ),
-        format!(
-            "The flare orbits at {:.1} M ({:.1} to {:.1} at 95 %); at the reference time {}.",
-            of("emission_radius", "median"),
-            of("emission_radius", "low").max(0.0),
-            of("emission_radius", "high"),
-            place_of(["median", "low", "high"].map(|part| of("azimuth_deg", part)))
+        orbit(
+            ["median", "low", "high"].map(|part| of("emission_radius", part)),
+            ["median", "low", "high"].map(|part| of("period_min", part)),
+            &radii_of(results),
         ),
         format!(
-            "Its period is {:.0} minutes ({:.0} to {:.0} at 95 %).",
-            of("period_min", "median"),
-            of("period_min", "low"),
-            of("period_min", "high")
+            "At the reference time {}.",
+            place_of(["median", "low", "high"].map(|part| of("azimuth_deg", part)))
         ),
     ]);
     let turns = results["rotation_factor"]["probabilities"].as_array();
@@ -332,6 +362,18 @@ mod tests {
         assert_eq!(place_of([273.0, 93.0, 453.0]), "its middle may be at any azimuth");
         let near = place_of([350.0, 330.0, 375.0]);
         assert_eq!(near, "its middle is at an azimuth of 350° (−20°, +25°)");
+    }
+
+    #[test]
+    fn exact_a_radius_as_wide_as_its_prior_is_not_constrained() {
+        let asked: Vec<f64> = (0..=20).map(|k| 4.0 + f64::from(k)).collect();
+        let open = orbit([11.0, 0.0, 22.0], [60.0, 20.0, 150.0], &asked);
+        assert!(open.contains("not constrained: 0.0 to 22.0 M and 20 to 150 minutes"), "{open}");
+        let known = orbit([11.0, 9.0, 13.0], [60.0, 50.0, 70.0], &asked);
+        assert!(known.starts_with("The flare orbits at 11.0 M (9.0 to 13.0 at 95 %), with"));
+        let of = |ln: f64| json!({"ln_bayes_factor": ln, "background": {}});
+        assert_eq!([0.5f64.ln(), 4.0].map(|ln| is_seen(&of(ln))), [Some(false), Some(true)]);
+        assert_eq!(is_seen(&Value::Null), None);
     }
 
     #[test]

@@ -7,7 +7,9 @@ use anyhow::{Context, bail};
 use kerrlight_common::frames::Frames;
 use kerrlight_common::numpy;
 use kerrlight_tomo::Error;
-use kerrlight_tomo::fit::settings::{DataFiles, FitFile, Simulation, StaticImageFile};
+use kerrlight_tomo::fit::settings::{
+    DataFiles, FitFile, Simulation, StaticImageFile, StrengthSettings,
+};
 use kerrlight_tomo::fit::setup::{Drawn, Instrument, Measured};
 use kerrlight_validation::sky::{Screen, Sky};
 use kerrlight_vlbi::files;
@@ -167,11 +169,23 @@ pub fn of_static(
     file: &StaticImageFile,
     base_dir: &Path,
 ) -> anyhow::Result<(Measured, Option<Measured>)> {
-    let path = paths::of_data(&file.data.visibilities.path, base_dir)?;
-    visibilities(&path, |observation, name| {
-        let polarized = Measured::of_static_polarized(file, observation.clone(), name)?;
-        Ok((Measured::of_static(file, observation, name)?, polarized))
-    })
+    let (mut all, mut all_polarized) = (Vec::new(), Vec::new());
+    for path in file.data.visibilities.path.all() {
+        let path = paths::of_data(path, base_dir)?;
+        let (measured, polarized) = visibilities(&path, |observation, name| {
+            let polarized = Measured::of_static_polarized(file, observation.clone(), name)?;
+            Ok((Measured::of_static(file, observation, name)?, polarized))
+        })?;
+        let name = || path.display().to_string();
+        all.push((name(), measured));
+        all_polarized.extend(polarized.map(|polarized| (name(), polarized)));
+    }
+    let of = file.polarization.as_ref().map(|polarization| &polarization.strength);
+    let joined = |strength: &Option<StrengthSettings>| {
+        Measured::joined(all_polarized, ("polarization.", strength.as_ref()))
+    };
+    let polarized = of.map(joined).transpose()?;
+    Ok((Measured::joined(all, ("", file.strength.as_ref()))?, polarized))
 }
 
 fn visibilities<R>(

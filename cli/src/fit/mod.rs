@@ -61,9 +61,9 @@ pub struct Fit {
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
     /// Fit this file of data (visibilities, images or a light curve) with settings that are guessed from it; every guess
-    /// is told, and what cannot be guessed is asked for
-    #[arg(long, value_name = "DATA", conflicts_with_all = ["file", "resume", "init"])]
-    data: Option<PathBuf>,
+    /// is told, and what cannot be guessed is asked for. Several files of visibilities (bands, days) make one static image
+    #[arg(long, value_name = "DATA", num_args = 1.., conflicts_with_all = ["file", "resume", "init"])]
+    data: Option<Vec<PathBuf>>,
     /// Change a setting, e.g. training.steps=500; `representation=grid` is short for
     /// representation.kind=grid
     #[arg(long, value_name = "KEY=VALUE")]
@@ -214,7 +214,10 @@ impl Fit {
         match (&self.file, &self.data) {
             (Some(file), _) => plain::path(file),
             // Lines that an error names are those of the settings, not of the data.
-            (None, Some(data)) => format!("settings guessed from {}", plain::path(data)),
+            (None, Some(data)) => {
+                let names: Vec<String> = data.iter().map(|path| plain::path(path)).collect();
+                format!("settings guessed from {}", names.join(", "))
+            }
             (None, None) if session::settings().is_some() => "settings".to_owned(),
             (None, None) => "built-in experiment".to_owned(),
         }

@@ -67,7 +67,9 @@ fn data(table: &Table) -> String {
         [("visibilities", "visibilities"), ("movie", "movie"), ("light-curve", "light curve")];
     let file = kinds.into_iter().find_map(|(kind, name)| {
         let path = table.get("data")?.get(kind)?.get("path")?;
-        Some(format!("{name} of {}", path.as_str().unwrap_or_default()))
+        let paths = path.as_array().map_or(core::slice::from_ref(path), Vec::as_slice);
+        let paths: Vec<&str> = paths.iter().filter_map(|path| path.as_str()).collect();
+        Some(format!("{name} of {}", paths.join(", ")))
     });
     let of = |key: &str| table.get("simulation").and_then(|simulation| simulation.get(key));
     let simulated = || match of("observation").and_then(|seen| seen.get("array")) {

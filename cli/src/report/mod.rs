@@ -7,9 +7,9 @@ mod paged;
 mod panels;
 mod pictures;
 mod plot;
+mod sky;
 #[cfg(test)]
 mod tests;
-mod ticked;
 mod triangle;
 mod view;
 
@@ -20,7 +20,7 @@ pub use pictures::{
     still,
 };
 pub use plot::{Axis, LinePlot, Marks, Series};
-pub use ticked::ticked;
+pub use sky::{SkyPanel, sky};
 pub use triangle::{Triangle, Variable};
 pub use view::{Motion, View3d, rates, thinned};
 

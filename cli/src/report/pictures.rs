@@ -99,7 +99,7 @@ pub fn projections(shown: &[Shown], around: &Surroundings, unit: &str) -> anyhow
 const STRIP: usize = 6;
 
 /// Images of n × n pixels on a sheet of equal cells, on one scale of colours.
-pub(super) struct Sheet {
+struct Sheet {
     drawn: image::RgbImage,
     n: usize,
     zoom: usize,
@@ -113,7 +113,7 @@ const GAP: usize = 4;
 
 impl Sheet {
     /// Brightness from 0 to `most`.
-    pub(super) fn new(cells: [usize; 2], n: usize, zoom: usize, most: f32) -> Self {
+    fn new(cells: [usize; 2], n: usize, zoom: usize, most: f32) -> Self {
         let ends = [0.0, most.max(f32::MIN_POSITIVE)];
         Self::colored(cells, n, zoom, (ends, Colormap::Inferno))
     }
@@ -130,17 +130,7 @@ impl Sheet {
         Self { drawn, n, zoom, ends, table: colors.table() }
     }
 
-    /// What was put on it.
-    pub(super) fn drawn(&self) -> &image::RgbImage {
-        &self.drawn
-    }
-
-    /// From the left edge of a cell to that of the next one, pixels.
-    pub(super) fn pitch(&self) -> usize {
-        self.n * self.zoom + GAP
-    }
-
-    pub(super) fn put(&mut self, [column, row]: [usize; 2], image: &[f32]) {
+    fn put(&mut self, [column, row]: [usize; 2], image: &[f32]) {
         let (n, zoom, table, [low, high]) = (self.n, self.zoom, &self.table, self.ends);
         let [left, top] = [column, row].map(|k| k * (n * zoom + GAP));
         for (k, value) in image.iter().enumerate() {

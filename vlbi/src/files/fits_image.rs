@@ -1,5 +1,9 @@
 //! Images in FITS files, as eht-imaging and other imaging programs write them.
 
+mod write;
+
+pub use write::write;
+
 use super::FileError;
 use super::fits::{Header, Unit};
 use super::fits_axes::{self, Place};

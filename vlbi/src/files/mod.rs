@@ -17,7 +17,7 @@ mod uvfits;
 
 pub use comments::write as observation_comments;
 pub use eht_table::{EhtTable, to_eht_table};
-pub use fits_image::read as read_fits_image;
+pub use fits_image::{read as read_fits_image, write as write_fits_image};
 pub use gains::{COLUMNS as GAIN_COLUMNS, parse as parse_gains, to_csv as gains_to_csv};
 pub use leakage::{parse as parse_leakage, to_csv as leakage_to_csv};
 pub use light_curve::{

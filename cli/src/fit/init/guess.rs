@@ -3,7 +3,7 @@
 use super::annotate::annotate;
 use super::{Model, of_data};
 use anyhow::bail;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Settings for a file of data.
 pub struct Guess {
@@ -26,12 +26,13 @@ struct Missing {
     why: String,
 }
 
-/// The settings for data at an absolute path.
+/// The settings for data of a file, or of several of one image.
 ///
 /// # Errors
 /// If the file holds no visibilities, images or light curve.
-pub fn guess(data: &Path, model: Option<Model>) -> anyhow::Result<Guess> {
-    let data = std::path::absolute(data)?;
+pub fn guess(data: &[PathBuf], model: Option<Model>) -> anyhow::Result<Guess> {
+    let data: Vec<PathBuf> =
+        data.iter().map(std::path::absolute).collect::<std::io::Result<_>>()?;
     let plain = of_data(&data, Path::new(""), model)?;
     let mut guess = Guess {
         text: annotate(&plain),
@@ -74,7 +75,7 @@ impl Guess {
     ///
     /// # Errors
     /// Names all of it, with what to write.
-    pub fn check(&self, settings: &str, data: &Path) -> anyhow::Result<()> {
+    pub fn check(&self, settings: &str, data: &[PathBuf]) -> anyhow::Result<()> {
         let table: toml::Table = settings.parse()?;
         let is_open = |missing: &&Missing| !has(&table, &missing.key);
         let open: Vec<&Missing> = self.missing.iter().filter(is_open).collect();
@@ -84,7 +85,8 @@ impl Guess {
         let line =
             |m: &&Missing| format!("\n  {} ({}): --set '{}={}'", m.key, m.why, m.key, m.example);
         let lines: String = open.iter().map(line).collect();
-        bail!("{} does not say what decides the result; give{lines}", data.display())
+        let names: Vec<String> = data.iter().map(|path| path.display().to_string()).collect();
+        bail!("{} does not say what decides the result; give{lines}", names.join(", "))
     }
 
     /// What was read and what was assumed, in lines.
@@ -149,13 +151,13 @@ mod tests {
     fn exact_what_is_open_is_demanded_and_what_is_changed_is_no_guess() {
         let plain = "[hole]\nspin = 0.5 #! the data do not tell the spin\n#? mass_msun = 4e6 # no value for it\n";
         let guess = guess_of(plain);
-        let path = Path::new("a.uvfits");
-        let error = guess.check("[hole]\nspin = 0.5", path).unwrap_err().to_string();
+        let path = [PathBuf::from("a.uvfits")];
+        let error = guess.check("[hole]\nspin = 0.5", &path).unwrap_err().to_string();
         assert!(
             error.contains("hole.mass_msun (no value for it): --set 'hole.mass_msun=4e6'"),
             "{error}"
         );
-        guess.check("[hole]\nspin = 0.5\nmass_msun = 6e9", path).unwrap();
+        guess.check("[hole]\nspin = 0.5\nmass_msun = 6e9", &path).unwrap();
         let said = guess.sentences("[hole]\nspin = 0.5");
         assert_eq!(said, "assumed: hole.spin = 0.5: the data do not tell the spin\n");
         assert_eq!(guess.sentences("[hole]\nspin = 0.9"), "");

@@ -104,7 +104,7 @@ pub fn write(
     let output = Output::new(path, "toml")?;
     let plain = match data {
         None => BUILT_IN.to_owned(),
-        Some(data) => of_data(data, path, model)?,
+        Some(data) => of_data(&[data.to_owned()], path, model)?,
     };
     let text = format!("{}{}", head(path, &plain), annotate(&plain));
     output.write(text.as_bytes())?;
@@ -134,8 +134,37 @@ fn head(path: &Path, plain: &str) -> String {
     )
 }
 
-/// The plain settings of a fit of this file, for annotation.
-fn of_data(data: &Path, toml: &Path, model: Option<Model>) -> anyhow::Result<String> {
+/// The plain settings of one image of several files, for annotation: guessed from the first.
+fn of_files(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Result<String> {
+    let mut observations = Vec::new();
+    for path in data {
+        observations.push(crate::interferometry::read(path)?.1);
+    }
+    let first = observations.first().context("no file of data")?;
+    let source = known(first);
+    if model != Some(Model::Image) && source.is_none_or(|source| source.varies) {
+        bail!("several files are fitted as one image that does not change: give --model image");
+    }
+    let name = &called(first, source);
+    let file = |path: &PathBuf| {
+        path.file_name().and_then(|name| name.to_str()).unwrap_or_default().to_owned()
+    };
+    let paths = data.iter().map(|path| seen_from(toml, path).map(toml::Value::String));
+    let paths = toml::Value::Array(paths.collect::<anyhow::Result<_>>()?).to_string();
+    let text = static_image::of_visibilities(first, source, name, (&paths, &file(&data[0])))?;
+    let others = observations.iter().zip(data).skip(1);
+    let said: String = others
+        .map(|(seen, path)| {
+            let name = &called(seen, known(seen));
+            format!("{}{}\n", guess::READ, read(seen, &file(path), name, known(seen).is_some()))
+        })
+        .collect();
+    Ok(text.replacen('\n', &format!("\n{said}"), 1))
+}
+
+/// The plain settings of a fit of this file, or of these of one image, for annotation.
+fn of_data(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Result<String> {
+    let [data] = data else { return of_files(data, toml, model) };
     if model == Some(Model::Image) {
         let (_, observation) = crate::interferometry::read(data)?;
         return of_observation(&observation, (data, toml), model);

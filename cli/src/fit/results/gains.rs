@@ -6,7 +6,7 @@ use crate::fit::folder::Folder;
 use crate::report::{Axis, LinePlot, Marks, Series, Table};
 use kerrlight_common::frames::Frames;
 use kerrlight_tomo::fit::settings::LossKind;
-use kerrlight_tomo::fit::setup::Measured;
+use kerrlight_tomo::fit::setup::{Measured, station_of_file};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::gains::{GainDistance, GainTable, StationGain};
@@ -23,6 +23,18 @@ const CURVES: usize = 6;
 pub struct Gains {
     table: GainTable,
     distance: Option<GainDistance>,
+}
+
+/// The gains of the stations of one file of several, by their own names.
+fn of_file(table: &GainTable, measured: &Measured, file: usize) -> GainTable {
+    if measured.files.iter().all(|file| *file == 0) {
+        return table.clone();
+    }
+    let own = |gain: &StationGain| {
+        let (station, of) = station_of_file(&gain.station);
+        (of == file).then(|| StationGain { station: station.to_owned(), ..gain.clone() })
+    };
+    GainTable { gains: table.gains.iter().filter_map(own).collect() }
 }
 
 /// What the gains of a station are like.
@@ -44,7 +56,7 @@ impl Estimate<'_> {
         let is_polarized =
             self.file.loss.iter().any(|loss| loss.data == LossKind::PolarizedVisibilities);
         if !is_polarized || self.measured.gains.is_none() {
-            return Gains::beside(&self.evidence(), movie, self.folder);
+            return Gains::beside(&self.evidence(), (movie, &[]), self.folder);
         }
         let table = self.measured.polarized_gains(&seen.to_vec()?)?;
         table.map(|table| Gains::written(table, self.measured, self.folder)).transpose()
@@ -52,20 +64,41 @@ impl Estimate<'_> {
 }
 
 impl Gains {
-    /// The gains of all stations and frames beside images of all frames, where they are solved for; writes their table.
+    /// The gains of all stations and frames beside images of all frames, where they are solved for; writes their table. Where
+    /// `others` may as well be the images, the root mean square distance of their gains is added to errors in quadrature.
     pub fn beside(
         evidence: &Evidence<'_>,
-        movie: &Frames<f32>,
+        (movie, others): (&Frames<f32>, &[Frames<f32>]),
         folder: &Folder,
     ) -> anyhow::Result<Option<Self>> {
         let Evidence { measured, losses, .. } = *evidence;
-        let Some(model) = evidence.model_visibilities(movie)? else { return Ok(None) };
-        let Some(table) = measured.gains(losses, &model)? else { return Ok(None) };
+        let of = |movie| -> anyhow::Result<Option<GainTable>> {
+            let Some(model) = evidence.model_visibilities(movie)? else { return Ok(None) };
+            Ok(measured.gains(losses, &model)?)
+        };
+        let Some(mut table) = of(movie)? else { return Ok(None) };
+        let mut squares = vec![[0.0; 2]; table.gains.len()];
+        for other in others {
+            let other = of(other)?.unwrap_or_default();
+            for ((sum, here), there) in squares.iter_mut().zip(&table.gains).zip(&other.gains) {
+                let apart = (there.gain / here.gain).ln();
+                *sum = [sum[0] + apart.re * apart.re, sum[1] + apart.im * apart.im];
+            }
+        }
+        for (gain, sum) in table.gains.iter_mut().zip(squares) {
+            for (error, sum) in gain.errors.iter_mut().zip(sum) {
+                *error = error.hypot((sum / others.len().max(1) as f64).sqrt());
+            }
+        }
         Self::written(table, measured, folder).map(Some)
     }
 
     fn written(table: GainTable, measured: &Measured, folder: &Folder) -> anyhow::Result<Self> {
-        folder.file(TABLE)?.write(files::gains_to_csv(&table).as_bytes())?;
+        for file in 0..=measured.files.iter().copied().max().unwrap_or(0) {
+            let own = of_file(&table, measured, file);
+            let name = if file == 0 { TABLE.to_owned() } else { format!("gains_{}.csv", file + 1) };
+            folder.file(&name)?.write(files::gains_to_csv(&own).as_bytes())?;
+        }
         let distance = measured.true_gains.as_ref().and_then(|truth| table.distance(truth));
         Ok(Gains { table, distance })
     }
@@ -151,7 +184,7 @@ impl Gains {
         let head = ["station", "frames", "amplitude", "scatter", "σ of ln|g|", "σ of phase (°)"];
         Table {
             title: "Station gains".to_owned(),
-            caption: "Gains that explain the data best beside the model: what a station measures is its gain times what it should. Amplitude and scatter are mean and standard deviation over the frames; σ is what data and priors leave open in one frame, the model taken for granted. A mean far from 1 is an error of calibration, or of the model.".to_owned(),
+            caption: "Gains that explain the data best beside the model: what a station measures is its gain times what it should. Amplitude and scatter are mean and standard deviation over the frames; σ is what data and priors leave open in one frame beside the model, with the scatter of draws of a static image. A mean far from 1 is an error of calibration, or of the model.".to_owned(),
             head: head.map(str::to_owned).to_vec(),
             rows: self.summaries().into_iter().map(row).collect(),
             links: Vec::new(),

@@ -133,6 +133,12 @@ impl Estimate<'_> {
         }
         if let Some(band) = band_search::found(self.folder)? {
             band_search::numbers(&band).into_iter().for_each(|(key, value)| results[key] = value);
+            // Samples that were not fitted have one χ²: with the errors that a flare's past leaves of them.
+            if band["validation_chi2_per_datum"].is_number()
+                && let Some(results) = results.as_object_mut()
+            {
+                results.remove("validation_chi2_per_datum");
+            }
             results["band"] = band;
         }
         Ok(())

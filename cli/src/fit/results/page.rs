@@ -174,8 +174,12 @@ impl Estimate<'_> {
         let file = self.file;
         let data: Vec<&str> = file.loss.iter().map(|l| l.data.label()).collect();
         let number = |key: &str| results[key].as_f64();
+        let fitted = match band_search::is_seen(&results["band"]) {
+            Some(false) => "was fitted to",
+            _ => "was recovered from",
+        };
         let mut lines = vec![format!(
-            "Emission around a black hole of spin {}, seen at {}° from its spin axis, was recovered from {} frames of {}. It is represented by {}.",
+            "Emission around a black hole of spin {}, seen at {}° from its spin axis, {fitted} {} frames of {}. It is represented by {}.",
             rounded(file.hole.spin.value()),
             rounded(file.observer.inclination_deg.value()),
             self.measured.times.len(),

@@ -3,6 +3,7 @@
 
 mod numbers;
 mod page;
+mod phases;
 mod pictures;
 mod polarized;
 mod words;
@@ -24,7 +25,8 @@ use kerrlight_tomo::fit::FrameTerm;
 use kerrlight_tomo::fit::settings::{Loss, LossKind, StaticImageFile, StrengthSettings};
 use kerrlight_tomo::fit::setup::Measured;
 use kerrlight_tomo::fit::static_image::{
-    PolarizedSurvey, Ring, Shape, ShapeFit, Stage, Survey, fit_shapes, survey, survey_polarized,
+    Candidate, PolarizedSurvey, Ring, Shape, ShapeFit, Stage, Survey, fit_shapes, survey,
+    survey_polarized,
 };
 use kerrlight_tomo::fit::verdict::{Statistics, Tested};
 use kerrlight_vlbi::files::images;
@@ -96,7 +98,12 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
     let others = tested.into_iter().collect();
     let mut judged = evidence.judged_beside(compared(file, measured, &survey)?, &movie, others)?;
     judged.expect(&numbers::chi2_of_draws(&survey), survey.draws.len());
-    let gains = Gains::beside(&evidence, &movie, folder)?;
+    let of_draw = |draw: &Candidate| {
+        let image: Vec<f32> = draw.solution.image.iter().map(|x| *x as f32).collect();
+        Frames::of(image.repeat(measured.times.len()), image.len())
+    };
+    let draws: Vec<Frames<f32>> = survey.draws.iter().map(of_draw).collect();
+    let gains = Gains::beside(&evidence, (&movie, &draws), folder)?;
     let beside = beside(file, measured, &survey);
     let found = Found {
         file,
@@ -116,7 +123,7 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
     results["ring_sentence"] = words::ring(&found.survey, &found.shapes).into();
     folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
     found.report(&evidence, &results)?;
-    let files = ["report.html", "results.json", "image.npz", "image.png"];
+    let files = ["report.html", "results.json", "image.npz", "image.fits", "image.png"];
     let files = files.map(|name| folder.path().join(name));
     Ok(Answer::lines(&found.worth(), &files[0].display().to_string())
         .with_all(results)
@@ -257,6 +264,9 @@ impl Found<'_> {
         }
         let bytes = images::movie_archive([1, n, n], &all, &lists);
         self.folder.file("image.npz")?.write(&bytes)?;
+        if let Some(bytes) = self.fits()? {
+            self.folder.file("image.fits")?.write(&bytes)?;
+        }
         let draws = &self.survey.draws;
         if draws.is_empty() {
             return Ok(());

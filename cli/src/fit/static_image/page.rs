@@ -59,6 +59,7 @@ impl Found<'_> {
         }
         let mut all_plots: Vec<LinePlot> =
             plots::amplitudes(evidence, &self.movie, self.gains.as_ref())?.into_iter().collect();
+        all_plots.extend(self.closure_phases(evidence)?);
         all_plots.extend(residuals::plots(&self.judged, self.measured));
         all_plots.extend(self.held_out());
         all_plots.extend(self.polarized.as_ref().and_then(Polarized::held_out));

@@ -1,37 +1,70 @@
-//! The image, blurred and as sure as it is.
+//! The image, blurred and as sure as it is, with axes and a beam, and as FITS.
 
 use super::Found;
-use crate::report::{Figure, enlarged, images};
+use crate::report::{Figure, SkyPanel, sky};
 use kerrlight_tomo::fit::static_image::{Candidate, blurred};
+use kerrlight_vlbi::files;
 
 /// Full width at half maximum of the beam of the published images of M87*, µas (EHT Collaboration 2019, ApJL 875, L4).
 const BEAM_UAS: f64 = 20.0;
 
-/// Pixels of a drawn image, about.
-const DRAWN: usize = 320;
-
 impl Found<'_> {
+    /// Pixels along a side, and the width of the field in µas.
+    fn size(&self) -> (usize, f64) {
+        (self.file.image.pixels, self.file.image.field_uas)
+    }
+
+    /// An image as a beam of so many µas sees it.
+    fn seen(&self, image: &[f64], beam_uas: f64) -> Vec<f64> {
+        let (n, field) = self.size();
+        blurred(image, n, beam_uas * n as f64 / field)
+    }
+
     /// The image, the same blurred, and its scatter over the draws.
     pub fn picture(&self) -> anyhow::Result<Figure> {
-        let n = self.file.image.pixels;
-        let pixel = self.file.image.field_uas / n as f64;
         let image = &self.survey.found().solution.image;
-        let zoom = (DRAWN / n).max(1);
-        let blurred = blurred(image, n, BEAM_UAS / pixel);
-        let mut all = vec![("the image", image.clone()), ("blurred to 20 µas", blurred)];
+        let panel = |name, image, beam_uas| SkyPanel { name, image, polarized: None, beam_uas };
+        let mut all = vec![
+            panel("the image", image.clone(), None),
+            panel("blurred to 20 µas", self.seen(image, BEAM_UAS), Some(BEAM_UAS)),
+        ];
         if self.survey.draws.len() > 1 {
-            all.push(("standard deviation of the draws", scatter(&self.survey.draws)));
+            let scatter = scatter(&self.survey.draws);
+            all.push(panel("standard deviation of the draws", scatter, None));
         }
-        let single = |image: &[f64]| image.iter().map(|x| *x as f32).collect::<Vec<f32>>();
-        let fine: Vec<(&str, Vec<f32>)> =
-            all.iter().map(|(name, image)| (*name, enlarged(&single(image), n, zoom))).collect();
-        let brightness = image.iter().fold(0.0f64, |most, x| most.max(*x)) / (pixel * pixel);
-        let what = format!(
-            "The static image, linear between the centres of its pixels as in the fit; the field is {} µas wide. The brightest \
-             pixel has {:.2e} Jy/µas².",
-            self.file.image.field_uas, brightness
-        );
-        images(&fine, n * zoom, &what)
+        let what = "The static image, linear between the centres of its pixels as in the fit.";
+        sky(&all, self.size(), what)
+    }
+
+    /// The image with ticks along its polarisation, and as the beam sees it.
+    pub fn polarized_picture(&self) -> anyhow::Result<Option<Figure>> {
+        let Some(polarized) = &self.polarized else { return Ok(None) };
+        let beam = polarized.settings.beam_uas;
+        let pixels = self.file.image.pixels.pow(2);
+        let images: Vec<&[f64]> = polarized.survey.found.images.chunks_exact(pixels).collect();
+        let panel = |name, of: &dyn Fn(&[f64]) -> Vec<f64>, beam_uas| SkyPanel {
+            name,
+            image: of(images[0]),
+            polarized: Some([of(images[1]), of(images[2])]),
+            beam_uas,
+        };
+        let name = format!("with a beam of {beam} µas");
+        let all = [
+            panel("the image", &<[f64]>::to_vec, None),
+            panel(&name, &|image| self.seen(image, beam), Some(beam)),
+        ];
+        sky(&all, self.size(), "Total intensity with linear polarisation.").map(Some)
+    }
+
+    /// The image as FITS, with Q and U where they were found.
+    pub fn fits(&self) -> anyhow::Result<Option<Vec<u8>>> {
+        let Some((seen, _)) = &self.measured.visibilities else { return Ok(None) };
+        let pixels = self.file.image.pixels.pow(2);
+        let images: Vec<&[f64]> = match &self.polarized {
+            Some(polarized) => polarized.survey.found.images.chunks_exact(pixels).collect(),
+            None => vec![&self.survey.found().solution.image],
+        };
+        Ok(Some(files::write_fits_image(&images, self.file.image.grid()?, seen)))
     }
 }
 

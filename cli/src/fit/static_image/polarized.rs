@@ -1,14 +1,13 @@
-//! The linear polarisation of a static image: numbers, sentences and a picture.
+//! The linear polarisation of a static image: numbers and sentences.
 
-use super::Found;
 use super::numbers::with_error;
 use crate::fit::results::leakage::Leakage;
-use crate::report::{Axis, Figure, LinePlot, Marks, Outcome, Series, enlarged, ticked};
+use crate::report::{Axis, LinePlot, Marks, Outcome, Series};
 use anyhow::Context;
 use kerrlight_tomo::fit::FrameTerm;
 use kerrlight_tomo::fit::settings::{LossKind, StaticImageFile, StaticPolarization};
 use kerrlight_tomo::fit::setup::{Measured, best_held};
-use kerrlight_tomo::fit::static_image::{LinearPolarization, PolarizedSurvey, blurred};
+use kerrlight_tomo::fit::static_image::{LinearPolarization, PolarizedSurvey};
 use kerrlight_tomo::fit::verdict::{Errors, Statistics, Tested};
 use serde_json::{Value, json};
 
@@ -252,32 +251,5 @@ impl Polarized {
                 marks: Marks::Joined,
             }],
         })
-    }
-}
-
-/// Pixels of a drawn image, about.
-const DRAWN: usize = 420;
-
-impl Found<'_> {
-    /// The image with ticks along its polarisation, and as the beam sees it.
-    pub fn polarized_picture(&self) -> anyhow::Result<Option<Figure>> {
-        let Some(polarized) = &self.polarized else { return Ok(None) };
-        let (n, beam) = (self.file.image.pixels, polarized.settings.beam_uas);
-        let pixel = self.file.image.field_uas / n as f64;
-        let zoom = (DRAWN / n).max(1);
-        let images = &polarized.survey.found.images;
-        let fine = |image: &[f64]| {
-            let single: Vec<f32> = image.iter().map(|x| *x as f32).collect();
-            enlarged(&single, n, zoom)
-        };
-        let stokes = |k: usize| &images[k * n * n..(k + 1) * n * n];
-        let sharp = [0, 1, 2].map(|k| fine(stokes(k)));
-        let wide = [0, 1, 2].map(|k| fine(&blurred(stokes(k), n, beam / pixel)));
-        let name = format!("the same with a beam of {beam} µas");
-        let what = format!(
-            "Total intensity, and ticks along the electric vector, as long as polarised light is bright; the field is {} µas wide.",
-            self.file.image.field_uas
-        );
-        ticked(&[("the image", sharp), (&name, wide)], n * zoom, &what).map(Some)
     }
 }

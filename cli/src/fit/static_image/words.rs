@@ -6,7 +6,7 @@ use super::polarized::Polarized;
 use crate::fit::closures;
 use crate::fit::results::medium;
 use crate::report::Part;
-use kerrlight_tomo::fit::settings::{Loss, StartImage};
+use kerrlight_tomo::fit::settings::{Loss, LossKind, StartImage};
 use kerrlight_tomo::fit::static_image::{ShapeFit, Survey};
 
 /// The ring in a sentence: its numbers where one is claimed, and why none is where the image has one.
@@ -88,15 +88,23 @@ impl Found<'_> {
         let mut text = vec![format!(
             "{}: {rows} visibilities of Stokes I in {} frames of {} s; {} are fitted. {} % of each amplitude was added to its \
              error in quadrature.",
-            data.path.display(),
+            data.path.names(),
             self.measured.times.len(),
             data.average_s,
             kinds.join(", "),
             100.0 * data.systematic
         )];
+        if data.path.all().len() > 1 {
+            text.push(
+                "The files share the image alone: each has gains of its own, and nothing closes across them. From the second \
+                 on (2), (3) … stand behind the names of stations."
+                    .to_owned(),
+            );
+        }
         if let Some(least) = data.uv_min {
             text.push(format!("Baselines below {least:e} wavelengths are left out."));
         }
+        text.extend(self.file.loss.iter().map(|loss| formula(loss.data, self.gains.is_some())));
         let closures = closures::sentences(self.measured, &self.file.loss);
         text.extend(closures.into_iter().map(|sentence| sentence + "."));
         text.extend(medium::sentences(data.scattering, data.variability));
@@ -210,6 +218,27 @@ impl Found<'_> {
         }
         text
     }
+}
+
+/// χ² of a kind of data, as it is computed.
+fn formula(kind: LossKind, has_gains: bool) -> String {
+    let name = super::name(kind);
+    let least = |of: &str, plain: &str| match has_gains {
+        true => format!("the least {of} + Σ (ln|g|/s)² over gains g with the priors s"),
+        false => plain.to_owned(),
+    };
+    let what = match kind {
+        LossKind::Amplitudes => {
+            least("Σ (|g₁ g₂ V| − A)²/σ²", "Σ (|V| − A)²/σ²") + ", with A² = |V_data|² − σ²"
+        }
+        LossKind::ClosurePhases | LossKind::LogClosureAmplitudes => {
+            "Σ rᵀ C⁻¹ r over frames, with r the differences of an independent set from the image and C = Σ ± (σ/|V|)² over \
+             the baselines that two of them share"
+                .to_owned()
+        }
+        _ => least("Σ |g₁ ḡ₂ V − V_data|²/σ²", "Σ |V − V_data|²/σ²"),
+    };
+    format!("χ² of {name} is {what}.")
 }
 
 /// Simple shapes in a sentence, the one that fits best first.

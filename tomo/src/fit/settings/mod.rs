@@ -49,8 +49,8 @@ pub use simulation::{
     GlyphShape, Movie, Noise, Observation, Ring, Shines, Simulation, Spot, Truth, Tube,
 };
 pub use static_image::{
-    EnvelopeSettings, ImageSettings, RingSettings, StartImage, StaticData, StaticImageFile,
-    StaticVisibilities, StrengthSettings,
+    DataPaths, EnvelopeSettings, ImageSettings, RingSettings, StartImage, StaticData,
+    StaticImageFile, StaticVisibilities, StrengthSettings,
 };
 pub use static_polarization::StaticPolarization;
 pub use unknown_world::UnknownWorld;

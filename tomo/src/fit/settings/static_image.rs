@@ -123,8 +123,8 @@ pub struct StaticData {
 #[serde(deny_unknown_fields)]
 pub struct StaticVisibilities {
     /// UVFITS, eht-imaging's text, EHT tables or CSV, relative to this file; `$KERRLIGHT_EHT_DATA/NAME` is in the
-    /// folder that this variable names.
-    pub path: PathBuf,
+    /// folder that this variable names. Several files (bands, days) in a list make one image, each with gains of its own.
+    pub path: DataPaths,
     /// Rows within this time are averaged and share the gains of their stations, s, 0 or above.
     pub average_s: f64,
     /// Fraction of each amplitude, added to its error in quadrature.
@@ -142,6 +142,45 @@ pub struct StaticVisibilities {
     /// Adds jy/(1 + (|u|/uv)²)^(power/2) to all errors, for what the source varies.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variability: Option<Variability>,
+}
+
+/// A file or several.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "a path or a list of paths")]
+pub enum DataPaths {
+    /// One.
+    One(PathBuf),
+    /// Several of one source at one frequency.
+    Several(Vec<PathBuf>),
+}
+
+impl DataPaths {
+    /// All of them.
+    pub fn all(&self) -> &[PathBuf] {
+        match self {
+            Self::One(path) => core::slice::from_ref(path),
+            Self::Several(paths) => paths,
+        }
+    }
+
+    /// Their names in a line.
+    pub fn names(&self) -> String {
+        self.all().iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        let paths = self.all();
+        if paths.is_empty() {
+            let key = "length of data.visibilities.path";
+            return Err(FitError::range(key, 0, "1 file or more").into());
+        }
+        for (k, path) in paths.iter().enumerate() {
+            if paths[..k].contains(path) {
+                refuse!("data.visibilities.path: {} is given twice", path.display());
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Factors on all penalties, from which frames that are held out choose.
@@ -214,6 +253,7 @@ impl StaticImageFile {
         if self.image.starts.is_empty() {
             return Err(FitError::range("length of image.starts", 0, "1 image or more").into());
         }
+        self.data.visibilities.path.check()?;
         if self.loss.is_empty() {
             refuse!("loss is empty: there is nothing to fit; add a table [[loss]]");
         }
@@ -330,6 +370,9 @@ most_radius_uas = 40.0
                 "regulariser 0: epsilon is not for smoothness",
             ),
             ("\"closure-phases\"", "\"image\"", "loss 0: data = \"image\" is not for"),
+            ("path = \"a.uvfits\"", "path = []", "length of data.visibilities.path = 0"),
+            ("path = \"a.uvfits\"", "path = [\"a\", \"b\", \"a\"]", "a is given twice"),
+            ("path = \"a.uvfits\"", "path = 3", "a path or a list of paths"),
             ("most_radius_uas = 40.0", "most_radius_uas = 70.0", "at most 60, half of the field"),
             ("[ring]", "[hole]\nspin = 0.5\n[ring]", "unknown field `hole`"),
         ] {

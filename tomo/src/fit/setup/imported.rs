@@ -116,7 +116,6 @@ impl Measured {
         let sky = (data.scattering, data.variability);
         medium::correct((&mut observation, &file.loss), sky, name)?;
         let (times, of_rows) = frames_of(&mut observation);
-        check_folds("", file.strength.as_ref(), times.len())?;
         let gains = gains::priors(file.instrument.as_ref(), &file.loss, &observation)?;
         let (visibilities, sky) = (Some((observation, of_rows)), Some(file.image.grid()?));
         let varies = data.variability.is_some();
@@ -148,7 +147,6 @@ impl Measured {
         medium::correct((&mut observation, &losses), (data.scattering, None), name)?;
         medium::polarized_errors(&mut observation, data.variability, polarization);
         let (times, of_rows) = frames_of(&mut observation);
-        check_folds("polarization.", polarization.strength.as_ref(), times.len())?;
         let instrument = file.instrument.clone().map(|instrument| with_phases(instrument, file));
         let gains = match polarization.data {
             // They cancel.
@@ -183,7 +181,11 @@ fn with_phases(mut instrument: InstrumentSettings, file: &StaticImageFile) -> In
 }
 
 /// Refuses more parts than half of the frames.
-fn check_folds(table: &str, strength: Option<&StrengthSettings>, frames: usize) -> Result<()> {
+pub(super) fn check_folds(
+    table: &str,
+    strength: Option<&StrengthSettings>,
+    frames: usize,
+) -> Result<()> {
     let Some(strength) = strength.filter(|strength| frames < 2 * strength.folds) else {
         return Ok(());
     };

@@ -15,6 +15,8 @@ use kerrlight_vlbi::polarimetry::LeakageTable;
 pub struct Measured {
     /// Times of the frames, M.
     pub times: Vec<f64>,
+    /// The file that each frame of a static image is of, counted from 0.
+    pub files: Vec<usize>,
     /// The movie, where images are the data or are simulated.
     pub movie: Option<Frames<f64>>,
     /// Visibilities, with the frame of each row.
@@ -43,6 +45,7 @@ impl Measured {
     pub(super) fn empty() -> Self {
         Self {
             times: Vec::new(),
+            files: Vec::new(),
             movie: None,
             visibilities: None,
             varies: false,
@@ -72,6 +75,7 @@ impl Measured {
     pub fn without_truth(&self) -> Self {
         Self {
             times: self.times.clone(),
+            files: self.files.clone(),
             movie: self.movie.clone(),
             visibilities: self.visibilities.clone(),
             varies: self.varies,

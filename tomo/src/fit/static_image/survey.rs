@@ -15,6 +15,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// What is being solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -139,7 +140,7 @@ pub fn survey(
     let frames: Vec<usize> = (0..measured.times.len()).collect();
     let middle = file.strength.as_ref().map_or(1.0, |s| s.values[s.values.len() / 2]);
     let Some(starts) = search.starts(middle, &frames) else { return Ok(None) };
-    let Some(held) = search.hold_out(least(&starts), &measured.times) else { return Ok(None) };
+    let Some(held) = search.hold_out(least(&starts), measured) else { return Ok(None) };
     let allowed = allowed(&held);
     let strength = match held.is_empty() {
         true => middle,
@@ -213,16 +214,26 @@ pub(super) fn held(
 const GAP: f64 = 1.5;
 
 /// The part that each frame is held out with. Frames of a scan see the sky through nearly the same baselines, and would tell
-/// the fit what it is to predict: scans are held out whole, where there are two of them for each part.
-fn parts(times: &[f64], folds: usize) -> Vec<usize> {
-    let apart: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let least = apart.iter().copied().fold(f64::INFINITY, f64::min);
+/// the fit what it is to predict: scans are held out whole, where there are two of them for each part. So are frames of several files at
+/// one hour of UTC.
+fn parts(times: &[f64], files: &[usize], folds: usize) -> Vec<usize> {
+    let file = |frame: usize| files.get(frame).copied().unwrap_or(0);
+    let mut last: BTreeMap<usize, f64> = BTreeMap::new();
+    let own = times
+        .iter()
+        .enumerate()
+        .filter_map(|(frame, time)| last.insert(file(frame), *time).map(|before| time - before));
+    let least = own.fold(f64::INFINITY, f64::min);
     let mut scans = vec![0; times.len()];
-    for (frame, apart) in apart.iter().enumerate() {
-        scans[frame + 1] = scans[frame] + usize::from(*apart > GAP * least);
+    for (frame, pair) in times.windows(2).enumerate() {
+        scans[frame + 1] = scans[frame] + usize::from(pair[1] - pair[0] > GAP * least);
     }
     let count = scans.last().map_or(0, |last| last + 1);
-    let of = |frame: usize| if count >= 2 * folds { scans[frame] } else { frame };
+    let of = |frame: usize| match last.len() {
+        _ if count >= 2 * folds => scans[frame],
+        2.. => ((times[frame] - times[0]) / least) as usize,
+        _ => frame,
+    };
     (0..times.len()).map(|frame| of(frame) % folds).collect()
 }
 
@@ -287,10 +298,11 @@ impl Search<'_> {
     }
 
     /// The loss of frames that were not fitted, for each strength; nothing where one is given.
-    fn hold_out(&self, start: usize, times: &[f64]) -> Option<Vec<Held>> {
+    fn hold_out(&self, start: usize, measured: &Measured) -> Option<Vec<Held>> {
         let Some(settings) = &self.file.strength else { return Some(Vec::new()) };
         let folds = settings.folds;
-        let parts = parts(times, folds);
+        let times = &measured.times;
+        let parts = parts(times, &measured.files, folds);
         let part = |fold: usize, seen: bool| -> Vec<usize> {
             (0..times.len()).filter(|frame| (parts[*frame] != fold) == seen).collect()
         };
@@ -381,8 +393,18 @@ mod tests {
     #[test]
     fn exact_scans_are_held_out_whole() {
         let times = [0.0, 1.0, 2.0, 9.0, 10.0, 20.0, 21.0, 30.0];
-        assert_eq!(parts(&times, 2), [0, 0, 0, 1, 1, 0, 0, 1]);
-        assert_eq!(parts(&times, 3), [0, 1, 2, 0, 1, 2, 0, 1], "too few scans: frame by frame");
-        assert_eq!(parts(&[0.0, 5.0, 10.0, 15.0], 2), [0, 1, 0, 1], "frames without a gap");
+        assert_eq!(parts(&times, &[], 2), [0, 0, 0, 1, 1, 0, 0, 1]);
+        assert_eq!(
+            parts(&times, &[], 3),
+            [0, 1, 2, 0, 1, 2, 0, 1],
+            "too few scans: frame by frame"
+        );
+        assert_eq!(parts(&[0.0, 5.0, 10.0, 15.0], &[], 2), [0, 1, 0, 1], "frames without a gap");
+        // Two bands of one night a second apart, with scans and without gaps.
+        let both = [0.0, 1.0, 10.0, 11.0, 40.0, 41.0, 50.0, 51.0, 80.0, 81.0, 120.0, 121.0];
+        let bands = [0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1];
+        assert_eq!(parts(&both, &bands, 2), [0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 1, 1]);
+        let steady = [0.0, 1.0, 10.0, 11.0, 20.0, 21.0];
+        assert_eq!(parts(&steady, &bands[..6], 2), [0, 0, 1, 1, 0, 0]);
     }
 }

@@ -40,6 +40,37 @@ fn exact_north_comes_first_and_east_is_left() {
     assert!(read(&file(-2e-9)).unwrap_err().to_string().contains("square"));
 }
 
+/// Cards as `eht-imaging` names them (its `save_im_fits`), and the same pixels and Stokes parameters read back.
+#[test]
+fn code_written_images_have_the_cards_of_eht_imaging() {
+    use crate::earth::SourcePosition;
+    use crate::observation::{Basis, Measured, Observation, Row};
+    let mut seen = Observation::empty(Basis::Stokes);
+    (seen.source, seen.mjd) = ("M87".to_owned(), Some(57853));
+    (seen.position, seen.frequency_hz) = (Some(SourcePosition::M87), Some(229.1e9));
+    let datum = Measured { visibility: crate::Complex64::new(1.0, 0.0), noise_sigma: 0.1 };
+    seen.rows.push(Row::total_intensity(1.0, [0, 1], [0.0; 2], datum));
+    let grid = ImageGrid::new(3, 2, 3e-10).unwrap();
+    let [q, u] = [0.1, -0.2].map(|part| PIXELS.map(|x| part * x));
+    let bytes = write(&[&PIXELS, &q, &u], grid, &seen);
+    let movie = read(&bytes).unwrap();
+    assert_eq!((movie.i.grid, &movie.i.pixels[..]), (grid, &PIXELS[..]));
+    assert_eq!(movie.polarized, [Some(q.to_vec()), Some(u.to_vec()), None]);
+    let text = String::from_utf8_lossy(&bytes);
+    for card in [
+        "OBJECT  = 'M87     '",
+        "BUNIT   = 'JY/PIXEL'",
+        "FREQ    =      229100000000.0",
+        "MJD     =              57853.0",
+        "OBSRA   =   187.70575",
+        "OBSDEC  =   12.391123",
+        "CDELT1  = -5.72957",
+        "STOKES  = 'U       '",
+    ] {
+        assert!(text.contains(card), "{card}");
+    }
+}
+
 /// Cards that turn, shift or multiply the image, each refused by its name; the same with harmless values is read.
 #[test]
 fn exact_cards_that_are_not_read_are_refused() {

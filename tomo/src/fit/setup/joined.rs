@@ -1,0 +1,192 @@
+//! Data of several files as those of one static image.
+
+use super::imported::check_folds;
+use super::leakage::LeakageUnknown;
+use super::{Measured, Result};
+use crate::fit::settings::{StrengthSettings, refuse};
+use kerrlight_vlbi::gains::GainPriors;
+use kerrlight_vlbi::observation::{Observation, Row};
+use kerrlight_vlbi::polarimetry::SharedLeakage;
+
+/// Degrees within which two positions are one.
+const SAME_DEG: f64 = 0.01;
+
+/// Frequencies may differ by this part: an image changes with frequency.
+const SAME_FREQUENCY: f64 = 0.05;
+
+impl Measured {
+    /// Data of several files, each with what it is called in messages, as those of one static image, in order of the hour of UTC. Frames
+    /// and stations of a file are its own: no gain is shared between files, and nothing closes across them. From the second
+    /// file on ` (2)`, ` (3)` … stand behind the names of stations. `table` is that of the strength, for messages.
+    ///
+    /// # Errors
+    /// If there are none, files contradict each other, or there are too few frames for the strength.
+    pub fn joined(
+        parts: Vec<(String, Self)>,
+        (table, strength): (&str, Option<&StrengthSettings>),
+    ) -> Result<Self> {
+        let mut parts = parts.into_iter();
+        let Some((first, mut all)) = parts.next() else {
+            refuse!("data.visibilities.path = [] is not allowed: one file or more");
+        };
+        all.files = vec![0; all.times.len()];
+        for (file, (name, part)) in parts.enumerate() {
+            all.join((&first, &name), part, file + 1)?;
+        }
+        check_folds(table, strength, all.times.len())?;
+        all.in_order();
+        Ok(all)
+    }
+
+    fn join(&mut self, names: (&str, &str), part: Self, file: usize) -> Result<()> {
+        let (Some((seen, of_rows)), Some((other, of_others))) =
+            (&mut self.visibilities, part.visibilities)
+        else {
+            return Ok(());
+        };
+        if let Some(why) = contradiction(seen, &other) {
+            refuse!("{} and {} cannot be one image: {why}", names.0, names.1);
+        }
+        let (stations, frames) = (seen.stations.len() as u16, self.times.len());
+        seen.stations.extend(other.stations.into_iter().map(|mut station| {
+            station.name = format!("{} ({})", station.name, file + 1);
+            station
+        }));
+        let own = |row: Row| Row { stations: row.stations.map(|k| k + stations), ..row };
+        seen.rows.extend(other.rows.into_iter().map(own));
+        of_rows.extend(of_others.into_iter().map(|frame| frame + frames));
+        self.files.extend(part.times.iter().map(|_| file));
+        self.times.extend(part.times);
+        if let (Some(GainPriors { amplitude_sigma, .. }), Some(more)) =
+            (&mut self.gains, part.gains)
+        {
+            amplitude_sigma.extend(more.amplitude_sigma);
+        }
+        if let Some(LeakageUnknown { shared, .. }) = &mut self.leakage {
+            *shared = SharedLeakage::none(seen.stations.len());
+        }
+        Ok(())
+    }
+
+    /// Puts frames in order of time, those of one time in the order of their files.
+    fn in_order(&mut self) {
+        let mut order: Vec<usize> = (0..self.times.len()).collect();
+        order.sort_by(|a, b| self.times[*a].total_cmp(&self.times[*b]));
+        let mut place = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(new, old)| place[*old] = new);
+        self.times = order.iter().map(|old| self.times[*old]).collect();
+        self.files = order.iter().map(|old| self.files[*old]).collect();
+        let Some((seen, of_rows)) = &mut self.visibilities else { return };
+        let mut rows: Vec<(usize, Row)> =
+            of_rows.iter().zip(&seen.rows).map(|(frame, row)| (place[*frame], *row)).collect();
+        rows.sort_by_key(|(frame, _)| *frame);
+        (*of_rows, seen.rows) = rows.into_iter().unzip();
+    }
+}
+
+/// The name of a station of joined data without what [`Measured::joined`] has put behind it, and which file it is of.
+pub fn station_of_file(name: &str) -> (&str, usize) {
+    let split = name.rsplit_once(" (").and_then(|(own, file)| {
+        let file: usize = file.strip_suffix(')')?.parse().ok()?;
+        Some((own, file.checked_sub(1)?))
+    });
+    split.unwrap_or((name, 0))
+}
+
+/// Why two observations are not of one image.
+fn contradiction(a: &Observation, b: &Observation) -> Option<String> {
+    if a.basis != b.basis {
+        return Some("one has products of feeds, the other Stokes parameters".to_owned());
+    }
+    match (a.position, b.position) {
+        (Some(here), Some(there)) => {
+            let turn = (here.ra_hours - there.ra_hours + 12.0).rem_euclid(24.0) - 12.0;
+            let east = 15.0 * turn * here.dec_deg.to_radians().cos();
+            if east.hypot(here.dec_deg - there.dec_deg) > SAME_DEG {
+                let place = |o: &Observation, at: kerrlight_vlbi::earth::SourcePosition| {
+                    format!("{} at {:.4} h, {:.4}°", o.source.trim(), at.ra_hours, at.dec_deg)
+                };
+                return Some(format!("they observe {} and {}", place(a, here), place(b, there)));
+            }
+        }
+        _ if !a.source.trim().eq_ignore_ascii_case(b.source.trim()) => {
+            return Some(format!("they observe {} and {}", a.source.trim(), b.source.trim()));
+        }
+        _ => {}
+    }
+    let mean = |o: &Observation| {
+        let all: Option<Vec<f64>> = o.rows.iter().map(|row| o.frequency_of(row)).collect();
+        all.map(|all| all.iter().sum::<f64>() / all.len() as f64)
+    };
+    let (here, there) = (mean(a)?, mean(b)?);
+    ((there / here).ln().abs() > SAME_FREQUENCY)
+        .then(|| format!("they are of {:.1} and {:.1} GHz", here * 1e-9, there * 1e-9))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::setup::frames_of;
+    use kerrlight_vlbi::Complex64;
+    use kerrlight_vlbi::array::Station;
+    use kerrlight_vlbi::earth::SourcePosition;
+    use kerrlight_vlbi::observation::{Basis, Measured as Datum};
+    use kerrlight_vlbi::products::{ClosureKind, ClosureSet};
+
+    /// Three stations at two times, with gains of this prior.
+    fn file(frequency_hz: f64, position: SourcePosition, sigma: f64) -> Measured {
+        let mut seen = Observation::empty(Basis::Stokes);
+        seen.stations = ["A", "B", "C"].map(Station::named).to_vec();
+        (seen.frequency_hz, seen.position) = (Some(frequency_hz), Some(position));
+        let i = Datum { visibility: Complex64::new(1.0, 0.0), noise_sigma: 0.1 };
+        for time_h in [1.0, 2.0] {
+            for stations in [[0, 1], [1, 2], [0, 2]] {
+                seen.rows.push(Row::total_intensity(time_h, stations, [1e9, 0.0], i));
+            }
+        }
+        let (times, of_rows) = frames_of(&mut seen);
+        let gains = Some(GainPriors { free_phases: false, amplitude_sigma: vec![sigma; 3] });
+        Measured { times, visibilities: Some((seen, of_rows)), gains, ..Measured::empty() }
+    }
+
+    /// Two bands of one night: as many closure phases as in both, none across, and gains of a file with its own priors.
+    #[test]
+    fn exact_files_share_neither_closures_nor_gains() {
+        let of = |hz, sigma| file(hz, SourcePosition::M87, sigma);
+        let parts = vec![("lo".to_owned(), of(227e9, 0.1)), ("hi".to_owned(), of(229e9, 0.2))];
+        let all = Measured::joined(parts, ("", None)).unwrap();
+        assert_eq!(
+            (&all.times[..], &all.files[..]),
+            (&[1.0, 1.0, 2.0, 2.0][..], &[0, 1, 0, 1][..])
+        );
+        assert_eq!(all.gains.as_ref().unwrap().amplitude_sigma, [0.1, 0.1, 0.1, 0.2, 0.2, 0.2]);
+        let (seen, of_rows) = all.visibilities.as_ref().unwrap();
+        assert_eq!(of_rows[..], [0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3]);
+        let sets = ClosureSet::of(seen, ClosureKind::Phase, 0.0);
+        let closures: Vec<_> = sets.iter().flat_map(|set| &set.closures).collect();
+        assert_eq!(closures.len(), 4);
+        for closure in closures {
+            let of = closure.legs.iter().map(|leg| {
+                let name = &seen.stations[usize::from(seen.rows[leg.visibility].stations[0])].name;
+                station_of_file(name).1
+            });
+            let of: Vec<usize> = of.collect();
+            assert!(of.iter().all(|file| *file == of[0]), "{of:?}");
+        }
+        assert_eq!(station_of_file(&seen.stations[4].name), ("B", 1));
+        assert_eq!(station_of_file("LMT (x)"), ("LMT (x)", 0));
+    }
+
+    #[test]
+    fn exact_files_of_other_sources_and_frequencies_are_refused() {
+        let m87 = || ("a".to_owned(), file(229e9, SourcePosition::M87, 0.1));
+        for (other, says) in [
+            (file(229e9, SourcePosition::SGR_A, 0.1), "a and b cannot be one image: they observe"),
+            (file(86e9, SourcePosition::M87, 0.1), "they are of 229.0 and 86.0 GHz"),
+        ] {
+            let error = Measured::joined(vec![m87(), ("b".to_owned(), other)], ("", None));
+            let error = error.err().unwrap().to_string();
+            assert!(error.contains(says), "{error}");
+        }
+    }
+}
