@@ -81,6 +81,12 @@ impl Estimate<'_> {
                 "# The fit's pixels are sums over chords (region.nodes = equal-mino-time), this scene's are integrals.\n"
             }
         };
+        let angle = self.file.observer.position_angle_deg.value();
+        if angle != 0.0 {
+            text += &format!(
+                "# The projected spin points upwards here; in the fit's images it is at {angle} degrees east of north.\n"
+            );
+        }
         if self.file.effects.absorption.is_some() {
             text += "# The medium of the fit's effects.absorption is not part of scenes: this one is without it.\n";
         }
