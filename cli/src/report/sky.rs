@@ -238,7 +238,9 @@ mod tests {
     #[test]
     fn exact_ticks_stand_where_there_is_light() {
         let n = 32;
-        let light: Vec<f64> = (0..n * n).map(|k| if k % n < n / 2 { 1.0 } else { 0.01 }).collect();
+        // Between pixels light is interpolated: the last lit one is a pixel away from the middle.
+        let lit = |k: usize| if k % n < n / 2 - 1 { 1.0 } else { 0.01 };
+        let light: Vec<f64> = (0..n * n).map(lit).collect();
         let panel = |polarized, beam_uas| SkyPanel {
             name: "a sky",
             image: light.clone(),

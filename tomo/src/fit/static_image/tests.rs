@@ -315,6 +315,8 @@ fn exact_the_search_can_be_stopped() {
     assert!(survey(&file, &measured(&file, 4), &[], &|_, _| false).unwrap().is_none());
     let text = format!("{SETTINGS}[strength]\nvalues = [0.5, 1.0]\nfolds = 9\n");
     let file = StaticImageFile::parse(&text).unwrap();
-    let error = Measured::of_static(&file, observed(4), "data").err().unwrap().to_string();
+    let data = Measured::of_static(&file, observed(4), "data").unwrap();
+    let joined = Measured::joined(vec![("data".to_owned(), data)], ("", file.strength.as_ref()));
+    let error = joined.err().unwrap().to_string();
     assert!(error.contains("strength.folds = 9 is not allowed: 8 at most"), "{error}");
 }

@@ -60,7 +60,7 @@ fn code_written_images_have_the_cards_of_eht_imaging() {
     for card in [
         "OBJECT  = 'M87     '",
         "BUNIT   = 'JY/PIXEL'",
-        "FREQ    =      229100000000.0",
+        "FREQ    =       229100000000.0",
         "MJD     =              57853.0",
         "OBSRA   =   187.70575",
         "OBSDEC  =   12.391123",
