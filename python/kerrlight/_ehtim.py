@@ -54,6 +54,8 @@ def read(obs: Any) -> Observation:
         )
         for row in obs.tarr
     )
+    for name in np.setdiff1d(np.union1d(data["t1"], data["t2"]), [station.name for station in array]):
+        raise ValueError(f"station {name} of the data is not in tarr")
     return Observation(
         time=_hours(obs),
         stations=np.stack([data["t1"], data["t2"]], axis=-1).astype(str),
@@ -67,7 +69,7 @@ def read(obs: Any) -> Observation:
         source=str(obs.source),
         ra_hours=float(obs.ra),
         dec_deg=float(obs.dec),
-        mjd=int(obs.mjd),
+        mjd=obs.mjd,
         frequency_hz=float(obs.rf),
         bandwidth_hz=float(obs.bw),
         history=("from eht-imaging", *(f"{name} = False" for name in CALIBRATIONS if not getattr(obs, name, True))),

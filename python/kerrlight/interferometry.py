@@ -19,6 +19,15 @@ __all__ = ["Closures", "Observation", "Station"]
 
 _ENDINGS = {".uvfits": "uvfits", ".fits": "uvfits", ".txt": "obs-text", ".csv": "csv"}
 _FORMATS = ("uvfits", "obs-text", "csv", "eht-csv", "eht-txt")
+_RANGES = {
+    "time": (-1e6, 1e6),
+    "uv": (-1e17, 1e17),
+    "integration": (0.0, 1e9),
+    "opacity": (0.0, 1e6),
+    "mjd": (0, 1e6),
+    "frequency_hz": (1e6, 1e15),
+    "bandwidth_hz": (0.0, 1e15),
+}
 PRODUCTS = {False: ("", "q", "u", "v"), True: ("rr", "ll", "rl", "lr")}
 
 
@@ -119,10 +128,17 @@ class Observation:
             "integration": _column("integration", _or_zero(self.integration, (count,)), (count,)),
             "opacity": _column("opacity", _or_zero(self.opacity, (count, 2)), (count, 2)),
         }
-        if not np.isfinite(columns["time"]).all():
-            raise ValueError("time has an element that is no finite number")
         if (columns["sigmas"] < 0).any():
             raise ValueError(f"sigmas = {columns['sigmas'].min()} is not allowed: 0 or above, or NaN")
+        for name, (least, most) in _RANGES.items():
+            _check_range(name, columns.get(name, getattr(self, name, None)), least, most)
+        for frequency, bandwidth in self.channels:
+            _check_range("channels: frequency", frequency, *_RANGES["frequency_hz"])
+            _check_range("channels: bandwidth", bandwidth, *_RANGES["bandwidth_hz"])
+        if self.mjd is not None and self.mjd != int(self.mjd):
+            raise ValueError(f"mjd = {self.mjd} is not allowed: a whole number, as hours count from its 0 h UTC")
+        for first in names[names[:, 0] == names[:, 1], 0]:
+            raise ValueError(f"stations has a baseline of {first} with itself")
         for name, column in columns.items():
             object.__setattr__(self, name, _frozen(column))
         object.__setattr__(self, "stations", _frozen(names))
@@ -130,6 +146,8 @@ class Observation:
         products = np.ascontiguousarray(self.products, dtype=np.complex128)
         if products.shape != (count, 4):
             raise ValueError(f"products have the shape {products.shape}, not {(count, 4)}")
+        if not np.isfinite(products[~np.isnan(columns["sigmas"])]).all():
+            raise ValueError("products has an element that is no finite number, though sigmas has one")
         object.__setattr__(self, "products", _frozen(products))
         channel = _column("channel", _or_zero(self.channel, (count,)), (count,))
         if (channel != np.floor(channel)).any():
@@ -152,7 +170,7 @@ class Observation:
         metadata = {
             "source": self.source,
             "position": position,
-            "mjd": self.mjd,
+            "mjd": None if self.mjd is None else int(self.mjd),
             "frequency_hz": self.frequency_hz,
             "bandwidth_hz": self.bandwidth_hz,
             "channels": list(self.channels),
@@ -392,6 +410,13 @@ def _frozen(column: Any) -> Any:
     column = np.array(column, order="C")
     column.setflags(write=False)
     return column
+
+
+def _check_range(name: str, values: Any, least: float, most: float) -> None:
+    array = np.asarray([] if values is None else values, dtype=np.float64)
+    outside = array[~((array >= least) & (array <= most))]
+    if outside.size:
+        raise ValueError(f"{name} = {outside.flat[0]:g} is not allowed: [{least:g}, {most:g}]")
 
 
 def _or_zero(column: Any, shape: tuple[int, ...]) -> Any:

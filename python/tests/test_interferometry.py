@@ -184,6 +184,34 @@ def test_from_ehtim_by_its_columns():
     assert len(found.closure_phases()) == 6
 
 
+@pytest.mark.parametrize(
+    ("of", "value", "words"),
+    [
+        ("u", np.nan, "uv = nan"),
+        ("time", 1e9, r"time = 1e\+09"),
+        ("tint", -5.0, "integration = -5"),
+        ("tau1", np.inf, "opacity = inf"),
+        ("t1", "XX", "station XX of the data is not in tarr"),
+        ("rf", 230.0, "frequency_hz = 230"),
+        ("bw", -1.0, "bandwidth_hz = -1"),
+        ("mjd", 57850.5, "mjd = 57850.5 is not allowed: a whole number"),
+        ("mjd", 2457850, r"mjd = 2.45785e\+06"),
+    ],
+)
+def test_implausible_fields_are_refused(of, value, words):
+    obs = fake_obsdata(observation())
+    if of in obs.data.dtype.names:
+        obs.data[of][1] = value
+    else:
+        setattr(obs, of, value)
+    with pytest.raises(ValueError, match=words):
+        Observation.from_ehtim(obs)
+    with pytest.raises(ValueError, match="baseline of A with itself"):
+        Observation.of_stokes_i([1.0], [["A", "A"]], [[1.0, 2.0]], [1.0], [0.1])
+    with pytest.raises(ValueError, match="products has an element"):
+        Observation.of_stokes_i([1.0], [["A", "B"]], [[1.0, 2.0]], [np.nan], [0.1])
+
+
 @pytest.mark.parametrize("circular", [False, True])
 def test_to_ehtim_and_back(circular, tmp_path):
     ehtim = pytest.importorskip("ehtim")

@@ -68,6 +68,7 @@ fn sky(header: &Header<'_>) -> Result<(), FileError> {
             return Err(header.error(&keyword, "deg"));
         }
     }
+    header.check_equinox()?;
     for (keyword, upright) in [("LONPOLE", 180.0), ("PV2_1", 0.0), ("PV2_2", 0.0)] {
         if header.number(keyword)?.is_some_and(|value| value != upright) {
             return Err(header.error(keyword, format!("{upright}: the plane of the sky, upright")));

@@ -120,6 +120,25 @@ impl<'a> Header<'a> {
         }
     }
 
+    /// Refuses coordinates of another equinox than 2000, whose north is another.
+    pub fn check_equinox(&self) -> Result<(), FileError> {
+        for keyword in ["EQUINOX", "EPOCH"] {
+            let value = match self.text(keyword) {
+                Some(text) if text.is_empty() => None,
+                Some(text) => Some(text.trim_start_matches(['J', 'j']).parse().unwrap_or(f64::NAN)),
+                None => self.number(keyword)?,
+            };
+            // Writers that do not know it write 0.
+            if value.is_some_and(|equinox: f64| equinox != 2000.0 && equinox != 0.0) {
+                return Err(self.error(keyword, "2000: other equinoxes are not converted"));
+            }
+        }
+        if self.text("RADESYS").is_some_and(|system| system.starts_with("FK4")) {
+            return Err(self.error("RADESYS", "ICRS or FK5: FK4 is not converted"));
+        }
+        Ok(())
+    }
+
     /// Lengths of the axes; the first one of random groups is 0.
     pub fn axes(&self) -> Result<Vec<usize>, FileError> {
         let axes = self.count("NAXIS", 0, 999)?;

@@ -89,6 +89,7 @@ fn exact_cards_that_are_not_read_are_refused() {
         ("CRPIX2", -1.0, 2.0),
         ("LONPOLE", 90.0, 180.0),
         ("PV2_1", 0.1, 0.0),
+        ("EQUINOX", 1950.0, 2000.0),
     ] {
         let message = refused(|cards| {
             cards.number(keyword, wrong);

@@ -115,20 +115,7 @@ pub fn check_header(header: &Header<'_>) -> Result<(), FileError> {
     {
         return Err(header.error("BUNIT", "JY"));
     }
-    for keyword in ["EQUINOX", "EPOCH"] {
-        let value = match header.text(keyword) {
-            Some(text) if text.is_empty() => None,
-            Some(text) => Some(text.trim_start_matches(['J', 'j']).parse().unwrap_or(f64::NAN)),
-            None => header.number(keyword)?,
-        };
-        // Writers that do not know it write 0.
-        if value.is_some_and(|equinox: f64| equinox != 2000.0 && equinox != 0.0) {
-            return Err(header.error(keyword, "2000: other equinoxes are not converted"));
-        }
-    }
-    if header.text("RADESYS").is_some_and(|system| system.starts_with("FK4")) {
-        return Err(header.error("RADESYS", "ICRS or FK5: FK4 is not converted"));
-    }
+    header.check_equinox()?;
     for k in 2..=9 {
         let name = header.text(&format!("CTYPE{k}")).unwrap_or_default();
         let keyword = format!("CROTA{k}");
