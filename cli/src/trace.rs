@@ -40,19 +40,6 @@ pub struct Trace {
     /// the end (from infinity: without the points at infinity)
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100_000))]
     samples: u32,
-    /// Place the samples at equal path lengths inside a sphere of this radius instead
-    #[arg(long, value_name = "RADIUS", requires = "samples", conflicts_with = "between")]
-    within: Option<f64>,
-    /// Place the samples at Gauss-Legendre nodes in Mino time on each piece of the ray
-    /// between two radii instead
-    #[arg(long, num_args = 2, value_names = ["FROM", "TO"], requires = "samples")]
-    between: Option<Vec<f64>>,
-    /// Also write covariant momenta (p_r, p_theta; p_t = -1 and p_phi = lambda never change)
-    #[arg(long)]
-    momentum: bool,
-    /// Also write each sample's weight in an integral over the affine parameter
-    #[arg(long)]
-    weights: bool,
     /// Also write each ray's largest estimated errors: of r (relative), theta, phi and delay
     #[arg(long)]
     errors: bool,
@@ -93,9 +80,6 @@ const NAMES: [&str; 5] = ["spin", RADIANS, DEGREES, "alpha", "beta"];
 const RADIANS: &str = "inclination_rad";
 const DEGREES: &str = "inclination_deg";
 
-/// Spheres beyond have path lengths in which steps near the hole are lost, M.
-const FARTHEST: f64 = 1e9;
-
 impl Trace {
     /// Traces all rays of the table.
     pub fn run(&self) -> anyhow::Result<Answer> {
@@ -111,9 +95,6 @@ impl Trace {
                 "--observer {} is not allowed: `infinity` or a radius above 2 (M)",
                 self.observer
             );
-        }
-        if let Some(radius) = self.within.filter(|radius| !(1.0..=FARTHEST).contains(radius)) {
-            bail!("--within {radius} is not allowed: 1 to {FARTHEST:e} (M)");
         }
         let ending = self.output.as_deref().and_then(|path| path.extension());
         let npz = ending.is_some_and(|ending| ending.eq_ignore_ascii_case("npz"));
@@ -148,19 +129,13 @@ impl Trace {
 
     fn request(&self) -> Request {
         let points = self.samples as usize;
-        let samples = match (&self.between, self.within) {
-            _ if points == 0 => Placement::None,
-            (Some(radii), _) => Placement::GaussLegendre { points, from: radii[0], to: radii[1] },
-            (None, Some(radius)) => Placement::PathLength { points, radius },
-            (None, None) => Placement::MinoTime(points),
-        };
         Request {
             crossings: usize::from(self.crossings),
-            samples,
+            samples: if points == 0 { Placement::None } else { Placement::MinoTime(points) },
             azimuth: true,
             time: true,
-            momentum: self.momentum,
-            weight: self.weights,
+            momentum: false,
+            weight: false,
             uncertainty: self.errors,
         }
     }
@@ -240,9 +215,7 @@ impl Trace {
         let crossings = points(traced, usize::from(self.crossings), "", |b| &b.crossings);
         groups.push(crossings.into_iter().filter(|column| column.name() != "theta").collect());
         if self.samples > 0 {
-            let pieces = if self.between.is_some() { 2 } else { 1 };
-            let width = self.samples as usize * pieces;
-            groups.push(points(traced, width, "sample_", |b| &b.samples));
+            groups.push(points(traced, self.samples as usize, "sample_", |b| &b.samples));
         }
         if self.errors {
             let error = |name: &str, value: &dyn Fn(&Uncertainty) -> f64| {
@@ -272,8 +245,7 @@ impl Traced {
     }
 }
 
-/// The columns of each ray's first `width` points, filled up with NaN; those that were not
-/// requested are left out.
+/// The columns of each ray's first `width` points, filled up with NaN.
 fn points(
     traced: &Traced,
     width: usize,
@@ -289,22 +261,13 @@ fn points(
         });
         Column::Blocks(format!("{prefix}{name}"), rows.collect())
     };
-    let mut columns = vec![
+    vec![
         block("mino", &|p, at| p.mino_time[at].to_vec()),
         block("r", &|p, at| p.radius[at].to_vec()),
         block("theta", &|p, at| p.theta[at].to_vec()),
         block("phi", &|p, at| p.azimuth[at].to_vec()),
         block("delay", &|p, at| p.delay[at].to_vec()),
-    ];
-    let has = |wanted: &dyn Fn(&Points) -> bool| traced.tables.iter().any(|t| wanted(of(t)));
-    if has(&|p| !p.momentum.is_empty()) {
-        columns.push(block("p_r", &|p, at| p.momentum[at].iter().map(|m| m[1]).collect()));
-        columns.push(block("p_theta", &|p, at| p.momentum[at].iter().map(|m| m[2]).collect()));
-    }
-    if has(&|p| !p.weight.is_empty()) {
-        columns.push(block("weight", &|p, at| p.weight[at].to_vec()));
-    }
-    columns
+    ]
 }
 
 /// Counts the lines up to each record, skipped ones included, which the reader's own count
