@@ -7,6 +7,7 @@ use crate::support::{binary, fail, kerrlight, root, succeed};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::noise::add_thermal_noise;
+use kerrlight_vlbi::products::{ClosureKind, ClosureSet};
 use std::path::Path;
 
 /// Stations, times and errors of a night of M87* with gains of 10 % and random phases.
@@ -94,10 +95,71 @@ fn exact_a_ring_is_found_at_once() {
     succeed(path, &["fit", "--resume", "run"]);
     assert_eq!(std::fs::read(run.join("image.npz")).unwrap(), first);
     assert!(succeed(path, &["inspect", "run"]).contains("static image of 32 x 32 pixels"));
+    for words in ["Closure phase ", "χ² of amplitudes is the least", "a circle is the beam"] {
+        assert!(page.contains(words), "{words}");
+    }
+    let sky = files::read_fits_image(&std::fs::read(run.join("image.fits")).unwrap()).unwrap();
+    for (a, b) in sky.i.pixels.iter().zip(&pixels) {
+        assert!((a - b).abs() < 1e-6 * pixels.iter().copied().fold(0.0, f64::max));
+    }
     // What it has found can be observed again.
     let again =
         SEEN.replace("image.csv --fov-uas 120", "run/image.npz").replace("data.uv", "again.uv");
     succeed(path, &again.split(' ').collect::<Vec<_>>());
+}
+
+/// Two bands of a night with gains of their own make one image: all closure phases of both, the ring within three errors, and a
+/// table of gains for each. Other sources and frequencies are refused by name.
+#[test]
+fn exact_two_bands_make_one_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    observed(path);
+    let low = SEEN.replace("229.1", "227.1").replace("--seed 3 -o data", "--seed 4 -o low");
+    succeed(path, &low.split(' ').collect::<Vec<_>>());
+    let words = ["--data", "low.uvfits", "data.uvfits", "--model", "image", "-o", "both"];
+    let output = kerrlight(path, &quick(&words));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("read: low.uvfits: M87*") && said.contains("read: data.uvfits: M87*"));
+    let found = results(&path.join("both"));
+    let ring = number(&found, "ring_diameter_uas");
+    let error = number(&found, "ring_diameter_uas_error");
+    assert!((ring - 42.0).abs() < 3.0 * error + 1.0, "{ring} ± {error}");
+    let count = |file: &str| {
+        let seen = files::decode(&std::fs::read(path.join(file)).unwrap()).unwrap().1;
+        ClosureSet::of(&seen, ClosureKind::Phase, 0.0)
+            .iter()
+            .map(|s| s.closures.len())
+            .sum::<usize>()
+    };
+    let possible = found["closures"][0]["possible"].as_u64().unwrap() as usize;
+    assert_eq!(possible, count("low.uvfits") + count("data.uvfits"));
+    for (table, own) in [("gains.csv", "ALMA"), ("gains_2.csv", "ALMA")] {
+        let text = std::fs::read_to_string(path.join("both").join(table)).unwrap();
+        assert!(text.contains(own) && !text.contains("(2)"), "{table}: {text}");
+    }
+    let page = std::fs::read_to_string(path.join("both/report.html")).unwrap();
+    assert!(page.contains("nothing closes across them") && page.contains("ALMA (2)"));
+    let other = SEEN.replace("m87 --mjd", "sgra --mjd").replace("-o data", "-o other");
+    succeed(path, &other.split(' ').collect::<Vec<_>>());
+    let far = SEEN.replace("229.1", "86.0").replace("-o data", "-o far");
+    succeed(path, &far.split(' ').collect::<Vec<_>>());
+    for (second, says) in [
+        ("other.uvfits", "cannot be one image: they observe"),
+        ("far.uvfits", "they are of 229.1 and 86.0 GHz"),
+        ("data.uvfits", "is given twice"),
+    ] {
+        let words = ["fit", "--data", "data.uvfits", second, "--model", "image", "-o", "none"];
+        let error = fail(path, &words);
+        assert!(error.contains(says) && !path.join("none").exists(), "{second}: {error}");
+    }
+    for words in
+        [&["other.uvfits", "data.uvfits"][..], &["low.uvfits", "data.uvfits", "--model", "volume"]]
+    {
+        let error = fail(path, &[&["fit", "--data"], words, &["-o", "none"]].concat());
+        assert!(error.contains("give --model image"), "{error}");
+    }
 }
 
 #[test]

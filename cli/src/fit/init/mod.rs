@@ -142,7 +142,11 @@ fn of_files(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Resu
     }
     let first = observations.first().context("no file of data")?;
     let source = known(first);
-    if model != Some(Model::Image) && source.is_none_or(|source| source.varies) {
+    let is_image = match model {
+        Some(model) => model == Model::Image,
+        None => source.is_some_and(|source| !source.varies),
+    };
+    if !is_image {
         bail!("several files are fitted as one image that does not change: give --model image");
     }
     let name = &called(first, source);

@@ -120,7 +120,7 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
     };
     found.images()?;
     let mut results = found.results();
-    results["ring_sentence"] = words::ring(&found.survey, &found.shapes).into();
+    results["ring_sentence"] = found.ring_sentence().into();
     folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
     found.report(&evidence, &results)?;
     let files = ["report.html", "results.json", "image.npz", "image.fits", "image.png"];
@@ -285,8 +285,7 @@ impl Found<'_> {
     /// The verdict and the ring in a line.
     fn worth(&self) -> String {
         let polarized = self.polarized.as_ref().map(Polarized::sentence);
-        let draws = words::draws(&self.survey, &self.file.loss);
-        let all = draws.into_iter().chain(words::ring(&self.survey, &self.shapes)).chain(polarized);
+        let all = self.ring_sentence().into_iter().chain(polarized);
         self.judged.worth() + &all.map(|sentence| format!("\n{sentence}")).collect::<String>()
     }
 }

@@ -3,7 +3,6 @@
 use super::Found;
 use super::numbers::{RING, error, with_error};
 use super::polarized::Polarized;
-use super::words;
 use crate::fit::results::gains::Gains;
 use crate::fit::results::leakage::Leakage;
 use crate::fit::results::page::settings;
@@ -77,8 +76,7 @@ impl Found<'_> {
         let report = Report {
             title: self.file.title.clone(),
             notice: Some(verdict::notice(&self.judged)),
-            summary: words::ring(&self.survey, &self.shapes)
-                .into_iter()
+            summary: (self.ring_sentence().into_iter())
                 .chain(self.polarized.as_ref().map(Polarized::sentence))
                 .collect(),
             parts: self.parts(),

@@ -1,19 +1,26 @@
 //! What is said of a static image: data, model, priors, and what may be concluded.
 
 use super::Found;
-use super::numbers::{RING, chi2_of_draws, error, with_error};
+use super::numbers::{RING, error, with_error};
 use super::polarized::Polarized;
 use crate::fit::closures;
 use crate::fit::results::medium;
 use crate::report::Part;
-use kerrlight_tomo::fit::settings::{Loss, LossKind, StartImage};
+use kerrlight_tomo::fit::settings::{LossKind, StartImage};
 use kerrlight_tomo::fit::static_image::{ShapeFit, Survey};
 
-/// The ring in a sentence: its numbers where one is claimed, and why none is where the image has one.
-pub fn ring(survey: &Survey, shapes: &[ShapeFit]) -> Option<String> {
-    let ring = survey.found().ring?;
+impl Found<'_> {
+    /// The ring in a sentence, where one is looked for.
+    pub fn ring_sentence(&self) -> Option<String> {
+        self.file.ring.map(|_| ring(&self.survey, &self.shapes))
+    }
+}
+
+/// The numbers of a ring where one is claimed, and why none is where the image or a simple shape has one.
+fn ring(survey: &Survey, shapes: &[ShapeFit]) -> String {
+    let Some(ring) = survey.found().ring else { return no_ring(shapes) };
     if let Some(doubt) = doubt(survey, shapes) {
-        return Some(format!("The image looks like a ring, but {doubt}: no ring is claimed."));
+        return format!("The image looks like a ring, but {doubt}: no ring is claimed.");
     }
     let [diameter, width, angle, ..] =
         RING.map(|(name, number)| (number(&ring), error(survey, name, number)));
@@ -22,12 +29,25 @@ pub fn ring(survey: &Survey, shapes: &[ShapeFit]) -> Option<String> {
         true => String::new(),
         false => format!(" {with} of {all} images that the data allow have one."),
     };
-    Some(format!(
+    format!(
         "The image has a ring of {} µas, {} µas wide, brightest at {}° east of north.{others}",
         with_error(diameter.0, diameter.1, 1),
         with_error(width.0, width.1, 1),
         with_error(angle.0, angle.1, 0)
-    ))
+    )
+}
+
+/// That the image has no ring, and whether a simple shape with one fits the data better than those without.
+fn no_ring(shapes: &[ShapeFit]) -> String {
+    let none = "The image has no ring between the radii that were asked for";
+    let best = shapes.iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    let Some(best) = best.filter(|best| best.shape.is_ring()) else { return format!("{none}.") };
+    let sizes = best.sizes.iter().map(|(name, value, unit)| format!("{name} {value:.0} {unit}"));
+    format!(
+        "{none}, but of the simple shapes a {} fits best ({}): the data allow a ring and do not require it.",
+        best.shape.name(),
+        sizes.collect::<Vec<_>>().join(", ")
+    )
 }
 
 /// Why the ring of an image is not claimed: other images that the data allow have none, or a shape without a hole fits better
@@ -55,18 +75,6 @@ pub fn doubt(survey: &Survey, shapes: &[ShapeFit]) -> Option<String> {
 
 /// Part of the images that the data allow which have to have a ring.
 const LEAST_AGREEMENT: f64 = 0.8;
-
-/// What fits of the image with other noise leave: an image and gains take up a part of the noise of the data.
-pub fn draws(survey: &Survey, losses: &[Loss]) -> Option<String> {
-    let kinds = losses.iter().zip(chi2_of_draws(survey));
-    let kinds: Vec<String> = kinds
-        .map(|(loss, [mean, deviation])| {
-            format!("{mean:.2} ± {deviation:.2} for {}", super::name(loss.data))
-        })
-        .collect();
-    (!kinds.is_empty())
-        .then(|| format!("Fits of this image with other noise have χ² {}.", kinds.join(", ")))
-}
 
 impl Found<'_> {
     /// Paragraphs under headings.
@@ -179,15 +187,11 @@ impl Found<'_> {
 
     fn concluded(&self) -> Vec<String> {
         let mut text = vec![self.judged.headline()];
-        text.extend(draws(&self.survey, &self.file.loss));
         for (name, chi2) in &self.beside {
             text.push(format!("χ² {chi2:.2} per data point of {name}, which were not fitted."));
         }
-        text.extend(ring(&self.survey, &self.shapes));
+        text.extend(self.ring_sentence());
         text.push(shapes_beside(&self.shapes));
-        if self.file.ring.is_some() && self.survey.found().ring.is_none() {
-            text.push("The image has no ring between the radii that were asked for.".to_owned());
-        }
         text.extend(self.polarized.as_ref().map(Polarized::sentence));
         text
     }
