@@ -19,31 +19,28 @@ fn finer(count: usize) -> usize {
 }
 
 /// Errors that the model has of itself in a world that a search has found with χ²/N of `reduced`, through pixels of this
-/// width, M. Data that are simulated by the same sums are not compared with finer ones.
+/// width, M; none where data are simulated by the same sums.
 pub(super) fn errors(
     (seen, view): (&Seen, &WorldView),
     (unknown, width): (&UnknownWorld, f64),
     problem: &WorldProblem<'_, f32>,
     (spread, reduced): (&Spread, f64),
 ) -> Result<ModelErrors> {
+    let file = &seen.view.file;
+    if file.data.is_none() && !is_drawn_elsewhere(file)? {
+        return Ok(ModelErrors::default());
+    }
     if let Some(why) = left_out(seen, problem) {
         let known = spread.unexplained(problem.excess(reduced), reduced).into_iter().collect();
         return Ok(ModelErrors { known, left_out: Some(why) });
     }
-    let file = &seen.view.file;
-    let is_foreign = file.data.is_some() || is_drawn_elsewhere(file)?;
-    if !is_foreign && problem.excess(reduced) == 0.0 {
-        return Ok(ModelErrors::default());
-    }
     let world = spread.world;
     seen.smoothly(problem, (world, BESIDE_THE_RING[1]), |problem| {
         let standing = problem.standing(world)?;
-        let mut refined = Vec::new();
-        if is_foreign {
-            refined.extend(voxels(&standing, problem)?);
-            refined.extend(sums(&standing, problem)?);
-            refined.extend(pixels((seen, view), (unknown, width), &standing, problem)?);
-        }
+        let voxels = voxels(&standing, problem)?;
+        let sums = sums(&standing, problem)?;
+        let pixels = pixels((seen, view), (unknown, width), &standing, problem)?;
+        let refined: Vec<Refined> = [voxels, sums, pixels].into_iter().flatten().collect();
         Ok(ModelErrors { known: standing.errors(problem.free, &refined), left_out: None })
     })
 }
