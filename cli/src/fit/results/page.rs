@@ -170,22 +170,28 @@ impl Estimate<'_> {
         }
     }
 
-    fn summary(&self, found: &Found<'_>, results: &Value) -> Vec<String> {
+    /// What was fitted to what.
+    fn subject(&self, results: &Value) -> String {
         let file = self.file;
         let data: Vec<&str> = file.loss.iter().map(|l| l.data.label()).collect();
-        let number = |key: &str| results[key].as_f64();
         let fitted = match band_search::is_seen(&results["band"]) {
             Some(false) => "was fitted to",
             _ => "was recovered from",
         };
-        let mut lines = vec![format!(
+        format!(
             "Emission around a black hole of spin {}, seen at {}° from its spin axis, {fitted} {} frames of {}. It is represented by {}.",
             rounded(file.hole.spin.value()),
             rounded(file.observer.inclination_deg.value()),
             self.measured.times.len(),
             data.join(", "),
             file.recovered()
-        )];
+        )
+    }
+
+    fn summary(&self, found: &Found<'_>, results: &Value) -> Vec<String> {
+        let file = self.file;
+        let number = |key: &str| results[key].as_f64();
+        let mut lines = vec![self.subject(results)];
         if results["world"].is_object() {
             lines.extend(world_results::sentences(&results["world"]));
         }

@@ -213,7 +213,7 @@ fn ended(seen: &Seen, problem: &WorldProblem<'_, f32>, mut explored: Explored) -
     let how = Polish { following: problem.effort.patience.looking, ..Polish::default() };
     let beside = (explored.best.world, BESIDE_THE_RING[0]);
     let polished =
-        seen.smoothly(problem, beside, |problem| Ok(problem.polish(&explored.best, &how)?))?;
+        seen.smoothly(problem, beside, |problem| problem.polish(&explored.best, &how))?;
     explored.best = problem.solve(polished.best.world)?;
     explored.converged = polished.converged;
     Ok(explored)
