@@ -180,7 +180,7 @@ pub mod capi;
 
 pub use matter::{flow, infall, plunge};
 pub use numbers::{legendre, quadrature, vector};
-pub use rays::{derivatives, footprint, nodes};
+pub use rays::{derivatives, footprint, node_gradients, nodes};
 pub use spacetime::orbits;
 
 pub use error::Error;

@@ -11,6 +11,7 @@ mod elliptic_rays;
 pub mod footprint;
 pub(crate) mod integrator;
 mod length;
+pub mod node_gradients;
 pub mod nodes;
 #[cfg(feature = "rayon")]
 mod parallel;

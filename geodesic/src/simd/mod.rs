@@ -54,6 +54,7 @@ mod samples;
 pub use crossings::{Crossing, Crossings, RayEnds};
 pub(crate) use error::MAX_STEP;
 pub use lanes::InstructionSet;
+pub(crate) use march::{GROWTH, Key};
 pub use nodes::{NodeRequest, Nodes};
 pub(crate) use panel::LONGEST_PANEL;
 pub use panel::PanelRule;

@@ -162,6 +162,13 @@ impl Nodes {
         self.plan.sort_by_key(|plan| plan.key);
     }
 
+    /// How many panels lie on each leg of each ray, in the order of the rays.
+    pub(crate) fn layouts(&self) -> Vec<Key> {
+        let mut layouts = vec![Key::default(); self.plan.len()];
+        self.plan.iter().for_each(|plan| layouts[plan.ray] = plan.key);
+        layouts
+    }
+
     fn start_of(&self, ray: usize) -> usize {
         ray.checked_sub(1).map_or(0, |ray| self.ends[ray])
     }
