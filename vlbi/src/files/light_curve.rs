@@ -42,6 +42,22 @@ impl TimeColumn {
         };
         of(&TIMES, false).or_else(|| of(&DAYS, true))
     }
+
+    fn check_unit(self, names: &[String], units: &[String]) -> Result<(), String> {
+        let allowed: &[&str] = match self.days {
+            true => &["d", "day", "days", "mjd", "jd", "utc", "ut"],
+            false => &["h", "hr", "hrs", "hour", "hours", "utc", "ut"],
+        };
+        check_unit(&names[self.at], &units[self.at], allowed)
+    }
+}
+
+/// Refuses a unit that is not made of these words; none is one of them.
+fn check_unit(name: &str, unit: &str, allowed: &[&str]) -> Result<(), String> {
+    match unit.is_empty() || unit.split('_').all(|word| allowed.contains(&word)) {
+        true => Ok(()),
+        false => Err(format!("column `{name}` in `{unit}` is not allowed: {}", allowed[0])),
+    }
 }
 
 impl Heading {
@@ -76,6 +92,13 @@ impl Heading {
         })
     }
 
+    /// Refuses columns in other units than those in which they are read.
+    fn check_units(&self, names: &[String], units: &[String]) -> Result<(), String> {
+        let mut fluxes = [self.values, self.sigmas].into_iter().flatten().flatten();
+        fluxes.try_for_each(|k| check_unit(&names[k], &units[k], &["jy"]))?;
+        self.time.check_unit(names, units)
+    }
+
     /// The number of a column that is read and has the name of another one.
     fn twice(&self, names: &[String]) -> Option<usize> {
         let read = [self.values, self.sigmas].into_iter().flatten().flatten();
@@ -99,18 +122,38 @@ fn cells(line: &str) -> Vec<&str> {
     }
 }
 
-/// The names in a line, a comment or not, as above tables of numpy, without units in brackets: `time(hr)` and
-/// `Time [UTC h]` are `time`.
-fn names(line: &str) -> Vec<String> {
-    let mut depth = 0;
-    let is_outside = |c: &char| {
-        depth += i32::from(matches!(c, '(' | '['));
-        let outside = depth <= 0;
-        depth -= i32::from(matches!(c, ')' | ']'));
-        outside
+/// The names in a line, a comment or not, as above tables of numpy, and their units in brackets: `time(hr)` and
+/// `Time [UTC h]` are `time`, in `hr` and `utc_h`.
+fn names(line: &str) -> (Vec<String>, Vec<String>) {
+    let (mut text, mut depth) = (String::new(), 0);
+    for c in line.trim_start_matches('#').chars() {
+        match c {
+            '(' | '[' => {
+                text.truncate(text.trim_end_matches([' ', '\t']).len());
+                text.push('[');
+                depth += 1;
+            }
+            ')' | ']' => {
+                text.push(']');
+                depth -= 1;
+            }
+            // A unit is one cell with its name.
+            ',' | ' ' | '\t' if depth > 0 => text.push('_'),
+            c => text.push(c),
+        }
+    }
+    let inside_and_out = |cell: &str| {
+        let mut parts = [String::new(), String::new()];
+        let mut inside = false;
+        for c in cell.chars() {
+            match c {
+                '[' | ']' => inside = c == '[',
+                c => parts[usize::from(inside)].push(c),
+            }
+        }
+        parts.map(|part| plain(&part)).into()
     };
-    let outside: String = line.trim_start_matches('#').chars().filter(is_outside).collect();
-    cells(&outside).into_iter().map(plain).collect()
+    cells(&text).into_iter().map(inside_and_out).unzip()
 }
 
 /// Whether the first line that is no comment, or the last comment above it, names columns as those of a light curve: then
@@ -119,10 +162,10 @@ pub fn is_light_curve(text: &str) -> bool {
     let mut comment = Vec::new();
     for line in text.lines().filter(|line| !line.trim().is_empty()) {
         if line.starts_with('#') {
-            comment = names(line);
+            comment = names(line).0;
             continue;
         }
-        let here = names(line);
+        let here = names(line).0;
         let has = |p: &&StokesParameter| here.iter().any(|n| n.eq_ignore_ascii_case(p.name()));
         let stokes = StokesParameter::ALL.iter().filter(has).count();
         return stokes > 1 || [here, comment].iter().any(|names| Heading::find(names).is_some());
@@ -132,13 +175,13 @@ pub fn is_light_curve(text: &str) -> bool {
 
 /// Reads a table with a column of times (`time_utc_h`, `time`, `t`, `UTC` or `hour`, hours of UTC; `MJD` or `JD`, days) and
 /// any of I, Q, U and V in Jy, each with a column of its standard deviations (`sigma_I`, `I_err`, `dI`), or one `sigma`
-/// for all. Names may have units in brackets. Other columns, lines that start with `#` and cells that are empty or `nan` are
+/// for all. Names may have these units in brackets. Other columns, lines that start with `#` and cells that are empty or `nan` are
 /// left out; the last comment above the numbers may name the columns.
 ///
 /// # Errors
 /// If no line names the columns, a line has too few of them or no number where one belongs: with line, column and value.
 pub fn parse(text: &str) -> Result<LightCurve, Error> {
-    let (mut heading, mut comment) = (None, Vec::new());
+    let (mut heading, mut comment) = (None, (Vec::new(), Vec::new()));
     let mut samples: Vec<Sample> = Vec::new();
     let mut first_day = None;
     for (index, line) in text.lines().enumerate() {
@@ -153,13 +196,14 @@ pub fn parse(text: &str) -> Result<LightCurve, Error> {
         let cells = cells(line);
         if heading.is_none() {
             let here = names(line);
-            let is_names = Heading::find(&here).is_some();
-            let named = if is_names { here } else { std::mem::take(&mut comment) };
+            let is_names = Heading::find(&here.0).is_some();
+            let (named, units) = if is_names { here } else { std::mem::take(&mut comment) };
             let why = || located(format!("`{}` names no {}", shown(line), wanted()));
             let found = Heading::find(&named).ok_or_else(why)?;
             if let Some(k) = found.twice(&named) {
                 return Err(located(format!("column `{}` appears twice", named[k])).into());
             }
+            found.check_units(&named, &units).map_err(located)?;
             heading = Some(found);
             if is_names {
                 continue;
@@ -250,7 +294,10 @@ pub fn parse_times(text: &str) -> Result<Vec<f64>, Error> {
         let Some(TimeColumn { at, days }) = column else {
             let only = || (cells.len() == 1).then_some(TimeColumn { at: 0, days: false });
             let why = || located(format!("`{}` names no column time_utc_h", shown(line)));
-            column = Some(TimeColumn::find(&names(line)).or_else(only).ok_or_else(why)?);
+            let (names, units) = names(line);
+            let found = TimeColumn::find(&names).or_else(only).ok_or_else(why)?;
+            found.check_unit(&names, &units).map_err(located)?;
+            column = Some(found);
             continue;
         };
         let cell = cells.get(at).copied().unwrap_or_default();
@@ -352,6 +399,9 @@ mod tests {
             ("time,I\n1e9,2\n", "line 2: column time: 1000000000 h is not allowed"),
             ("time,Q,Q\n1,2,3\n", "line 1: column `q` appears twice"),
             ("time,I\n1,2,3\n", "line 2: 3 cells, but 2 names"),
+            ("time (min),I\n1,2\n", "line 1: column `time` in `min` is not allowed: h"),
+            ("time(h)\tI [mJy]\n1\t2\n", "line 1: column `i` in `mjy` is not allowed: jy"),
+            ("# MJD [s] I\n1 2\n", "line 2: column `mjd` in `s` is not allowed: d"),
             ("", "no line names columns time_utc_h"),
         ] {
             let error = parse(text).unwrap_err().to_string();

@@ -38,6 +38,16 @@ pub enum CatalogueError {
     /// Two columns tell the same.
     #[error("the first line names two columns that tell {0}: one of them is expected")]
     Twice(&'static str),
+    /// A line has more columns than names, as numbers with decimal commas make it.
+    #[error("line {line}: {columns} columns, but {names} names")]
+    Columns {
+        /// Line of the file, from 1.
+        line: usize,
+        /// How many columns it has.
+        columns: usize,
+        /// How many the first line names.
+        names: usize,
+    },
     /// A value is no number or out of range.
     #[error("line {line}: {column} = {value:?} is not allowed: {allowed}")]
     Value {
@@ -163,7 +173,11 @@ impl Catalogue {
             return Err(CatalogueError::Twice(COLUMNS[twice][0]).into());
         }
         let star = |(number, line): (usize, &str)| {
-            let fields = line.split(',').map(str::trim).collect();
+            let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+            let columns = fields.iter().rposition(|field| !field.is_empty()).map_or(0, |k| k + 1);
+            if columns > names.len() {
+                return Err(CatalogueError::Columns { line: number, columns, names: names.len() });
+            }
             Line { number, fields, places }.star()
         };
         let (mut catalogue, mut odd) = (Catalogue::default(), Vec::new());
@@ -257,6 +271,7 @@ mod tests {
         assert!(fail("lon,lat\n1,2\n").contains("no column magnitude"));
         assert!(fail("lon,lat,ra,mag\n1,2,3,4\n").contains("two columns that tell lon"));
         assert!(fail("lon,lat,mag,lat\n1,2,3,4\n").contains("two columns that tell lat"));
+        assert!(fail("lon,lat,mag\n1,2,3,\n4,5,0,6\n").contains("line 3: 4 columns, but 3 names"));
         let said = fail("lon,lat,mag\n1,2,3\n4,95,6\n");
         assert!(said.starts_with("line 3: lat = \"95\" is not allowed"), "{said}");
         assert!(fail("lon,lat,mag,bv\n1,2,3,nan\n").contains("color_index = \"nan\""));
