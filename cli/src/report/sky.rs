@@ -208,8 +208,8 @@ impl Drawn<'_> {
         for value in (0..).map(|k| f64::from(k) * step).take_while(|v| *v <= factor * most) {
             let height = y + side * (1.0 - value / (factor * most));
             canvas.line(&[[x + 12.0, height], [x + 16.0, height]], false, 1.0, BLACK);
-            let text = format!("{}", (value / step).round() * step);
-            let text: String = text.chars().take(5).collect();
+            let digits = (-step.log10().floor()).max(0.0) as usize;
+            let text = format!("{value:.digits$}");
             canvas.text(&text, [x + 19.0, height + 4.0], TEXT, Align::Left, BLACK);
         }
         canvas.text(&format!("{unit}/µas²"), [x, y - 8.0], TEXT, Align::Left, BLACK);
