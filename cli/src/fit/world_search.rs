@@ -99,7 +99,7 @@ fn results(
     let trial = |trial: &Trial| {
         json!({
             "start": world(&trial.start), "end": world(&trial.end), "above_best": trial.value - least,
-            "worlds": trial.worlds, "converged": trial.converged,
+            "worlds": trial.worlds, "converged": has_converged(&free, trial, &sigma),
             "same": is_same(&free, trial, (&found.trials, &sigma)),
         })
     };
@@ -168,6 +168,16 @@ fn own(free: &[Free], spread: &Spread) -> Map<String, Value> {
         (error.source.to_owned(), Value::Object(moved))
     };
     spread.own.known.iter().map(part).collect()
+}
+
+/// Whether what a search expects farther on is no farther away than a standard deviation of every parameter.
+fn has_converged(free: &[Free], trial: &Trial, sigma: &dyn Fn(usize) -> Option<f64>) -> bool {
+    trial.further.is_some_and(|further| {
+        free.iter().enumerate().all(|(k, Free { parameter, .. })| {
+            let apart = parameter.difference(further.get(*parameter), trial.end.get(*parameter));
+            sigma(k).is_some_and(|sigma| apart.abs() <= sigma)
+        })
+    })
 }
 
 /// Whether a search ended where the best one did: within the 95 % interval about it, or at a world that is as probable and
@@ -251,7 +261,7 @@ mod tests {
         let free = [Free { parameter: Parameter::Spin, prior }];
         let trial = |spin: f64, value: f64| {
             let end = World::new(spin, 1.0);
-            Trial { start: end, end, reduced_chi2: 1.0, value, worlds: 1, converged: true }
+            Trial { start: end, end, reduced_chi2: 1.0, value, worlds: 1, further: Some(end) }
         };
         // Of 200 data, whose χ²/2 scatters by 10; the interval reaches 0.0196 to each side.
         for (spin, above, expected) in
@@ -262,5 +272,13 @@ mod tests {
             assert_eq!(same, expected, "{spin} {above}");
             assert!(is_same(&free, &trials[0], (&trials, &|_| None)));
         }
+        for (further, expected) in [(0.505, true), (0.52, false)] {
+            let further = Some(World::new(further, 1.0));
+            let trial = Trial { further, ..trial(0.5, 100.0) };
+            assert_eq!(has_converged(&free, &trial, &|_| Some(0.01)), expected);
+            assert!(!has_converged(&free, &trial, &|_| None));
+        }
+        let none = Trial { further: None, ..trial(0.5, 100.0) };
+        assert!(!has_converged(&free, &none, &|_| Some(0.01)));
     }
 }

@@ -27,8 +27,8 @@ pub struct Explored {
     pub best: Estimate,
     /// All worlds that were evaluated.
     pub samples: Vec<Sample>,
-    /// Whether the best one is known to be a minimum: populations alone do not say so.
-    pub converged: bool,
+    /// Where the minimum is expected from there, if that is known: populations alone do not say so.
+    pub further: Option<World>,
 }
 
 /// How a world is looked for.
@@ -115,7 +115,7 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             Some(best) => best,
             None => self.solve(samples.first().map_or(start, |best| best.world))?,
         };
-        Ok(Some(Explored { start, best, samples, converged: false }))
+        Ok(Some(Explored { start, best, samples, further: None }))
     }
 
     fn look(&self, world: World, from: Option<&Estimate>, log: &Mutex<Log>) -> f64 {

@@ -24,9 +24,8 @@ pub struct Polished {
     pub covariance: Vec<f64>,
     /// By how much the best volume moves with each free parameter, per its scale.
     pub responses: Vec<Vec<f64>>,
-    /// Whether it is a minimum: a further step promises less than one standard deviation of data whose errors are as large as
-    /// residuals.
-    pub converged: bool,
+    /// Where a further step leads; none where there is no bowl.
+    pub further: Option<World>,
 }
 
 /// How steps are taken.
@@ -48,9 +47,6 @@ impl Default for Polish {
 const WIDTH: f64 = 0.1;
 /// Parts of a step that are tried.
 const PARTS: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
-/// Then, where all of it lowers the value: nodes that begin to shine or go dark on the way make valleys longer than the second
-/// derivatives of those that shine say.
-const FARTHER: [f64; 3] = [2.0, 4.0, 8.0];
 /// Steps that promise to lower the value by less than this are not taken: a tenth of a standard deviation.
 const ENOUGH: f64 = 0.005;
 
@@ -85,9 +81,8 @@ impl<T: Float + Default> WorldProblem<'_, T> {
             bowl = self.bowl(&best, how.following)?;
         }
         let covariance = self.covariance(&best.world, &bowl);
-        let deviation = 0.5 * (self.scale * self.reduced(best.chi2)).max(1.0);
-        let converged = bowl.step().is_some_and(|(_, promise)| promise < deviation);
-        Ok(Polished { best, covariance, responses: bowl.responses, converged })
+        let further = bowl.step().map(|(step, _)| self.moved(&best.world, step.as_slice()));
+        Ok(Polished { best, covariance, responses: bowl.responses, further })
     }
 
     /// The best volume of a world, from that of another one.
@@ -100,27 +95,19 @@ impl<T: Float + Default> WorldProblem<'_, T> {
         Ok(self.estimate(world, least))
     }
 
-    /// The first part of a Newton step that lowers the value, or what is farther that way and lower still; none if none does.
+    /// The first part of a Newton step that lowers the value; none if none does.
     fn descend(&self, from: &Estimate, bowl: &Bowl) -> Result<Option<Estimate>, Error> {
         let Some((step, _)) = bowl.step().filter(|(_, promise)| *promise >= ENOUGH) else {
             return Ok(None);
         };
-        let there = |part: f64| -> Result<Option<Estimate>, Error> {
+        for part in PARTS {
             let step: Vec<f64> = step.iter().map(|step| part * step).collect();
             let world = self.moved(&from.world, &step);
             let x = self.along(from, &bowl.responses, &step);
             let there = self.solve_from(world, &x)?;
-            Ok((there.value < from.value).then_some(there))
-        };
-        for part in PARTS {
-            let Some(mut lower) = there(part)? else { continue };
-            for part in FARTHER.into_iter().filter(|_| part == PARTS[0]) {
-                match there(part)?.filter(|there| there.value < lower.value) {
-                    Some(farther) => lower = farther,
-                    None => break,
-                }
+            if there.value < from.value {
+                return Ok(Some(there));
             }
-            return Ok(Some(lower));
         }
         Ok(None)
     }

@@ -46,14 +46,6 @@ impl Spread {
         counts.filter_map(|count| Self::through(free, best, &samples[..count], reduced_chi2)).next()
     }
 
-    /// Whether a world lies within a standard deviation of every parameter.
-    pub fn holds(&self, free: &[Free], world: &World) -> bool {
-        free.iter().zip(&self.sigma).all(|(Free { parameter, .. }, sigma)| {
-            let apart = parameter.difference(world.get(*parameter), self.world.get(*parameter));
-            apart.abs() <= *sigma
-        })
-    }
-
     /// About another world near by: how far it is from this one is part of its error.
     #[must_use]
     pub fn moved(&self, free: &[Free], world: World) -> Self {

@@ -25,9 +25,9 @@ pub struct Trial {
     pub value: f64,
     /// Worlds that were evaluated.
     pub worlds: usize,
-    /// Whether that is a minimum: a further step, or the quadratic form through its surroundings, leads no farther away than a
-    /// standard deviation.
-    pub converged: bool,
+    /// Where a further step leads from there, or the lowest point of a quadratic form through the worlds around; none without
+    /// such a form.
+    pub further: Option<World>,
 }
 
 /// A world that was found.
@@ -190,24 +190,20 @@ fn searched(
     let Some(explored) = explored else { return Ok(None) };
     let short = Exploration { width: WIDTHS[1], worlds: how.worlds / PART, ..*how };
     let Some(nearer) = nearer(seen, problem, explored, &short, watch)? else { return Ok(None) };
-    let converged = is_lowest(problem, &nearer)?;
-    Ok(Some(Explored { start, converged, ..nearer }))
+    let further = lowest(problem, &nearer)?;
+    Ok(Some(Explored { start, further, ..nearer }))
 }
 
-/// Whether the best world is, within its errors, the lowest point of the quadratic form through the others.
-fn is_lowest(problem: &WorldProblem<'_, f32>, explored: &Explored) -> Result<bool> {
+/// The lowest point of the quadratic form through worlds that were explored, if there is one.
+fn lowest(problem: &WorldProblem<'_, f32>, explored: &Explored) -> Result<Option<World>> {
     let reduced = problem.scale * problem.left(&explored.best)?;
-    let form = Spread::of(problem.free, &explored.samples, reduced);
-    Ok(form.is_some_and(|form| form.holds(problem.free, &explored.best.world)))
+    Ok(Spread::of(problem.free, &explored.samples, reduced).map(|form| form.world))
 }
 
 /// The end of the valley in which populations have ended: steps lead there, where χ² is smooth enough.
 fn ended(seen: &Seen, problem: &WorldProblem<'_, f32>, mut explored: Explored) -> Result<Explored> {
     if !is_stepped(seen, problem) {
-        let reduced = problem.scale * problem.left(&explored.best)?;
-        let form = Spread::of(problem.free, &explored.samples, reduced);
-        explored.converged =
-            form.is_some_and(|form| form.holds(problem.free, &explored.best.world));
+        explored.further = lowest(problem, &explored)?;
         return Ok(explored);
     }
     let how = Polish { following: problem.effort.patience.looking, ..Polish::default() };
@@ -215,7 +211,7 @@ fn ended(seen: &Seen, problem: &WorldProblem<'_, f32>, mut explored: Explored) -
     let polished =
         seen.smoothly(problem, beside, |problem| problem.polish(&explored.best, &how))?;
     explored.best = problem.solve(polished.best.world)?;
-    explored.converged = polished.converged;
+    explored.further = polished.further;
     Ok(explored)
 }
 
@@ -264,6 +260,6 @@ fn trial(explored: &Explored, problem: &WorldProblem<'_, f32>) -> Result<Trial> 
         end: explored.best.world,
         value: explored.best.value,
         worlds: explored.samples.len(),
-        converged: explored.converged,
+        further: explored.further,
     })
 }
