@@ -127,7 +127,9 @@ fn exact_two_bands_make_one_image() {
     let error = number(&found, "ring_diameter_uas_error");
     assert!((ring - 42.0).abs() < 3.0 * error + 1.0, "{ring} ± {error}");
     let count = |file: &str| {
-        let seen = files::decode(&std::fs::read(path.join(file)).unwrap()).unwrap().1;
+        let mut seen = files::decode(&std::fs::read(path.join(file)).unwrap()).unwrap().1;
+        // Shorter baselines of M87* are dropped.
+        seen.rows.retain(|row| row.uv[0].hypot(row.uv[1]) >= 1e8);
         ClosureSet::of(&seen, ClosureKind::Phase, 0.0)
             .iter()
             .map(|s| s.closures.len())

@@ -42,7 +42,7 @@ fn exact_north_comes_first_and_east_is_left() {
 
 /// Cards as `eht-imaging` names them (its `save_im_fits`), and the same pixels and Stokes parameters read back.
 #[test]
-fn code_written_images_have_the_cards_of_eht_imaging() {
+fn exact_written_images_have_the_cards_of_eht_imaging() {
     use crate::earth::SourcePosition;
     use crate::observation::{Basis, Measured, Observation, Row};
     let mut seen = Observation::empty(Basis::Stokes);

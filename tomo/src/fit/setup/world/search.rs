@@ -1,14 +1,12 @@
 //! The search for a world: from many starts with coarse voxels, then with fine ones.
 
-use super::fine::{Detail, PART, is_stepped, nearer};
-use super::seen::{BESIDE_THE_RING, Seen};
+use super::fine::{Detail, PART, nearer};
+use super::seen::Seen;
 use super::tangent::Anchor;
 use crate::fit::journal::{Journal, Memory};
 use crate::fit::settings::{FieldKind, FitFile, Linear, UnknownWorld};
 use crate::fit::setup::{Measured, Result};
-use crate::fit::world::{
-    Estimate, Exploration, Explored, Polish, Spread, World, WorldProblem, WorldWatch,
-};
+use crate::fit::world::{Estimate, Exploration, Explored, Spread, World, WorldProblem, WorldWatch};
 
 use rayon::prelude::*;
 
@@ -25,8 +23,7 @@ pub struct Trial {
     pub value: f64,
     /// Worlds that were evaluated.
     pub worlds: usize,
-    /// Where a further step leads from there, or the lowest point of a quadratic form through the worlds around; none without
-    /// such a form.
+    /// The lowest point of a quadratic form through the worlds around; none without such a form.
     pub further: Option<World>,
 }
 
@@ -54,9 +51,6 @@ const WIDTHS: [f64; 2] = [1.5, 0.4];
 
 /// Worlds of a search for each of that from the twin of its end.
 const TWIN: usize = 6;
-
-/// Worlds of a search for each that steps from its end take the time of.
-const STEPPED: usize = 4;
 
 /// Looks for the world from all starts, and again with finer voxels about the best end; none if it was cancelled. What the
 /// journal knows of an earlier search that was interrupted is not looked at again.
@@ -177,12 +171,11 @@ fn searched(
     how: &Exploration,
     watch: &mut WorldWatch<'_>,
 ) -> Result<Option<Explored>> {
-    let steps = if is_stepped(seen, problem) { how.worlds / STEPPED } else { 0 };
-    let how = &Exploration { worlds: how.worlds - steps, ..*how };
     let mut from = |problem: &WorldProblem<'_, f32>| -> Result<Option<Explored>> {
         let Some(explored) = problem.explore((start, None), how, watch)? else { return Ok(None) };
-        let explored = or_twin(problem, explored, how, watch)?;
-        explored.map(|explored| ended(seen, problem, explored)).transpose()
+        let Some(explored) = or_twin(problem, explored, how, watch)? else { return Ok(None) };
+        let further = lowest(problem, &explored)?;
+        Ok(Some(Explored { further, ..explored }))
     };
     let Some(lit) = lit else { return from(problem) };
     let about = seen.about(problem, &Anchor::of(problem, &lit), &mut from)?;
@@ -198,21 +191,6 @@ fn searched(
 fn lowest(problem: &WorldProblem<'_, f32>, explored: &Explored) -> Result<Option<World>> {
     let reduced = problem.scale * problem.left(&explored.best)?;
     Ok(Spread::of(problem.free, &explored.samples, reduced).map(|form| form.world))
-}
-
-/// The end of the valley in which populations have ended: steps lead there, where χ² is smooth enough.
-fn ended(seen: &Seen, problem: &WorldProblem<'_, f32>, mut explored: Explored) -> Result<Explored> {
-    if !is_stepped(seen, problem) {
-        explored.further = lowest(problem, &explored)?;
-        return Ok(explored);
-    }
-    let how = Polish { following: problem.effort.patience.looking, ..Polish::default() };
-    let beside = (explored.best.world, BESIDE_THE_RING[0]);
-    let polished =
-        seen.smoothly(problem, beside, |problem| problem.polish(&explored.best, &how))?;
-    explored.best = problem.solve(polished.best.world)?;
-    explored.further = polished.further;
-    Ok(explored)
 }
 
 /// Where a search has ended, or a short one from the twin of that world, if that ends at a better one.
