@@ -225,16 +225,27 @@ impl Convert {
         Ok(())
     }
 
-    /// Adds what the input does not tell; what it tells stays.
+    /// Adds what the input does not tell; what it tells stays, with a warning where an option says otherwise.
     fn complete(&self, observation: &mut Observation) -> anyhow::Result<()> {
+        let unused = |name: &str, told: String| {
+            eprintln!("warning: {name} is not used: {} says {told}", self.input.display());
+        };
         if let Some(source) = &self.source {
-            observation.position.get_or_insert(source.position);
+            let told = *observation.position.get_or_insert(source.position);
+            if !agree(told.ra_hours, source.position.ra_hours)
+                || !agree(told.dec_deg, source.position.dec_deg)
+            {
+                unused("--source", format!("{} h, {} deg", told.ra_hours, told.dec_deg));
+            }
             if observation.source.is_empty() {
                 observation.source.clone_from(&source.name);
             }
         }
         if let Some(mjd) = self.mjd {
-            observation.mjd.get_or_insert(mjd);
+            let told = *observation.mjd.get_or_insert(mjd);
+            if told != mjd {
+                unused("--mjd", told.to_string());
+            }
         }
         for (name, value, field) in [
             ("--frequency", self.frequency, &mut observation.frequency_hz),
@@ -244,9 +255,14 @@ impl Convert {
                 Some(ghz) if !(1e-9..=1e6).contains(&ghz) => {
                     bail!("{name} {ghz} is not allowed: GHz in [1e-9, 1e6]")
                 }
-                Some(ghz) => field.get_or_insert(ghz * 1e9),
-                None => continue,
-            };
+                Some(ghz) => {
+                    let told = *field.get_or_insert(ghz * 1e9) / 1e9;
+                    if !agree(told, ghz) {
+                        unused(name, format!("{told} GHz"));
+                    }
+                }
+                None => {}
+            }
         }
         let Some(array) = &self.array else { return Ok(()) };
         let array = arguments::array_of(array)?;
@@ -263,6 +279,11 @@ impl Convert {
         }
         Ok(())
     }
+}
+
+/// Whether two numbers are the same but for digits that were left out.
+fn agree(told: f64, given: f64) -> bool {
+    (told - given).abs() <= 1e-5 * told.abs().max(given.abs())
 }
 
 /// An error, with the options that give what the data lack where that is the error.
