@@ -6,6 +6,7 @@ use super::{Source, complete, digits, gains, has_closures, plain_words, read, sh
 use anyhow::Context;
 use core::f64::consts::{LN_2, PI};
 use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_tomo::fit::setup::{self, VisibilitySettings};
 use kerrlight_vlbi::observation::Observation;
 use std::collections::BTreeMap;
 
@@ -60,8 +61,9 @@ pub fn of_visibilities(
         ("thick", digits(0.5 * envelope)),
         ("least", scaled(0.04)),
         ("most", scaled(0.36)),
-        ("average", average(source).to_owned()),
+        ("average", format!("{:?}", average(source))),
         ("extra", extra.join("\n")),
+        ("strength", strength(observation, average(source), long_only.is_some())),
         ("losses", losses.trim_end().to_owned()),
         ("gains", gains(observation)),
         ("leakage", tables.leakage),
@@ -70,6 +72,20 @@ pub fn of_visibilities(
         ("path", path.to_owned()),
     ];
     complete(include_str!("image.toml"), &fields)
+}
+
+/// Parts of the frames that a strength is chosen by, if there are so many.
+const FOLDS: usize = 4;
+
+/// The choice of a strength by frames that are held out, two or more in each part; nothing where there are too few.
+fn strength(observation: &Observation, average_s: f64, long_only: bool) -> String {
+    let settings = VisibilitySettings { average_s, uv_min: long_only.then_some(1e8) };
+    let frames = setup::prepared(observation.clone(), &settings)
+        .map_or(0, |mut kept| setup::frames_of(&mut kept).0.len());
+    match FOLDS.min(frames / 2) {
+        0 | 1 => String::new(),
+        folds => format!("[strength]\nvalues = [10.0, 30.0, 100.0]\nfolds = {folds}"),
+    }
 }
 
 /// Width of the envelope, µas, and why: as published, or as wide as the fall of the flux says, at least the beam.
@@ -126,8 +142,8 @@ const HOLLOW: f64 = 0.785;
 
 /// Seconds of an average. The longer they are, the fewer closure quantities are left; a source that varies asks for frames in
 /// which all baselines see the same.
-fn average(source: Option<&Source>) -> &'static str {
-    if source.is_some_and(|source| !source.varies) { "60.0" } else { "300.0" }
+fn average(source: Option<&Source>) -> f64 {
+    if source.is_some_and(|source| !source.varies) { 60.0 } else { 300.0 }
 }
 
 /// Amplitudes, and closure quantities where there are any.
