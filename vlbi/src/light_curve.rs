@@ -199,7 +199,7 @@ fn position(station: &Station) -> Option<[f64; 3]> {
 }
 
 fn stokes(row: &Row, basis: Basis) -> [Option<Flux>; 4] {
-    let of = |k: usize| row.product(k).filter(|product| !product.is_placeholder());
+    let of = |k: usize| row.product(k).filter(|product| !product.is_unmeasured());
     let real = |product: Measured| Flux {
         jy: product.visibility.re,
         sigma_jy: (product.noise_sigma > 0.0).then_some(product.noise_sigma),

@@ -111,7 +111,7 @@ fn strong(observation: &Observation, least_snr: f64) -> impl Iterator<Item = (&R
 /// Q ± iU of a row, each with the turn of its U.
 fn crossed(row: &Row, basis: Basis) -> Vec<(Complex64, Measured)> {
     let j = Complex64::i();
-    let measured = |k: usize| row.product(k).filter(|datum| !datum.is_placeholder());
+    let measured = |k: usize| row.product(k).filter(|datum| !datum.is_unmeasured());
     let both = match basis {
         Basis::Circular => [measured(2), measured(3)],
         Basis::Stokes => {

@@ -46,7 +46,7 @@ impl Observation {
     ///
     /// Products are means weighted by 1/σ², so that σ of a mean is 1/√(Σ 1/σ²); times and (u, v)
     /// are means weighted by integration time, which adds up. Products that were not measured
-    /// ([`Measured::is_placeholder`](super::Measured::is_placeholder)) do not count; where other errors are zero, or
+    /// ([`Measured::is_unmeasured`](super::Measured::is_unmeasured)) do not count; where other errors are zero, or
     /// without weights, means are plain and σ is √(Σσ²)/n. Rows that repeat others count as in
     /// [`with_repeats_merged`](Self::with_repeats_merged).
     #[must_use]
@@ -148,10 +148,10 @@ pub(super) fn mean(rows: &[Row], weighted: bool) -> Row {
 
 fn mean_product(rows: &[Row], k: usize, weighted: bool) -> (Complex64, f64) {
     let all = || rows.iter().filter_map(|row| row.product(k));
-    // A mean of nothing but placeholders is one.
-    let only_placeholders = all().all(|m| m.is_placeholder());
+    // A mean of nothing measured is not measured either.
+    let only_unmeasured = all().all(|m| m.is_unmeasured());
     let present: Vec<Measured> =
-        all().filter(|m| only_placeholders || !m.is_placeholder()).collect();
+        all().filter(|m| only_unmeasured || !m.is_unmeasured()).collect();
     if present.is_empty() {
         return (Complex64::new(0.0, 0.0), f64::NAN);
     }
@@ -243,7 +243,7 @@ mod tests {
 
     /// Hands that were not measured change neither Stokes I nor a mean.
     #[test]
-    fn exact_placeholders_do_not_count() {
+    fn exact_unmeasured_products_do_not_count() {
         let hand = |re: f64| Complex64::new(re, 0.0);
         let row = |time_h: f64, rr: (f64, f64), ll: (f64, f64)| Row {
             products: [hand(rr.0), hand(ll.0), hand(0.0), hand(0.0)],
@@ -265,7 +265,7 @@ mod tests {
         let [rr, ll] = mean.parts_of_i(Basis::Circular).map(Option::unwrap);
         assert!((rr.noise_sigma - 0.3 / 2f64.sqrt()).abs() < 1e-15);
         assert_eq!((ll.visibility.re, ll.noise_sigma), (1.0, 0.4));
-        assert!(mean.product(2).unwrap().is_placeholder() && mean.product(3).is_none());
+        assert!(mean.product(2).unwrap().is_unmeasured() && mean.product(3).is_none());
     }
 
     /// Errors whose squares no double holds give means as others do, in units of their own.

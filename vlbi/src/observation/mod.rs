@@ -65,7 +65,7 @@ pub struct Measured {
 impl Measured {
     /// Whether it stands for a product that was not measured: exactly 0 with an error of 0, which
     /// eht-imaging writes for the cross hands of Stokes I alone.
-    pub fn is_placeholder(&self) -> bool {
+    pub fn is_unmeasured(&self) -> bool {
         self.noise_sigma == 0.0 && self.visibility == Complex64::new(0.0, 0.0)
     }
 }
@@ -95,7 +95,7 @@ impl Row {
 
     /// The products that Stokes I is made of: itself, or the parallel hands that were measured.
     pub fn parts_of_i(&self, basis: Basis) -> [Option<Measured>; 2] {
-        let hand = |k: usize| self.product(k).filter(|hand| !hand.is_placeholder());
+        let hand = |k: usize| self.product(k).filter(|hand| !hand.is_unmeasured());
         match basis {
             Basis::Stokes => [self.product(0), None],
             Basis::Circular => [hand(0), hand(1)],
@@ -212,7 +212,7 @@ impl Observation {
 
     /// Whether more than total intensity was measured: RL and LR, or Q, U or V.
     pub fn is_polarized(&self) -> bool {
-        let measured = |row: &Row, k: usize| row.product(k).is_some_and(|p| !p.is_placeholder());
+        let measured = |row: &Row, k: usize| row.product(k).is_some_and(|p| !p.is_unmeasured());
         self.rows.iter().any(|row| match self.basis {
             Basis::Circular => measured(row, 2) || measured(row, 3),
             Basis::Stokes => (1..4).any(|k| measured(row, k)),

@@ -51,7 +51,7 @@ impl Products {
 }
 
 fn measured(row: &Row, product: usize) -> Option<Measured> {
-    row.product(product).filter(|datum| !datum.is_placeholder())
+    row.product(product).filter(|datum| !datum.is_unmeasured())
 }
 
 #[cfg(test)]

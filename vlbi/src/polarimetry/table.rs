@@ -76,7 +76,7 @@ impl LeakageTable {
         let terms: Vec<_> = observation.stations.iter().map(|s| self.of(&s.name)).collect();
         let known = |row: &Row| {
             let has_terms = row.stations.iter().all(|k| terms[usize::from(*k)].is_some());
-            has_terms && (0..4).all(|k| row.product(k).is_some_and(|x| !x.is_placeholder()))
+            has_terms && (0..4).all(|k| row.product(k).is_some_and(|x| !x.is_unmeasured()))
         };
         observation.rows.retain(known);
         let turns = turns(observation)?;
