@@ -43,6 +43,7 @@ mod quiescent;
 mod radiative_transfer;
 mod readme;
 mod reference;
+mod resolved_rings;
 mod results;
 mod resume;
 mod resumed_fits;

@@ -150,8 +150,7 @@ fn mean_product(rows: &[Row], k: usize, weighted: bool) -> (Complex64, f64) {
     let all = || rows.iter().filter_map(|row| row.product(k));
     // A mean of nothing measured is not measured either.
     let only_unmeasured = all().all(|m| m.is_unmeasured());
-    let present: Vec<Measured> =
-        all().filter(|m| only_unmeasured || !m.is_unmeasured()).collect();
+    let present: Vec<Measured> = all().filter(|m| only_unmeasured || !m.is_unmeasured()).collect();
     if present.is_empty() {
         return (Complex64::new(0.0, 0.0), f64::NAN);
     }
