@@ -33,7 +33,7 @@ pub fn chosen(folder: &Folder, file: &FitFile) -> anyhow::Result<Option<Choice>>
     let Some(results) = found(folder).with_context(damaged)? else { return Ok(None) };
     let Some(unknown) = file.unknown_world()? else { return Ok(None) };
     world_results::lines(&results).iter().for_each(|line| eprintln!("{line}"));
-    let world = world_of(file, &unknown.free()?, &results).with_context(damaged)?;
+    let world = world_of(file, &unknown.free, &results).with_context(damaged)?;
     Ok(Some(Choice::World(world)))
 }
 
@@ -89,8 +89,8 @@ fn results(
     unknown: &UnknownWorld,
     found: &FoundWorld,
 ) -> anyhow::Result<Value> {
-    let free = unknown.free()?;
-    let world = |world: &World| values(&free, |_, parameter| Some(world.get(parameter)));
+    let free = &unknown.free;
+    let world = |world: &World| values(free, |_, parameter| Some(world.get(parameter)));
     let spread = found.spread.as_ref();
     let sigma = |k: usize| spread.map(|spread| spread.sigma[k]);
     let open = |k: usize| spread.is_none_or(|spread| spread.open[k]);
@@ -99,8 +99,8 @@ fn results(
     let trial = |trial: &Trial| {
         json!({
             "start": world(&trial.start), "end": world(&trial.end), "above_best": trial.value - least,
-            "worlds": trial.worlds, "converged": has_converged(&free, trial, &sigma),
-            "same": is_same(&free, trial, (&found.trials, &sigma)),
+            "worlds": trial.worlds, "converged": has_converged(free, trial, &sigma),
+            "same": is_same(free, trial, (&found.trials, &sigma)),
         })
     };
     let trials: Vec<Value> = found.trials.iter().map(trial).collect();
@@ -115,12 +115,12 @@ fn results(
     Ok(json!({
         "world": world(&found.world),
         "flow_error": flow,
-        "sigma": values(&free, |k, _| sigma(k)),
+        "sigma": values(free, |k, _| sigma(k)),
         "open": free.iter().enumerate().map(|(k, f)| (f.parameter.name().to_owned(), json!(open(k))))
             .collect::<Map<String, Value>>(),
-        "interval_68": intervals(&free, &found.world, &sigma, Span::ONE_SIGMA),
-        "interval_95": intervals(&free, &found.world, &sigma, Span::NEARLY_ALL),
-        "model_error": spread.map(|spread| own(&free, spread)),
+        "interval_68": intervals(free, &found.world, &sigma, Span::ONE_SIGMA),
+        "interval_95": intervals(free, &found.world, &sigma, Span::NEARLY_ALL),
+        "model_error": spread.map(|spread| own(free, spread)),
         "model_error_left_out": spread.and_then(|spread| spread.own.left_out),
         "correlation": spread.map(|spread| spread.correlation.clone()),
         "ripple": spread.map(|spread| spread.ripple),

@@ -198,10 +198,10 @@ fn worlds<'a>(
     unknown: &'a UnknownWorld,
     (folder, world): (&Folder, &Value),
 ) -> anyhow::Result<WorldPosterior<'a>> {
-    let free = unknown.free()?;
-    let best = world_search::world_of(&prepared.settings, &free, world)?;
+    let free = &unknown.free;
+    let best = world_search::world_of(&prepared.settings, free, world)?;
     let noise = world["noise_factor"].as_f64().unwrap_or(1.0);
-    let spread = world_search::spread_of(&free, best, world)?;
+    let spread = world_search::spread_of(free, best, world)?;
     // Residuals of the best world, but no less than the errors that the search assumed.
     let left = world["chi2_per_datum"].as_f64().unwrap_or(1.0);
     let is_changing = prepared.settings.change.is_some();
@@ -298,7 +298,7 @@ impl<'a> Drawing<'a> {
         let through =
             Through { file: &file, instrument: &instrument, motion: &motion, registry, measured };
         let drawn = sample::draw(&through, &data, keeper, told)?;
-        let values = world_search::values_of(&unknown.free()?, &world);
+        let values = world_search::values_of(&unknown.free, &world);
         Ok(drawn.map(|drawn| (drawn, values)))
     }
 }

@@ -51,11 +51,6 @@ impl Quantity {
             Self::Prior(prior) => Some(*prior),
         }
     }
-
-    /// Whether it is this value.
-    pub(super) fn is(&self, value: &f64) -> bool {
-        *self == Self::Value(*value)
-    }
 }
 
 impl From<f64> for Quantity {

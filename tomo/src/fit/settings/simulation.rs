@@ -385,12 +385,9 @@ mod tests {
     }
 
     fn with(changes: &str) -> FitFile {
-        let mut file = built_in();
-        let table = toml_file::table_of(&file).unwrap();
-        let mut table = Table::from_iter(table);
+        let mut table = toml_file::table_of(&built_in()).unwrap();
         merge(&mut table, &changes.parse().unwrap());
-        file = toml_file::read_table(&table).unwrap();
-        file
+        toml_file::read_table(&table).unwrap()
     }
 
     #[test]

@@ -9,20 +9,10 @@ use rand_pcg::Pcg64;
 /// Parameters of the geometry that have a prior in place of a value, and the search for them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnknownWorld {
-    /// With their keys.
-    priors: Vec<(Parameter, &'static str, PriorSettings)>,
+    /// The free parameters.
+    pub free: Vec<Free>,
     /// How they are searched for.
     pub search: WorldSearch,
-}
-
-impl UnknownWorld {
-    /// The free parameters.
-    ///
-    /// # Errors
-    /// If a prior is no density on possible values.
-    pub fn free(&self) -> Result<Vec<Free>, Error> {
-        self.priors.iter().map(|prior| free(*prior)).collect()
-    }
 }
 
 /// Why finer steps are refused.
@@ -59,16 +49,16 @@ impl FitFile {
     /// If a prior is out of range, or settings of the search contradict the data.
     pub fn unknown_world(&self) -> Result<Option<UnknownWorld>, Error> {
         let all = self.quantities().into_iter();
-        let priors: Vec<_> = all.filter_map(|(p, key, q)| Some((p, key, q.prior()?))).collect();
+        let priors = all.filter_map(|(p, key, q)| Some((p, key, q.prior()?)));
+        let free: Vec<Free> = priors.map(free).collect::<Result<_, _>>()?;
         let given = self.search.clone();
-        if priors.is_empty() {
+        if free.is_empty() {
             return match given {
                 None => Ok(None),
                 Some(_) => Err(FitError::Conflict(NOTHING.to_owned()).into()),
             };
         }
-        let unknown = UnknownWorld { priors, search: given.unwrap_or_default() };
-        unknown.free()?;
+        let unknown = UnknownWorld { free, search: given.unwrap_or_default() };
         if unknown.search.finest.is_some() && !self.is_stepped() {
             return Err(FitError::Conflict(NO_STEPS.to_owned()).into());
         }

@@ -49,7 +49,7 @@ fn north() -> Quantity {
 }
 
 fn is_north(angle: &Quantity) -> bool {
-    angle.is(&0.0)
+    *angle == north()
 }
 
 /// Pixels of the model.

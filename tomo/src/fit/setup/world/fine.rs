@@ -55,9 +55,9 @@ impl Detail<'_> {
         let (polished, reduced) =
             self.through((&seen, &finest), errors, |fine, problem| fine.finest(problem, world))?;
         let world = polished.best.world;
-        let free = self.unknown.free()?;
+        let free = &self.unknown.free;
         // What finer voxels and pixels moved the world by is what finer ones still might.
-        let spread = spread.map(|spread| spread.moved(&free, world));
+        let spread = spread.map(|spread| spread.moved(free, world));
         let spread = self.beside_its_own((&seen, &finest), errors, (spread, reduced))?;
         Ok(Some(((spread, reduced, world), errors)))
     }
@@ -74,7 +74,7 @@ impl Detail<'_> {
         let own = self.through((seen, view), scale, |_, problem| {
             discretisation::errors((seen, view), about, problem, (&spread, reduced))
         })?;
-        Ok(Some(spread.beside(&self.unknown.free()?, own)))
+        Ok(Some(spread.beside(&self.unknown.free, own)))
     }
 
     fn through<R>(

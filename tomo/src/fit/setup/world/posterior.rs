@@ -142,7 +142,15 @@ impl<'a> WorldPosterior<'a> {
             DMatrix::from_fn(n, n, |a, b| correlation[a * n + b] * sigma[a] * sigma[b]);
         let apart = || DMatrix::from_diagonal(&DVector::from_column_slice(sigma));
         let root = covariance.cholesky().map_or_else(apart, |factors| factors.l());
-        Ok(Self { file, measured, free: unknown.free()?, world, root, open: open.clone(), factor })
+        Ok(Self {
+            file,
+            measured,
+            free: unknown.free.clone(),
+            world,
+            root,
+            open: open.clone(),
+            factor,
+        })
     }
 
     /// Noise of a draw over the data's errors.

@@ -120,7 +120,7 @@ impl Seen {
         search(&WorldProblem {
             model: &model(file, instrument, &plain)?,
             known: known_world(file),
-            free: &unknown.free()?,
+            free: &unknown.free,
             frames: &frames,
             terms: &terms,
             half_width: file.region.r_max,
