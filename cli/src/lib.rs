@@ -17,7 +17,7 @@
 //! }
 //! ```
 //!
-//! From then on `representation.kind = "small"` with `representation.own.width = 32` works in every fit and every
+//! From then on `representation.kind = "small"` with `representation.own.settings.width = 32` works in every fit and every
 //! comparison of that program.
 
 /// As the standard library's, but a message that cannot be written, as into a file on a full disk, is no panic, control

@@ -6,9 +6,9 @@ A class in a module of yours, ``blobs.py``, ::
         def __init__(self, region, *, count):
             ...
 
-has the name ``"blobs:Blobs"`` in fit files and experiments, with its keywords in ``representation.own``::
+has the name ``"blobs:Blobs"`` in fit files and experiments, with its keywords in ``representation.own.settings``::
 
-    kerrlight.Fit(set={"representation.kind": "blobs:Blobs", "representation.own": {"count": 64}})
+    kerrlight.Fit(set={"representation.kind": "blobs:Blobs", "representation.own.settings": {"count": 64}})
 
 :class:`kerrlight.jax.Representation` and :class:`kerrlight.torch.Representation` need the function alone: derivatives
 are theirs.
@@ -47,7 +47,7 @@ class Region:
 class Representation(ABC):
     """Emission e(x; parameters) at batches of points.
 
-    A fit makes one of the region and the keywords in ``representation.own``. A value may not depend on the batch that
+    A fit makes one of the region and the keywords in ``representation.own.settings``. A value may not depend on the batch that
     its point is in, nor on chance: a fit that was stopped resumes to the same bytes.
     """
 

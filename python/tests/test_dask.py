@@ -23,7 +23,7 @@ region.r_min = 3.0
 region.r_max = 4.2
 simulation.movie.frames = 2
 output.nodes = 6
-representation = {{ kind = "grid", nodes = 6 }}
+representation = {{ kind = "grid", grid.nodes = 6 }}
 region.nodes = {{ equal-mino-time = {{ per_ray = 8 }} }}
 training = {{ steps = 2000, log_every = 10, start = "drawn", checkpoint_seconds = 0.1 }}
 """

@@ -7,7 +7,7 @@ from kerrlight import Fit, Posterior
 
 LINEAR = {
     "representation.kind": "linear-grid",
-    "representation.nodes": 10,
+    "representation.linear-grid.nodes": 10,
     "linear": {"rounds": 2, "iterations": 20},
     "screen.pixels": 16,
     "output.nodes": 10,

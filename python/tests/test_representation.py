@@ -59,11 +59,12 @@ class Wrong(Voxels):
 '''
 
 QUICK = {
-    "training": {"steps": 6, "log_every": 1, "start": "drawn", "batch": {"frames": 2}, "rate": 0.01, "last_rate": 0.01},
+    "training": {"steps": 6, "log_every": 1, "start": "drawn", "batch": {"frames": 2}},
     "output.nodes": 12,
     "screen.pixels": 16,
     "simulation.observation.scans": 8,
 }
+RATES = {"rate": 0.01, "last_rate": 0.01}
 
 
 @pytest.fixture
@@ -81,11 +82,10 @@ def losses(fit):
 
 
 def test_the_same_fit_as_with_the_grid_of_the_program(voxels):
-    ours = {"kind": voxels, "own": {"nodes": 12}}
+    ours = {"kind": voxels, "own": {"settings": {"nodes": 12}, **RATES}}
     mine = Fit(folder="mine", set={**QUICK, "representation": ours}).run(progress=False)
-    theirs = {"kind": "grid", "nodes": 12, "activation": "linear"}
-    rates = {"training.grid_rate": 0.01, "training.grid_last_rate": 0.01}
-    grid = Fit(folder="grid", set={**QUICK, **rates, "representation": theirs}).run(progress=False)
+    theirs = {"kind": "grid", "activation": "linear", "grid": {"nodes": 12, **RATES}}
+    grid = Fit(folder="grid", set={**QUICK, "representation": theirs}).run(progress=False)
     # Sums in single precision have another order here, and Adam divides by their size.
     np.testing.assert_allclose(losses(mine), losses(grid), rtol=1e-3)
     assert losses(mine)[-1] < losses(mine)[0]
@@ -94,7 +94,8 @@ def test_the_same_fit_as_with_the_grid_of_the_program(voxels):
 
 
 def test_stopped_and_resumed(voxels):
-    chosen = {**QUICK, "representation": {"kind": f"{pathlib.Path('own_voxels.py')}:Voxels", "own": {"nodes": 8}}}
+    own = {"settings": {"nodes": 8}, **RATES}
+    chosen = {**QUICK, "representation": {"kind": f"{pathlib.Path('own_voxels.py')}:Voxels", "own": own}}
     whole = Fit(folder="whole", set=chosen).run(progress=False)
 
     def stop(step):
@@ -109,10 +110,9 @@ def test_stopped_and_resumed(voxels):
 
 
 def test_takes_part_in_a_comparison(voxels):
-    own = {"representation": {"kind": voxels, "own": {"nodes": 8}}}
-    grid = {"representation": {"kind": "grid", "nodes": 8, "activation": "linear"}}
-    rates = {"training": {"grid_rate": 0.01, "grid_last_rate": 0.01}}
-    levels = [{"name": "mine", "set": own}, {"name": "grid", "set": {**grid, **rates}}]
+    own = {"representation": {"kind": voxels, "own": {"settings": {"nodes": 8}, **RATES}}}
+    grid = {"representation": {"kind": "grid", "activation": "linear", "grid": {"nodes": 8, **RATES}}}
+    levels = [{"name": "mine", "set": own}, {"name": "grid", "set": grid}]
     pathlib.Path("fit.toml").write_text(Fit().settings, encoding="utf-8")
     experiment = {
         "title": "Mine and theirs",
@@ -142,7 +142,7 @@ def test_what_goes_wrong(voxels, capfd):
         ({"kind": "no_such_module:Voxels"}, "No module named 'no_such_module'"),
         ({"kind": "own_voxels:Nothing"}, "has no attribute 'Nothing'"),
         ({"kind": voxels}, "nodes"),
-        ({"kind": voxels, "own": {"nodes": 8, "colour": 1}}, "colour"),
+        ({"kind": voxels, "own": {"settings": {"nodes": 8, "colour": 1}}}, "colour"),
     ]:
         with pytest.raises(ValueError) as refused:
             fit(**chosen)
@@ -155,7 +155,7 @@ def test_what_goes_wrong(voxels, capfd):
         with pytest.raises(kerrlight.FitError) as failed:
             Fit(
                 folder=f"wrong-{how}",
-                set={**QUICK, "representation": {"kind": "own_voxels:Wrong", "own": {"how": how}}},
+                set={**QUICK, "representation": {"kind": "own_voxels:Wrong", "own": {"settings": {"how": how}}}},
             ).run(progress=False)
         assert words in str(failed.value) and failed.value.__cause__ is not None
     assert capfd.readouterr().err == ""
@@ -212,7 +212,7 @@ def test_jax(tmp_path, monkeypatch):
     own = own_blobs.Blobs(kerrlight.Region(2.0, 8.0, np.inf), count=7)
     own.chunk = 64
     derivatives(own)
-    chosen = {"kind": "own_blobs:Blobs", "own": {"count": 16}}
+    chosen = {"kind": "own_blobs:Blobs", "own": {"settings": {"count": 16}, **RATES}}
     settings = {**QUICK, "representation": chosen, "training.batch": {"frames": 8}}
     fit = Fit(folder="run", set=settings).run(progress=False)
     assert losses(fit)[-1] < losses(fit)[0]

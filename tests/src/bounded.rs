@@ -47,7 +47,8 @@ fn exact_numbers_that_would_take_too_much_are_named() {
     ] {
         refused(at, "2GiB", &set(change), said);
     }
-    let nodes = [&set("representation=grid")[..], &["--set", "representation.nodes=1000"]].concat();
+    let nodes =
+        [&set("representation=grid")[..], &["--set", "representation.grid.nodes=1000"]].concat();
     refused(at, "2GiB", &nodes, "1000000000 parameters");
     refused(at, "64MiB", &["render", "--set", "screen.width=16384"], "screen.width = 16384");
     let scene = crate::support::root().join("scenes/disc_face_on.toml");
@@ -144,7 +145,7 @@ fn exact_a_movie_in_a_file_gives_the_same_bytes() {
         "training.steps=4",
         "output.nodes=12",
         "representation=grid",
-        "representation.nodes=12",
+        "representation.grid.nodes=12",
         "training.start={linear={nodes=12,stride=400,steps=4}}",
     ];
     let set: Vec<&str> = set.iter().flat_map(|change| ["--set", *change]).collect();
@@ -185,9 +186,10 @@ fn exact_the_least_limit_that_is_said_is_enough() {
     let images = crate::support::root().join("scenes/fits/flare_images.toml");
     let images = ["fit", images.to_str().unwrap()];
     let few = ["training.steps=3", "output.nodes=16", "training.start=drawn"];
-    let linear = ["representation=linear-grid", "representation.nodes=20", "output.nodes=16"];
+    let linear =
+        ["representation=linear-grid", "representation.linear-grid.nodes=20", "output.nodes=16"];
     let fine = ["screen.pixels=96", "simulation.movie.frames=600"];
-    let grid = ["representation=grid", "representation.nodes=20"];
+    let grid = ["representation=grid", "representation.grid.nodes=20"];
     let cases: [(&[&str], Vec<&str>, f64); 4] = [
         (&images, few.to_vec(), 120.0),
         (&images, linear.to_vec(), 300.0),
@@ -224,7 +226,7 @@ fn exact_a_sequence_of_images_is_a_movie() {
         "training.steps=4",
         "output.nodes=12",
         "representation=grid",
-        "representation.nodes=12",
+        "representation.grid.nodes=12",
         "training.start={linear={nodes=12,stride=2,steps=4}}",
     ];
     let set: Vec<&str> = set.iter().flat_map(|change| ["--set", *change]).collect();

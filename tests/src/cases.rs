@@ -23,12 +23,12 @@ pub fn experiment(folder: &Path, seeds: usize, steps: usize) {
         region.r_max = 4.2
         simulation.movie.frames = 2
         output.nodes = 6
-        representation = {{ kind = "grid", nodes = 6 }}
+        representation = {{ kind = "grid", grid.nodes = 6 }}
         region.nodes = {{ equal-mino-time = {{ per_ray = 8 }} }}
         training = {{ steps = {steps}, log_every = 10, start = "drawn", checkpoint_seconds = 0.1 }}
         [[factor]]
         name = "rate"
-        key = "training.grid_rate"
+        key = "representation.grid.rate"
         values = [0.1]
         "#
     );

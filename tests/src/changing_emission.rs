@@ -63,8 +63,8 @@ fn exact_onset_and_end_of_a_flare_are_found_within_one_frame() {
 /// Of a representation that is learnt, from voxels that change.
 const LEARNT: [&str; 8] = [
     "training.steps=60",
-    "training.rate=5e-4",
-    "training.last_rate=5e-6",
+    "representation.network.rate=5e-4",
+    "representation.network.last_rate=5e-6",
     "training.ramp=10",
     "training.batch={frames=6}",
     "training.start={linear={nodes=20,stride=1,steps=200}}",
@@ -78,12 +78,19 @@ fn exact_what_is_learnt_may_change_as_voxels_may() {
     let voxels = tempfile::tempdir().unwrap();
     let bound = 1.05 * fit(voxels.path(), &[])["nrmse_over_time"].as_f64().unwrap();
     let mask = "training.occupancy={cells=16,threshold=0.003,memory=0.8,warm_up=0,every=20}";
-    let network = ["representation.width=48", "representation.length_scale=2.0", mask];
+    let network =
+        ["representation.network.width=48", "representation.network.length_scale=2.0", mask];
     let network = [&network[..], &["representation.kind=bhnerf", "training.optimiser=muon"]];
     let grid = ["representation.kind=grid", "representation.activation=softplus"];
-    let rate = ["training.rate=5e-2", "training.last_rate=5e-4", "change.spacing=4.0"];
-    let features = ["representation.kind=feature-grid", "representation.levels=2", mask];
-    let slower = ["training.rate=2.5e-3", "training.last_rate=1e-4"];
+    let rate = [
+        "representation.grid.rate=5e-2",
+        "representation.grid.last_rate=5e-4",
+        "change.spacing=4.0",
+    ];
+    let features =
+        ["representation.kind=feature-grid", "representation.feature-grid.levels=2", mask];
+    let slower =
+        ["representation.feature-grid.rate=2.5e-3", "representation.feature-grid.last_rate=1e-4"];
     for kind in
         [network.concat(), [grid.as_slice(), &rate].concat(), [&features[..], &slower].concat()]
     {
@@ -107,7 +114,7 @@ fn exact_what_is_learnt_may_change_as_voxels_may() {
 #[test]
 fn exact_held_out_frames_choose_the_price_of_a_network() {
     let folder = tempfile::tempdir().unwrap();
-    let network = ["representation.kind=bhnerf", "representation.width=16"];
+    let network = ["representation.kind=bhnerf", "representation.network.width=16"];
     let held = "held_out={setting=\"change.weight\",values=[0.003,3.0],folds=2}";
     let few = ["training.steps=2", "linear.iterations=10", held];
     let results = fit(folder.path(), &[&LEARNT[..], &network, &few].concat());

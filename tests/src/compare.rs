@@ -17,12 +17,12 @@ fn experiment(folder: &Path, changes: &[(&str, &str)]) {
         screen.pixels = 16
         simulation.movie.frames = 8
         output.nodes = 16
-        representation = {{ kind = "grid", nodes = 16 }}
+        representation = {{ kind = "grid", grid.nodes = 16 }}
         region.nodes = {{ equal-mino-time = {{ per_ray = 40 }} }}
         training = {{ steps = 30, log_every = 10, start = "drawn" }}
         [[factor]]
         name = "rate"
-        key = "training.grid_rate"
+        key = "representation.grid.rate"
         values = [0.1, 0.4]
         [[table]]
         title = "Quality"
@@ -160,7 +160,7 @@ fn a_case_that_fills_the_disk_is_named_and_done_later() {
     let at = folder.path();
     let nodes = [
         ("\"rate\"", "\"nodes\""),
-        ("\"training.grid_rate\"", "\"output.nodes\""),
+        ("\"representation.grid.rate\"", "\"output.nodes\""),
         ("[0.1, 0.4]", "[128, 16]"),
     ];
     experiment(at, &nodes);
@@ -340,7 +340,8 @@ fn exact_chi2_of_several_kinds_of_data_has_tables_of_its_own() {
     let at = folder.path();
     let one = "{ data = \"image\", weight = 1.0, sigma = 1.0 }";
     let two = format!("[{one}, {{ data = \"light-curve\", weight = 1.0, sigma = 1.0 }}]");
-    let rate = "name = \"rate\"\n        key = \"training.grid_rate\"\n        values = [0.1, 0.4]";
+    let rate =
+        "name = \"rate\"\n        key = \"representation.grid.rate\"\n        values = [0.1, 0.4]";
     let levels = format!(
         "name = \"rate\"\n[[factor.level]]\nname = \"one\"\nset.loss = [{one}]\n[[factor.level]]\nname = \"both\"\n\
          set.loss = {two}"

@@ -12,7 +12,7 @@ fn small_of(file: &Path) -> Vec<String> {
         "screen.pixels=20",
         "region.nodes={equal-mino-time={per_ray=40}}",
         "simulation.movie.frames=16",
-        "representation.width=32",
+        "representation.network.width=32",
         "training.steps=150",
         "training.log_every=50",
         "training.batch={pixels=200}",
@@ -182,7 +182,7 @@ fn bad_input_is_named_and_nothing_is_begun() {
     for (change, said) in [
         ("hole.spin=1.5", "spin = 1.5"),
         ("region.r_max=1.0", "r_max = 1"),
-        ("training.rate=-1.0", "training.rate = -1 is not allowed"),
+        ("representation.network.rate=-1.0", "representation.network.rate = -1 is not allowed"),
         ("training.batch={frames=0}", "training.batch.frames = 0 is not allowed: at least 1"),
         ("loss.0.sigma=0.0", "loss.0.sigma = 0 is not allowed"),
         ("loss.0.data=visibilities", "pixels work with images only"),
@@ -231,7 +231,7 @@ fn exact_visibilities_and_closures_together() {
     let set = [
         "screen.pixels=24",
         "simulation.observation.scans=8",
-        "representation.width=24",
+        "representation.network.width=24",
         "training.steps=40",
         "training.log_every=20",
         "training.start=drawn",

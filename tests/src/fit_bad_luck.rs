@@ -87,8 +87,8 @@ fn bad_settings_are_named_with_their_line() {
         ),
         (
             "kind = \"bhnerf\"",
-            "kind = \"feature-grid\"\nlevels = 0",
-            "representation.levels = 0 is not allowed: 1 to 6",
+            "kind = \"feature-grid\"\nfeature-grid.levels = 0",
+            "representation.feature-grid.levels = 0 is not allowed: 1 to 6",
         ),
     ] {
         let words = changed(folder.path(), |text| text.replacen(from, to, 1));
@@ -189,7 +189,7 @@ fn exact_frames_without_visibilities_are_left_out() {
             "--set",
             "simulation.observation.scans=8",
             "--set",
-            "representation.width=24",
+            "representation.network.width=24",
             "--set",
             "training.steps=20",
             "--set",

@@ -75,7 +75,7 @@ fn exact_light_curves_are_fitted_at_once() {
         "band.radii={from=9.0,to=11.0,step=1.0}",
         "band.inclinations_deg={from=20.0,to=40.0,step=20.0}",
         "band.nodes=21",
-        "representation.nodes=12",
+        "representation.linear-grid.nodes=12",
         "linear.rounds=1",
         "linear.iterations=5",
     ];

@@ -22,7 +22,7 @@ fn fit(folder: &Path) {
         "motion.injection_time=-8.0",
         "simulation.movie={frames=5,from=-5.0,to=60.0}",
         "representation=linear-grid",
-        "representation.nodes=24",
+        "representation.linear-grid.nodes=24",
         "training.start=drawn",
         // What a scene has between its nodes.
         "linear={upper=3.0,rounds=1,iterations=8,degree=\"linear\"}",

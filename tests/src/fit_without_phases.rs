@@ -15,7 +15,8 @@ fn small(sets: &[&str]) -> Vec<String> {
         "screen.pixels=20",
         "screen.jy_per_pixel=0.32",
         "simulation.observation.scans=12",
-        "representation.nodes=20",
+        "representation.linear-grid.nodes=20",
+        "representation.grid.nodes=20",
         // So few cubic splines are wider than the flare.
         "linear.degree=linear",
         "output.nodes=24",
@@ -36,8 +37,11 @@ fn text(folder: &Path, name: &str) -> String {
 fn exact_amplitudes_light_every_representation_and_claim_no_certificate() {
     let folder = tempfile::tempdir().unwrap();
     for kind in ["linear-grid", "grid", "bhnerf"] {
-        let words =
-            small(&[AMPLITUDES, &format!("representation.kind={kind}"), "representation.width=32"]);
+        let words = small(&[
+            AMPLITUDES,
+            &format!("representation.kind={kind}"),
+            "representation.network.width=32",
+        ]);
         succeed(folder.path(), &with(&words, &["-o", kind]));
         let run = folder.path().join(kind);
         let found = results(&run);

@@ -9,7 +9,7 @@ const SMALL: [&str; 17] = [
     "--set",
     "representation=linear-grid",
     "--set",
-    "representation.nodes=40",
+    "representation.linear-grid.nodes=40",
     "--set",
     "linear.degree=linear",
     "--set",

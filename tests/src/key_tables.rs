@@ -23,7 +23,7 @@ const COPIES: [&str; 9] = [
     "simulation.effects",
     "simulation.motion",
     "simulation.polarization",
-    "representation.own",
+    "representation.own.settings",
 ];
 
 /// Numbers that may have a prior, which is described once, under the first of them.

@@ -82,7 +82,7 @@ fn found(folder: &Path, sky: &(Sky, Vec<Arc>), noise: f64, [starts, worlds]: [us
         format!("data.movie.to={LAST}"),
         format!("loss.0.sigma={sigma}"),
         "representation=linear-grid".to_owned(),
-        "representation.nodes=24".to_owned(),
+        "representation.linear-grid.nodes=24".to_owned(),
         "linear.iterations=10".to_owned(),
         "linear.rounds=1".to_owned(),
         "output.nodes=24".to_owned(),

@@ -33,7 +33,8 @@ fn read(path: &Path) -> Value {
 fn exact_draws_of_voxels_resume_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
-    let kind = ["--set", "representation=linear-grid", "--set", "representation.nodes=20"];
+    let kind =
+        ["--set", "representation=linear-grid", "--set", "representation.linear-grid.nodes=20"];
     run(folder.path(), &[&["fit", "fit.toml", "-o", "run"][..], &kind[..]].concat());
     run(folder.path(), &["posterior", "run", "--samples", "4"]);
     let of = |name: &str| std::fs::read(folder.path().join("run/posterior").join(name)).unwrap();
@@ -84,7 +85,7 @@ fn exact_draws_of_a_right_model_predict_the_data() {
         ),
         "simulation.observation.scans=5".to_owned(),
         "representation=linear-grid".to_owned(),
-        "representation.nodes=12".to_owned(),
+        "representation.linear-grid.nodes=12".to_owned(),
         format!(
             "linear={{upper=10.0,degree=\"linear\",rounds=3,iterations=300,prior={{{field}}}}}"
         ),
@@ -113,7 +114,8 @@ fn exact_draws_of_a_right_model_predict_the_data() {
 fn exact_draws_survive_a_kill() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
-    let kind = ["--set", "representation=linear-grid", "--set", "representation.nodes=20"];
+    let kind =
+        ["--set", "representation=linear-grid", "--set", "representation.linear-grid.nodes=20"];
     for name in ["run", "killed"] {
         run(folder.path(), &[&["fit", "fit.toml", "-o", name][..], &kind[..]].concat());
     }
@@ -156,7 +158,8 @@ fn exact_draws_with_a_prior_resume_to_the_same_bytes() {
 fn same_again(prior: &str) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
-    let kind = ["--set", "representation=linear-grid", "--set", "representation.nodes=14"];
+    let kind =
+        ["--set", "representation=linear-grid", "--set", "representation.linear-grid.nodes=14"];
     let kind = [&kind[..], &["--set", prior]].concat();
     run(folder.path(), &[&["fit", "fit.toml", "-o", "run", "--samples", "3"][..], &kind].concat());
     let of = |name: &str| std::fs::read(folder.path().join("run/posterior").join(name)).unwrap();
@@ -241,7 +244,8 @@ fn exact_draws_of_an_unknown_world_have_worlds() {
     let search = format!("starts = 1\ncoarse = {view}\nfine = {view}\n");
     let text = of_unknown_view(&settings(), NEAR, &search);
     std::fs::write(folder.path().join("fit.toml"), text).unwrap();
-    let kind = ["--set", "representation=linear-grid", "--set", "representation.nodes=20"];
+    let kind =
+        ["--set", "representation=linear-grid", "--set", "representation.linear-grid.nodes=20"];
     let told = run(
         folder.path(),
         &[&["fit", "fit.toml", "-o", "run", "--samples", "3"][..], &kind[..]].concat(),

@@ -23,7 +23,7 @@ const SMALL: [&str; 10] = [
     "--set",
     "simulation.truth.spot.0.sigma=1.2",
     "--set",
-    "representation.nodes=16",
+    "representation.linear-grid.nodes=16",
     "--set",
     "output.nodes=24",
 ];

@@ -182,7 +182,7 @@ fn exact_fit_ends_with_its_verdict_and_results() {
         "screen.pixels=16",
         "simulation.movie.frames=8",
         "output.nodes=16",
-        "representation={kind=\"grid\",nodes=16}",
+        "representation={kind=\"grid\",grid.nodes=16}",
         "region.nodes={equal-mino-time={per_ray=40}}",
         "training.steps=5",
         "training.log_every=5",

@@ -30,7 +30,7 @@ fn of_an_array(at: &Path) -> Vec<String> {
     for change in [
         "simulation.observation.array=array.txt",
         "representation=grid",
-        "representation.nodes=12",
+        "representation.grid.nodes=12",
         "screen.pixels=12",
         "simulation.observation.scans=6",
         "training.steps=400",
@@ -117,7 +117,7 @@ fn exact_changed_inputs_and_damaged_state_are_refused() {
     std::fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
     assert!(refused(at).contains("remove it to start over"));
     // Of the same fit with other settings.
-    succeed(at, &[&words[..], &["-o", "other", "--set", "training.grid_rate=2e-3"]].concat());
+    succeed(at, &[&words[..], &["-o", "other", "--set", "representation.grid.rate=2e-3"]].concat());
     std::fs::copy(at.join("other/checkpoint.safetensors"), &path).unwrap();
     assert!(refused(at).contains("belongs to a run with other settings"));
     std::fs::write(&path, &bytes).unwrap();
@@ -216,7 +216,7 @@ fn exact_comparisons_are_resumed_alone_with_the_same_data() {
         training = {{ steps = 4, log_every = 2, start = "drawn" }}
         [[factor]]
         name = "rate"
-        key = "training.rate"
+        key = "representation.network.rate"
         values = [1e-4, 2e-4]
         "#,
         root().join("cli/src/fit/built_in.toml")

@@ -7,8 +7,14 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// A fit of few voxels.
-const VOXELS: [&str; 6] =
-    ["fit", "fit.toml", "--set", "representation=linear-grid", "--set", "representation.nodes=16"];
+const VOXELS: [&str; 6] = [
+    "fit",
+    "fit.toml",
+    "--set",
+    "representation=linear-grid",
+    "--set",
+    "representation.linear-grid.nodes=16",
+];
 
 /// Kills a fit once its search has so many results, and resumes it: what it says then.
 fn killed_and_resumed(at: &Path, words: &[&str], results: usize) -> String {
@@ -66,7 +72,7 @@ fn exact_a_killed_weighing_of_bands_resumes_to_the_same_bytes() {
         "band.widths=[2.0]",
         "band.lengths=[4.0]",
         "screen.pixels=24",
-        "representation.nodes=12",
+        "representation.linear-grid.nodes=12",
         "linear.rounds=1",
         "linear.iterations=10",
         "output.nodes=16",

@@ -119,12 +119,12 @@ fn experiment(folder: &Path) {
         screen.pixels = 16
         simulation.movie.frames = 8
         output.nodes = 16
-        representation = {{ kind = "grid", nodes = 16 }}
+        representation = {{ kind = "grid", grid.nodes = 16 }}
         region.nodes = {{ equal-mino-time = {{ per_ray = 40 }} }}
         training = {{ steps = 1000000, log_every = 10, start = "drawn" }}
         [[factor]]
         name = "rate"
-        key = "training.grid_rate"
+        key = "representation.grid.rate"
         values = [0.1, 0.4]
         "#
     );

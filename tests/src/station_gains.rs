@@ -16,7 +16,7 @@ fn small(sets: &[&str]) -> Vec<String> {
         "screen.jy_per_pixel=0.32",
         "simulation.observation.scans=16",
         "representation=linear-grid",
-        "representation.nodes=24",
+        "representation.linear-grid.nodes=24",
         "linear.smoothness=0.03",
         "output.nodes=24",
     ];

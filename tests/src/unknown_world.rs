@@ -190,7 +190,7 @@ fn exact_finer_steps_count_what_they_move_the_world_by() {
         "search.starts=1",
         "screen.ring_rays=4",
         "representation=linear-grid",
-        "representation.nodes=20",
+        "representation.linear-grid.nodes=20",
     ];
     let fit = |more: &[&str]| {
         let mut words = vec!["fit", "fit.toml"];

@@ -11,7 +11,7 @@ const SMALL: [&str; 14] = [
     "--set",
     "representation=linear-grid",
     "--set",
-    "representation.nodes=24",
+    "representation.linear-grid.nodes=24",
     // So few cubic splines are wider than the flare.
     "--set",
     "linear.degree=linear",

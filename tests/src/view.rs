@@ -308,7 +308,7 @@ fn code_the_page_of_a_fit_has_volume_truth_and_data() {
         "screen.pixels=12",
         "simulation.movie.frames=6",
         "representation=bhnerf",
-        "representation.width=16",
+        "representation.network.width=16",
         "training.steps=20",
         "training.start={linear={nodes=10,stride=1,steps=60}}",
         "output.nodes=20",

@@ -12,7 +12,7 @@
 //! let mut settings = FitFile::new(Hole::new(0.5), 40.0, [3.0, 10.0], Kind::LinearGrid)
 //!     .simulating(truth, (8, 0.0, 60.0), 1e-2);
 //! settings.screen.pixels = 16;
-//! settings.representation.nodes = Some(14);
+//! settings.representation.linear_grid.nodes = 14;
 //! settings.output.nodes = 20;
 //! let recovery = fit(&Problem::simulated(settings, None)?, &mut Silent)?;
 //! println!("{}", recovery.judged.worth());

@@ -196,7 +196,7 @@ mod tests {
         set.axis.scan = { directions = 50, frames = 4, pixels = 20, rate = 0.0, last_rate = 0.0 }
         [[factor]]
         name = "rate"
-        key = "training.rate"
+        key = "representation.network.rate"
         values = [1.0, 2]
         scale = 1e-3
         [[skip]]
@@ -224,7 +224,7 @@ mod tests {
         assert_ne!(cases[0].slug(), cases[1].slug());
         let (grid, scan) = (table(&cases[1]), table(&cases[2]));
         assert_eq!(grid["representation"]["kind"].as_str(), Some("grid"));
-        assert_eq!(grid["training"]["rate"].as_float(), Some(2e-3));
+        assert_eq!(grid["representation"]["network"]["rate"].as_float(), Some(2e-3));
         assert_eq!(grid["training"]["steps"].as_integer(), Some(7));
         assert!(!grid["training"].as_table().unwrap().contains_key("occupancy"));
         let axis = scan["axis"].as_table().unwrap();

@@ -19,7 +19,7 @@ const SHOWN: [(&str, &str); 9] = [
     ("simulation.movie.frames", "frames of the movie"),
     ("simulation.observation.scans", "scans of the observation"),
     ("simulation.observation.noise", "noise"),
-    ("representation.nodes", "nodes along each side of a grid, where the representation is one"),
+    ("representation.linear-grid.nodes", "nodes along each side of a linear grid"),
     ("linear.rounds", "rounds of the linear problem"),
     ("linear.iterations", "iterations of a round"),
     ("output.nodes", "nodes along each side of the volume that is judged"),

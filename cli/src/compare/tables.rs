@@ -248,7 +248,7 @@ pub mod tests {
         values = ["bhnerf", "grid"]
         [[factor]]
         name = "rate"
-        key = "training.rate"
+        key = "representation.network.rate"
         values = [1e-3, 2e-3]
         [[table]]
         title = "Best"

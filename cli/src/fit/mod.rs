@@ -133,9 +133,6 @@ impl Fit {
             eprint!("{text}\n{}", guess.sentences(&text));
         }
         let work = Work::read_changed(&changed)?;
-        if let Some(unused) = work.unused(&text) {
-            eprintln!("note: {unused}");
-        }
         if self.samples.is_some() {
             work.check_draws()?;
         }

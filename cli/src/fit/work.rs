@@ -69,18 +69,6 @@ impl Work {
         })
     }
 
-    /// Keys of the text that it has no use for, in a sentence.
-    pub fn unused(&self, text: &str) -> Option<String> {
-        let Work::Emission(file) = self else { return None };
-        let kind = &file.representation.kind;
-        let foreign = kind.foreign_keys(text);
-        let keys: Vec<String> = foreign.iter().map(|key| format!("representation.{key}")).collect();
-        let are = if keys.len() == 1 { "is" } else { "are" };
-        (!keys.is_empty()).then(|| {
-            format!("{} has no use for {}, which {are} passed over", kind.name(), keys.join(", "))
-        })
-    }
-
     /// With its data, whose relative paths start from `base_dir`.
     pub fn prepared(self, base_dir: &Path, registry: &Registry) -> anyhow::Result<Prepared> {
         Ok(match self {

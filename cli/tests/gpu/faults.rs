@@ -38,7 +38,7 @@ fn steps() -> Words {
         "screen.pixels=12",
         "region.nodes={equal-mino-time={per_ray=20}}",
         "simulation.movie.frames=6",
-        "representation.width=16",
+        "representation.network.width=16",
         "training.steps=60",
         "training.log_every=20",
         "training.batch={pixels=60}",

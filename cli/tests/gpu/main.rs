@@ -160,7 +160,7 @@ fn scene_1(more: &[&str]) -> Vec<String> {
         "screen.pixels=20",
         "region.nodes={equal-mino-time={per_ray=40}}",
         "simulation.movie.frames=16",
-        "representation.width=32",
+        "representation.network.width=32",
         "training.optimiser=adam",
         "training.steps=150",
         "training.log_every=50",
@@ -248,7 +248,7 @@ fn code_fits_of_visibilities_are_those_of_the_processor() {
         None,
         &[
             "representation=bhnerf",
-            "representation.width=16",
+            "representation.network.width=16",
             "screen.pixels=12",
             "simulation.observation.scans=6",
             "training.optimiser=adam",

@@ -72,7 +72,7 @@ impl Fit<'_, '_> {
         let measured = self.measured;
         let trainer = &mut self.trainer;
         if file.representation.kind == Kind::LinearGrid {
-            let nodes = file.representation.grid_nodes();
+            let nodes = file.representation.linear_grid.nodes;
             let file = weighed(file, &mut trainer.objective, (axis, times), progress)?;
             let change = setup::change(&file, times)?;
             let of = (&file, measured, (axis, change), (nodes, 1));

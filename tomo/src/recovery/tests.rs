@@ -12,7 +12,7 @@ fn settings(kind: Kind) -> FitFile {
     let mut settings =
         FitFile::new(hole, 40.0, [3.0, 9.0], kind).simulating(truth, (6, 0.0, 50.0), 1e-2);
     settings.screen.pixels = 10;
-    settings.representation.nodes = Some(10);
+    settings.representation.linear_grid.nodes = 10;
     settings.output.nodes = 12;
     settings.training.start = Start::Drawn;
     settings.training.occupancy = None;

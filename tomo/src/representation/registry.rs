@@ -23,18 +23,18 @@ pub struct OwnSettings {
     pub r_max: f64,
     /// Largest |z| of the region of recovery, M; infinite where there is no limit.
     pub z_width: f64,
-    /// `representation.own` of the fit.
+    /// `representation.own.settings` of the fit.
     pub table: toml::Table,
 }
 
-/// A number of `representation.own` that is missing or out of range.
+/// A number of `representation.own.settings` that is missing or out of range.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OwnError {
     /// The number is missing: none has a default.
     #[error(
-        "representation.own.{key} is missing: add `own = {{ {key} = … }}`, a number from {low} to {high}, to \
-         [representation]"
+        "representation.own.settings.{key} is missing: add it to [representation.own.settings], a \
+         number from {low} to {high}"
     )]
     Missing {
         /// The key.
@@ -45,7 +45,7 @@ pub enum OwnError {
         high: f64,
     },
     /// The value is no number, or out of range.
-    #[error("representation.own.{key} = {value} is not allowed: {low} to {high}")]
+    #[error("representation.own.settings.{key} = {value} is not allowed: {low} to {high}")]
     Range {
         /// The key.
         key: String,
@@ -59,7 +59,7 @@ pub enum OwnError {
 }
 
 impl OwnSettings {
-    /// A number of `representation.own`, which has no default.
+    /// A number of `representation.own.settings`, which has no default.
     ///
     /// # Errors
     /// If it is missing, no number, or out of range.
@@ -141,8 +141,11 @@ mod tests {
         let build = |text: &str| registry.build("small", &own(text)).unwrap();
         assert!(build("width = 8").unwrap().parameters() > 0);
         let says = |text: &str| build(text).err().unwrap().to_string();
-        assert!(says("").starts_with("representation.own.width is missing"));
-        assert_eq!(says("width = 4"), "representation.own.width = 4 is not allowed: 8 to 512");
+        assert!(says("").starts_with("representation.own.settings.width is missing"));
+        assert_eq!(
+            says("width = 4"),
+            "representation.own.settings.width = 4 is not allowed: 8 to 512"
+        );
         assert!(registry.build("other", &own("")).is_none());
         assert!(registry.names().eq(["small"]));
         registry.find_others(|name, own| name.starts_with("plug-in:").then(|| small(own)));

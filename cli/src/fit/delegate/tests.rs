@@ -47,7 +47,7 @@ fn settings() -> String {
         "screen.pixels=8",
         "region.nodes={equal-mino-time={per_ray=10}}",
         "simulation.movie.frames=4",
-        "representation.width=8",
+        "representation.network.width=8",
         "training.steps=12",
         "training.batch={pixels=20}",
         "training.start=drawn",

@@ -38,22 +38,26 @@ pub fn explained(error: &ReadError) -> anyhow::Error {
     let unknown = text.split_once("unknown field `").and_then(|(_, rest)| rest.split('`').next());
     let advice = match (missing, unknown) {
         (Some(missing), _) => advice(missing, &error.key()),
-        (_, Some(unknown)) if error.key().is_empty() => moved(unknown).to_owned(),
+        (_, Some(unknown)) => moved(&error.key(), unknown).to_owned(),
         _ => String::new(),
     };
     anyhow::anyhow!("{text}{advice}")
 }
 
-/// Where the keys of a table are that files do not have.
-fn moved(table: &str) -> &'static str {
-    match table {
-        "world" => {
+/// Where a key or a table stands now that a table does not have.
+fn moved(table: &str, key: &str) -> &'static str {
+    match (table, key) {
+        ("", "world") => {
             "\na number that is not known has a prior in place of its value, such as `spin = { uniform = [0.0, 0.9] }` in \
              [hole]; the search for it is [search], and what differs in a simulation stands in [simulation]"
         }
-        "truth" | "observation" | "light_curve" | "movie" => {
+        ("", "truth" | "observation" | "light_curve" | "movie") => {
             "\nwhat is simulated stands in [simulation]: [simulation.truth], [simulation.movie], \
              [simulation.observation], [simulation.light_curve]; times of images that are read stand in [data.movie]"
+        }
+        ("training", rate) if rate.ends_with("rate") => {
+            "\nlearning rates stand with what is learnt: [representation.network], [representation.feature-grid], \
+             [representation.grid], [representation.own]"
         }
         _ => "",
     }

@@ -280,8 +280,8 @@ impl<'a> Drawing<'a> {
         file.seed = file.seed.wrapping_add(number);
         let has_prior = file.linear.as_ref().is_some_and(|linear| linear.prior.is_some());
         if file.representation.kind == Kind::LinearGrid && !has_prior {
-            let nodes = other_voxels(file.representation.grid_nodes(), number);
-            file.representation.nodes = Some(nodes);
+            let nodes = &mut file.representation.linear_grid.nodes;
+            *nodes = other_voxels(*nodes, number);
         }
         let noise = seed(&file, number);
         let (Some(unknown), Some(worlds)) = (self.unknown, &self.worlds) else {

@@ -112,7 +112,7 @@ fn begin(
     let is_linear = file.representation.kind == Kind::LinearGrid;
     let change = setup::change(file, times)?;
     let (nodes, stride, steps) = match file.training.start {
-        _ if is_linear => (file.representation.grid_nodes(), 1, 0),
+        _ if is_linear => (file.representation.linear_grid.nodes, 1, 0),
         Start::Linear { nodes, stride, steps, .. } => (nodes, stride, steps),
         _ => return Ok(true),
     };

@@ -72,12 +72,18 @@ mod tests {
             ),
             ("simulation.truth.spot.0.amplitude=-1", "simulation.truth.spot.0.amplitude = -1"),
             ("loss.0.weight=1e-300", "loss.0.weight = 1e-300"),
-            ("representation.length_scale=nan", "representation.length_scale = NaN"),
             (
-                "training.rate=-1",
-                "training.rate = -1 is not allowed: 1e-12 to 10 (a learning rate)",
+                "representation.network.length_scale=nan",
+                "representation.network.length_scale = NaN",
             ),
-            ("training.rate=0", "training.rate = 0 is not allowed: 1e-12 to 10 (a learning rate)"),
+            (
+                "representation.network.rate=-1",
+                "representation.network.rate = -1 is not allowed: 1e-12 to 10 (a learning rate)",
+            ),
+            (
+                "representation.network.rate=0",
+                "representation.network.rate = 0 is not allowed: 1e-12 to 10 (a learning rate)",
+            ),
             ("simulation.hole.spin=2", "simulation.hole.spin = 2"),
             ("output.nodes=nan", "output.nodes = NaN is not allowed: 2 to 512"),
             ("observer.radius=nan", "observer.radius = NaN is not allowed: a finite number"),
@@ -95,7 +101,7 @@ mod tests {
     #[test]
     fn exact_what_is_carried_along_is_allowed() {
         check(BUILT_IN, FitFile::keys()).unwrap();
-        let own = apply_override(BUILT_IN, "representation.own.width=1e20").unwrap();
+        let own = apply_override(BUILT_IN, "representation.own.settings.width=1e20").unwrap();
         check(&own, FitFile::keys()).unwrap();
         check(&apply_override(BUILT_IN, "region.z_width=inf").unwrap(), FitFile::keys()).unwrap();
     }

@@ -19,6 +19,7 @@ mod plain;
 mod quantity;
 mod quiescent;
 mod recovery;
+mod representation;
 mod search;
 mod simulation;
 mod static_image;
@@ -41,9 +42,8 @@ pub use merge::merge;
 pub use penalties::{PenaltyKind, PenaltySettings};
 pub use quantity::{PriorSettings, Quantity};
 pub use quiescent::QuiescentSettings;
-pub use recovery::{
-    AxisScan, AxisSearch, Kind, Linear, Occupancy, Optimiser, Representation, Start, Training,
-};
+pub use recovery::{AxisScan, AxisSearch, Linear, Occupancy, Optimiser, Start, Training};
+pub use representation::{FeatureGrid, Grid, Kind, LinearGrid, Network, Own, Representation};
 pub use search::{WorldSearch, WorldSteps, WorldView};
 pub use simulation::{
     GlyphShape, Movie, Noise, Observation, Ring, Shines, Simulation, Spot, Truth, Tube,

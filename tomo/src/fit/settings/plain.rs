@@ -87,7 +87,10 @@ impl FitFile {
             search: None,
             instrument: None,
             loss: Vec::new(),
-            representation: Representation::of(kind),
+            representation: Representation {
+                activation: Activation::Softplus,
+                ..Representation::of(kind)
+            },
             training: Training::starting(start),
             linear: Some(Linear::below(3.0)),
             axis: AxisSearch::default(),
@@ -148,25 +151,6 @@ impl FitFile {
         let pixels = self.screen.pixels.pow(2) as f64;
         self.screen.jy_per_pixel = flux_jy / (pixels * 4.0 * FILLING);
         self
-    }
-}
-
-impl Representation {
-    /// The usual numbers of a kind, with emission that has no upper bound.
-    pub fn of(kind: Kind) -> Self {
-        Self {
-            kind,
-            nodes: None,
-            coarsest: 8,
-            levels: 4,
-            activation: Activation::Softplus,
-            width: 128,
-            hidden_layers: 4,
-            degree: 3,
-            length_scale: 2.0,
-            time_scale: 1.0,
-            own: toml::Table::new(),
-        }
     }
 }
 

@@ -6,7 +6,7 @@ use super::linear_problem::{Of, misfit, solve_frames};
 use crate::fit::Objective;
 use crate::fit::journal::{self, Journal};
 use crate::fit::linear::{Ending, LinearProgress, Watch};
-use crate::fit::settings::{FitError, FitFile, HeldOutSettings, Kind, Start};
+use crate::fit::settings::{FitError, FitFile, HeldOutSettings};
 use core::ops::ControlFlow;
 use kerrlight_render::dynamics::Axis;
 
@@ -78,7 +78,7 @@ pub fn hold_out(
                 false => ControlFlow::Break(()),
             };
             let how = (axis, change(&file, times)?);
-            let of = Of { file: &file, objective, how, nodes: nodes(&file), seed: None };
+            let of = Of { file: &file, objective, how, nodes: file.voxel_nodes(), seed: None };
             let Some(loss) = loss(&of, &parts, &mut told)? else { return Ok(None) };
             journal.keep(key, &[loss]);
             held.losses.push(loss);
@@ -106,14 +106,6 @@ fn loss(of: &Of<'_>, [kept, out]: &[Vec<usize>; 2], watch: &mut Watch<'_>) -> Re
         return Ok(None);
     }
     misfit(of, out, &solution.parameters()).map(Some)
-}
-
-/// Nodes along each axis of the voxels that frames judge: those of the fit, or of its start.
-fn nodes(file: &FitFile) -> usize {
-    match file.training.start {
-        Start::Linear { nodes, .. } if file.representation.kind != Kind::LinearGrid => nodes,
-        _ => file.representation.grid_nodes(),
-    }
 }
 
 #[cfg(test)]

@@ -206,7 +206,7 @@ impl Draw {
 
 /// The parameters of a grid whose nodes have these values, knot after knot.
 fn read_off(file: &FitFile, solution: &Solution<'_>, parameters: &mut [f32]) {
-    let (n, r) = (file.representation.grid_nodes(), file.region.r_max);
+    let (n, r) = (file.representation.grid.nodes, file.region.r_max);
     let at = |k: usize| (-r + 2.0 * r * k as f64 / (n - 1) as f64) as f32;
     let of = |node: fn(usize, usize) -> usize| -> Vec<f32> {
         (0..n * n * n).map(|k| at(node(k, n))).collect()

@@ -60,7 +60,7 @@ fn over_time(
     Ok(Box::new(Changing::new(inner, knots, carrier)?))
 }
 
-/// A network of place and time, whatever `representation.time_scale` is.
+/// A network of place and time, whatever `representation.network.time_scale` is.
 fn changing_network(file: &FitFile, knots: Knots) -> Result<Network> {
     let paper = NetworkSettings::changing([knots.spacing, knots.last() - knots.first]);
     let time_scale = paper.time_scale;
@@ -94,8 +94,8 @@ pub(super) fn of_matter(
         ),
         Kind::FeatureGrid => {
             let settings = FeatureGridSettings {
-                coarsest: chosen.coarsest,
-                levels: chosen.levels,
+                coarsest: chosen.feature_grid.coarsest,
+                levels: chosen.feature_grid.levels,
                 low: [-r; 3],
                 high: [r; 3],
                 activation: chosen.activation,
@@ -104,7 +104,8 @@ pub(super) fn of_matter(
             Box::new(FeatureGrid::new(settings).within("representation")?)
         }
         Kind::LinearGrid if degree(file) != Degree::Linear => {
-            Box::new(Spline::cube(chosen.grid_nodes(), r, degree(file)).within("representation")?)
+            let nodes = chosen.linear_grid.nodes;
+            Box::new(Spline::cube(nodes, r, degree(file)).within("representation")?)
         }
         Kind::Grid | Kind::LinearGrid => {
             Box::new(Grid::new(chosen_grid(chosen, r)).within("representation")?)
@@ -114,13 +115,15 @@ pub(super) fn of_matter(
 
 /// The paper's network with what the file says of it.
 fn chosen_network(chosen: &settings::Representation, paper: NetworkSettings) -> NetworkSettings {
+    let settings::Network { degree, width, hidden_layers, length_scale, time_scale, .. } =
+        chosen.network;
     NetworkSettings {
-        degree: chosen.degree,
-        width: chosen.width,
-        hidden_layers: chosen.hidden_layers,
-        skip_after: paper.skip_after.filter(|layer| *layer <= chosen.hidden_layers),
-        length_scale: chosen.length_scale,
-        time_scale: chosen.time_scale,
+        degree,
+        width,
+        hidden_layers,
+        skip_after: paper.skip_after.filter(|layer| *layer <= hidden_layers),
+        length_scale,
+        time_scale,
         activation: chosen.activation,
         ..paper
     }
@@ -128,13 +131,12 @@ fn chosen_network(chosen: &settings::Representation, paper: NetworkSettings) -> 
 
 /// Trilinear voxels of the cube |x| ≤ `r`, as dark as a network starts: sigmoid(−10).
 fn chosen_grid(chosen: &settings::Representation, r: f64) -> GridSettings {
-    let (activation, initial) = match chosen.activation {
-        _ if chosen.kind == Kind::LinearGrid => (Activation::Linear, 0.0),
-        Activation::Linear => (Activation::Linear, 0.0),
-        other => (other, -10.0),
+    let (nodes, activation) = match chosen.kind {
+        Kind::LinearGrid => (chosen.linear_grid.nodes, Activation::Linear),
+        _ => (chosen.grid.nodes, chosen.activation),
     };
-    let nodes = [chosen.grid_nodes(); 3];
-    GridSettings { nodes, low: [-r; 3], high: [r; 3], activation, initial }
+    let initial = if activation == Activation::Linear { 0.0 } else { -10.0 };
+    GridSettings { nodes: [nodes; 3], low: [-r; 3], high: [r; 3], activation, initial }
 }
 
 /// What is between the nodes of a linear grid.
@@ -148,7 +150,7 @@ const FAINT: f64 = -4.0;
 /// A representation that the program adds.
 fn own(name: &str, file: &FitFile, registry: &Registry) -> Result<Box<dyn Representation<f32>>> {
     let Region { r_min, r_max, z_width } = file.region.limits();
-    let table = file.representation.own.clone();
+    let table = file.representation.own.settings.clone();
     if let Some(built) = registry.build(name, &OwnSettings { r_min, r_max, z_width, table }) {
         return Ok(built.map_err(FitError::from)?);
     }
@@ -167,7 +169,6 @@ pub fn training(
     times: [f64; 2],
 ) -> Result<Training> {
     let chosen = &file.training;
-    let (name, rate) = rates(file);
     if matches!(chosen.batch, BatchSize::Pixels(0) | BatchSize::Frames(0)) {
         refuse!("training.batch of 0 is not allowed: 1 or more");
     }
@@ -182,7 +183,7 @@ pub fn training(
         seed: file.seed,
         adam: Adam::default(),
         muon,
-        rate: rate.checked().within(name)?,
+        rate: rate(file)?,
         axis_rate,
         ramp: chosen.ramp,
         batch: chosen.batch,
@@ -215,17 +216,11 @@ pub fn caution(file: &FitFile) -> Option<&'static str> {
     )
 }
 
-/// Rates, and what they are called: parameters of voxels and features are of another size than a network's.
-fn rates(file: &FitFile) -> (&'static str, Polynomial) {
-    let chosen = &file.training;
-    let (from, to, name) = match file.representation.kind {
-        Kind::Grid => (chosen.grid_rate, chosen.grid_last_rate, "training.grid_rate"),
-        Kind::FeatureGrid => {
-            (chosen.feature_rate, chosen.feature_last_rate, "training.feature_rate")
-        }
-        _ => (chosen.rate, chosen.last_rate, "training.rate"),
-    };
-    (name, Polynomial { from, to, steps: chosen.steps, power: 1.0 })
+/// Learning rate over the steps; those of voxels that are solved for have no rate.
+fn rate(file: &FitFile) -> Result<Polynomial> {
+    let [from, to] = file.representation.rates().map_or([1.0, 1.0], |(_, rates)| rates);
+    let rate = Polynomial { from, to, steps: file.training.steps, power: 1.0 };
+    rate.checked().within("training")
 }
 
 fn occupancy(chosen: &Occupancy) -> Result<OccupancyPlan> {

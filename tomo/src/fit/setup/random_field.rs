@@ -67,7 +67,7 @@ pub fn deviation_of_prior(file: &FitFile) -> Result<Option<f64>> {
         let mean = (prior.mean + 0.5 * variance).exp();
         return Ok(Some(mean * variance.exp_m1().sqrt()));
     }
-    let voxels = Voxels::cube(file.representation.grid_nodes(), file.region.r_max, linear.degree);
+    let voxels = Voxels::cube(file.voxel_nodes(), file.region.r_max, linear.degree);
     let field = GaussianField::new(prior.law(), &voxels).within("linear.prior")?;
     let splines = voxels.field().within("linear.prior")?;
     let place = |k: usize| (k as f64 / (PLACES - 1) as f64 - 0.5) * file.region.r_max;

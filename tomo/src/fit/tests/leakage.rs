@@ -10,7 +10,7 @@ const FLARE: &str = include_str!("../../../../scenes/fits/polarized_flare.toml")
 fn file(set: &[&str]) -> FitFile {
     let small = [
         "screen.pixels=16",
-        "representation.nodes=16",
+        "representation.linear-grid.nodes=16",
         "linear.iterations=25",
         "simulation.observation.scans=24",
         "simulation.observation.bandwidth_ghz=8.0",
@@ -81,6 +81,6 @@ fn exact_refusals() {
     let both =
         "loss=[{data=\"polarized-visibilities\",weight=1.0},{data=\"image\",weight=1.0,sigma=1.0}]";
     assert!(refused(&[both], false).contains("images are not allowed"));
-    let drawn = ["representation={kind=\"grid\",nodes=8,activation=\"linear\"}"];
+    let drawn = ["representation={kind=\"grid\",grid.nodes=8,activation=\"linear\"}"];
     assert!(!refused(&drawn, false).is_empty());
 }
