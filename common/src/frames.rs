@@ -62,7 +62,7 @@ impl<T: Float> Frames<T> {
     ) -> Result<Self, E> {
         let bytes = count as f64 * pixels as f64 * size_of::<T>() as f64;
         let file = if bytes > memory::part(SHARE) { memory::scratch(bytes) } else { None };
-        let failed = |error| failure((count, pixels), "written", &error);
+        let failed = |error| failure(count, pixels, "written", &error);
         let Some(file) = file else {
             memory::afford(|| format!("{count} images of {pixels} pixels"), bytes)?;
             let mut values = Vec::with_capacity(count * pixels);
@@ -188,7 +188,7 @@ impl<T: Float> Frames<T> {
         let place = SeekFrom::Start((from * size) as u64);
         let read = file.seek(place).and_then(|_| file.read_exact(&mut bytes));
         drop(file);
-        read.map_err(|error| failure((self.count, self.pixels), "read", &error))?;
+        read.map_err(|error| failure(self.count, self.pixels, "read", &error))?;
         Ok(bytes.chunks_exact(size).map(get).collect())
     }
 }
@@ -200,7 +200,8 @@ const SHARE: f64 = 1.0 / 8.0;
 pub type Sink<'a, T, E = Error> = dyn FnMut(&[T]) -> Result<(), E> + 'a;
 
 fn failure(
-    (count, pixels): (usize, usize),
+    count: usize,
+    pixels: usize,
     what: &'static str,
     error: &std::io::Error,
 ) -> ScratchError {

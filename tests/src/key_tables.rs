@@ -56,12 +56,12 @@ impl Page<'_> {
         let mut out = "| key | meaning | value | default |\n|---|---|---|---|\n".to_owned();
         for path in paths {
             let prefix = if paths.len() > 1 { format!("{path}.") } else { String::new() };
-            self.rows(path, (&prefix, false), &mut out);
+            self.rows(path, &prefix, false, &mut out);
         }
         out
     }
 
-    fn rows(&mut self, path: &str, (prefix, is_choice): (&str, bool), out: &mut String) {
+    fn rows(&mut self, path: &str, prefix: &str, is_choice: bool, out: &mut String) {
         for key in self.keys.table(path) {
             let below = below(path, &key.name);
             let has_prior = PRIORS.contains(&&*below);
@@ -69,10 +69,10 @@ impl Page<'_> {
             if !has_prior && (self.own.contains(&below) || !is_new) {
                 continue;
             }
-            *out += &row(&key, (prefix, is_choice));
+            *out += &row(&key, prefix, is_choice);
             if !has_prior && !is_described_elsewhere(&below) {
                 let is_choice = key.choices.iter().any(|(word, _)| word.starts_with('{'));
-                self.rows(&below, (&format!("{prefix}{}.", key.name), is_choice), out);
+                self.rows(&below, &format!("{prefix}{}.", key.name), is_choice, out);
             }
         }
     }
@@ -84,7 +84,7 @@ fn below(path: &str, name: &str) -> String {
 }
 
 /// A row; keys of which just one is given are not called required.
-fn row(key: &Key, (prefix, is_choice): (&str, bool)) -> String {
+fn row(key: &Key, prefix: &str, is_choice: bool) -> String {
     let is_word = |(word, _): &&(String, String)| word.starts_with('"');
     let words = key.choices.iter().filter(is_word);
     let words: Vec<String> = words.map(|(word, about)| format!("`{word}`: {about}")).collect();
@@ -124,7 +124,7 @@ fn paths<'a>(line: &'a str, kind: &str) -> Option<Vec<&'a str>> {
 }
 
 /// The page with the tables of these keys made anew.
-fn renewed(text: &str, (keys, kind): (&Keys, &str)) -> (String, BTreeSet<String>) {
+fn renewed(text: &str, keys: &Keys, kind: &str) -> (String, BTreeSet<String>) {
     let all = text.lines().filter_map(|line| paths(line, kind)).flatten();
     let own = all.filter(|path| !path.is_empty()).map(str::to_owned);
     let own: Vec<String> = own.collect();
@@ -162,7 +162,7 @@ fn check(page: &str, kinds: &[(&Keys, &str)]) {
     let mut text = read(&path);
     let before = text.clone();
     for (keys, kind) in kinds {
-        let (renewed, described) = renewed(&text, (keys, kind));
+        let (renewed, described) = renewed(&text, keys, kind);
         let mut wanted = BTreeSet::new();
         all(keys, "", &mut wanted);
         let missing: Vec<_> = wanted.difference(&described).collect();

@@ -275,7 +275,7 @@ fn convolved(image: &[f64], side: usize, field: f64) -> Vec<f64> {
 }
 
 /// The largest normalised cross-correlation of an image with a sky over shifts of up to 10 µas, both with a beam of 10 µas.
-fn correlation(image: &[f64], (side, field): (usize, f64), sky: fn(f64, f64) -> f64) -> f64 {
+fn correlation(image: &[f64], side: usize, field: f64, sky: fn(f64, f64) -> f64) -> f64 {
     let centred = |image: Vec<f64>| {
         let mean = image.iter().sum::<f64>() / image.len() as f64;
         image.into_iter().map(|x| x - mean).collect::<Vec<f64>>()
@@ -309,7 +309,7 @@ fn exact_images_are_like_the_skies_that_were_observed() {
         let image = array(&path.join("run/image.npz"), "recovered.npy");
         let field = array(&path.join("run/image.npz"), "field_uas.npy")[0];
         let side = (image.len() as f64).sqrt() as usize;
-        let alike = correlation(&image, (side, field), sky);
+        let alike = correlation(&image, side, field, sky);
         let ring = found["ring_diameter_uas"].as_f64();
         println!("{name}: correlation {alike:.4}, ring {ring:?}, strength {}", found["strength"]);
         if alike < least || ring.is_some() != matches!(name, "ring" | "crescent") {

@@ -61,7 +61,7 @@ fn exact_fingers_turn_and_approach_and_pick() {
 }
 
 /// The bytes of a file that the page saves when a button is clicked.
-fn saved(browser: &mut Browser, at: &Path, (button, name): (&str, &str)) -> Vec<u8> {
+fn saved(browser: &mut Browser, at: &Path, button: &str, name: &str) -> Vec<u8> {
     let allowed = json!({ "behavior": "allow", "downloadPath": at });
     browser.call("Browser.setDownloadBehavior", &allowed);
     browser.value(&format!("document.getElementById('{button}').click()"));
@@ -82,7 +82,7 @@ fn exact_saved_pictures_are_the_view() {
     let folder = tempfile::tempdir().unwrap();
     let Some(mut browser) = opened(folder.path(), &["--set", "spot="], "curve=1") else { return };
     let files = tempfile::tempdir().unwrap();
-    let png = saved(&mut browser, files.path(), ("save", "kerrlight.png"));
+    let png = saved(&mut browser, files.path(), "save", "kerrlight.png");
     browser.wait("kerrlight.rests()");
     let (saved_png, screen) =
         (image::load_from_memory(&png).unwrap().into_rgb8(), browser.screen());
@@ -101,7 +101,7 @@ fn exact_saved_pictures_are_the_view() {
     // The curve is blue, the disc is not.
     let blue = saved_png.pixels().filter(|pixel| pixel.0[2] > pixel.0[0]).count();
     assert!(colors > 10_000 && blue > 100, "{colors} {blue}");
-    let bytes = saved(&mut browser, files.path(), ("exr", "kerrlight.exr"));
+    let bytes = saved(&mut browser, files.path(), "exr", "kerrlight.exr");
     let (picture, _) = exr::decode(&bytes).unwrap();
     let light = measured(&mut browser, "recovered", [saved_png.width(), saved_png.height()]);
     let expected: Vec<f32> = light.chunks(4).map(|pixel| pixel[3] as f32).collect();

@@ -24,7 +24,7 @@ fn screen(a: f64, degrees: f64, r: f64) -> Option<(f64, f64)> {
 
 /// Relative distance from Bardeen's curve, in the direction of one of its points, to where
 /// traced rays begin to escape.
-fn miss(a: f64, degrees: f64, (alpha, beta): (f64, f64)) -> f64 {
+fn miss(a: f64, degrees: f64, alpha: f64, beta: f64) -> f64 {
     let captured = |factor: f64| {
         trace(a, degrees, factor * alpha, factor * beta, Quantities::POLAR).outcome()
             == Outcome::Captured
@@ -46,7 +46,7 @@ pub fn cases() -> Vec<Case> {
         let misses: Vec<f64> = (1..60)
             .map(|k| from + (to - from) * f64::from(k) / 60.0)
             .filter_map(|r| screen(a, degrees, r))
-            .flat_map(|(x, y)| [miss(a, degrees, (x, y)), miss(a, degrees, (x, -y))])
+            .flat_map(|(x, y)| [miss(a, degrees, x, y), miss(a, degrees, x, -y)])
             .collect();
         let name = format!("critical curve of a = {a} at {degrees}°");
         cases.push(Case::sample(AUTHORITY, name, "directions", misses, 2e-13));

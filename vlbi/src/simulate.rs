@@ -59,7 +59,7 @@ pub fn fill(
     times_h: &[f64],
     method: Method,
 ) -> Result<String, Error> {
-    let (how, seen) = all_seen(observation, (movie.grid, &movie.pixels), pulse, times_h, method)?;
+    let (how, seen) = all_seen(observation, movie.grid, &movie.pixels, pulse, times_h, method)?;
     set(observation, &seen);
     Ok(how)
 }
@@ -70,7 +70,8 @@ pub fn fill(
 /// As those of [`fill`], or if an image cannot be read.
 pub fn fill_from(
     observation: &mut Observation,
-    (grid, movie): (ImageGrid, &Frames<f64>),
+    grid: ImageGrid,
+    movie: &Frames<f64>,
     pulse: Pulse,
     times_h: &[f64],
 ) -> Result<(), Error> {
@@ -132,7 +133,8 @@ fn seen<'p>(
 /// What every row sees of a movie, and how it was transformed.
 fn all_seen(
     observation: &Observation,
-    (grid, pixels): (ImageGrid, &[f64]),
+    grid: ImageGrid,
+    pixels: &[f64],
     pulse: Pulse,
     times_h: &[f64],
     method: Method,
@@ -199,8 +201,7 @@ pub fn fill_stokes(
     }
     let of = |pixels: &Option<Vec<f64>>| {
         let grid = movie.i.grid;
-        let seen =
-            |pixels: &Vec<f64>| all_seen(observation, (grid, pixels), pulse, times_h, method);
+        let seen = |pixels: &Vec<f64>| all_seen(observation, grid, pixels, pulse, times_h, method);
         pixels.as_ref().map(seen).transpose()
     };
     let (linear, v) = (of(q)?.zip(of(u)?), of(v)?);

@@ -55,7 +55,7 @@ impl Work<'_> {
             let journal = &mut partial.journal;
             let look = look.as_mut();
             let style = self.style.style(self.raster.camera());
-            Ok(self.raster.write_exr(journal, &summary, (&attributes, style), file, look)?)
+            Ok(self.raster.write_exr(journal, &summary, &attributes, style, file, look)?)
         })
         .with_context(|| partial.kept())?;
         partial.remove();

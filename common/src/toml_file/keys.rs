@@ -187,9 +187,7 @@ impl Keys {
             let properties = part.schema.get("properties").and_then(Value::as_object);
             let all = properties.into_iter().flatten();
             let mut own: Vec<Key> = all
-                .map(|(name, value)| {
-                    self.key(name, value, (part, required.contains(&name.as_str())))
-                })
+                .map(|(name, value)| self.key(name, value, part, required.contains(&name.as_str())))
                 .collect();
             own.sort_by_key(|key| {
                 required.iter().position(|name| *name == key.name).unwrap_or(usize::MAX)
@@ -289,7 +287,7 @@ impl Keys {
         }
     }
 
-    fn key(&self, name: &str, value: &Value, (table, is_required): (&Part<'_>, bool)) -> Key {
+    fn key(&self, name: &str, value: &Value, table: &Part<'_>, is_required: bool) -> Key {
         let parts = self.parts(value, &table.range);
         let own = value.as_object();
         let about = |part: &Part<'_>| text(part.schema, "description");

@@ -59,7 +59,7 @@ pub(super) fn render_bands(
     let wanted = from_fn(|| if stop.load(Ordering::Relaxed) { None } else { todo.next() });
     let order = wanted.flat_map(|band| (0..tiles).map(move |tile| (band, tile))).par_bridge();
     order.try_for_each_init(Workspace::default, |work, (band, tile)| -> Result<(), Error> {
-        let pixels = raster.tile((band, tile), times, tolerance, work)?;
+        let pixels = raster.tile(band, tile, times, tolerance, work)?;
         let Some(parts) = put(&open[band], tiles, tile, pixels) else { return Ok(()) };
         let at = |time: usize| raster.assemble(band, &parts, time);
         sink((0..times.len()).map(at).collect::<Result<_, _>>()?)?;
@@ -85,7 +85,8 @@ impl Raster {
 
     fn tile(
         &self,
-        (band, tile): (usize, usize),
+        band: usize,
+        tile: usize,
         times: &[f64],
         tolerance: Option<f64>,
         work: &mut Workspace,

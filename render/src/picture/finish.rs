@@ -55,7 +55,8 @@ impl Raster {
         &self,
         journal: &mut AnyJournal<'_>,
         summary: &Summary,
-        (attributes, style): (&Attributes, Style),
+        attributes: &Attributes,
+        style: Style,
         out: impl Write + Seek,
         reduction: Option<&mut Reduction>,
     ) -> Result<()> {

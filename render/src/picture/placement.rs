@@ -18,7 +18,7 @@ struct Placement {
 }
 
 /// e_r, e_θ and e_φ.
-fn frame((sin, cos): (f64, f64), azimuth: f64) -> [[f64; 3]; 3] {
+fn frame(sin: f64, cos: f64, azimuth: f64) -> [[f64; 3]; 3] {
     let (y, x) = azimuth.sin_cos();
     [[sin * x, sin * y, cos], [cos * x, cos * y, -sin], [-y, x, 0.0]]
 }
@@ -26,7 +26,7 @@ fn frame((sin, cos): (f64, f64), azimuth: f64) -> [[f64; 3]; 3] {
 impl Placement {
     fn of_observer(observer: &Observer) -> Self {
         let inclination = observer.inclination();
-        let [out, down, right] = frame((inclination.sin(), inclination.cos()), observer.azimuth());
+        let [out, down, right] = frame(inclination.sin(), inclination.cos(), observer.azimuth());
         let w = observer.inverse_radius();
         let distance = if w > 0.0 { 1.0 / w } else { FAR };
         Placement { place: out.map(|x| x * distance), axes: [right, down.map(|x| -x), out] }
@@ -34,7 +34,7 @@ impl Placement {
 
     fn of_camera(camera: &Camera) -> Self {
         let inclination = camera.inclination();
-        let frame = frame((inclination.sin(), inclination.cos()), camera.azimuth());
+        let frame = frame(inclination.sin(), inclination.cos(), camera.azimuth());
         let axes = camera.axes().map(|axis| {
             core::array::from_fn(|k| (0..3).map(|j| axis[j] * frame[j][k]).sum::<f64>())
         });

@@ -35,7 +35,7 @@ impl Workspace {
     }
 
     /// One more ray of a square.
-    pub fn push_ray(&mut self, (x, y): (f64, f64)) {
+    pub fn push_ray(&mut self, x: f64, y: f64) {
         self.alpha.push(x);
         self.beta.push(y);
     }

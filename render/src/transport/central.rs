@@ -30,14 +30,14 @@ impl PreparedScene {
     ) -> Result<(), crate::Error> {
         let (wanted, scratch) = (self.optics.wanted, &mut scratch.central);
         if let (true, Some(origin)) = (wanted.depth, layers.origin) {
-            layers.depth = Some(self.depth((x, y), origin.mino_time, scratch)?);
+            layers.depth = Some(self.depth(x, y, origin.mino_time, scratch)?);
         }
         let moves = |origin: &Origin| self.optics.numbering.kind(origin.source) != Kind::Other;
         if let (true, Some(origin)) = (wanted.motion, layers.origin.filter(moves)) {
-            layers.motion = self.motion((x, y), origin, scratch)?.map(|rate| finite(rate / pixel));
+            layers.motion = self.motion(x, y, origin, scratch)?.map(|rate| finite(rate / pixel));
         }
         if wanted.footprint && layers.exit.is_some() {
-            layers.footprint = self.footprint((x, y), scratch)? * pixel * pixel;
+            layers.footprint = self.footprint(x, y, scratch)? * pixel * pixel;
         }
         Ok(())
     }
@@ -45,7 +45,8 @@ impl PreparedScene {
     /// ∫Σ dτ in M from the observer, or from [`FAR`], up to a Mino time.
     fn depth(
         &self,
-        (x, y): (f64, f64),
+        x: f64,
+        y: f64,
         mino_time: f64,
         CentralScratch { path, length, .. }: &mut CentralScratch,
     ) -> Result<f64, crate::Error> {
@@ -60,7 +61,8 @@ impl PreparedScene {
     /// lens map.
     fn footprint(
         &self,
-        (x, y): (f64, f64),
+        x: f64,
+        y: f64,
         CentralScratch { beam, .. }: &mut CentralScratch,
     ) -> Result<f64, crate::Error> {
         let hole = &self.optics.hole;
@@ -75,7 +77,8 @@ impl PreparedScene {
     /// its delay with respect to x, y and τ this is a linear system for the rates of the three.
     fn motion(
         &self,
-        (x, y): (f64, f64),
+        x: f64,
+        y: f64,
         origin: Origin,
         CentralScratch { beam, .. }: &mut CentralScratch,
     ) -> Result<[f64; 2], crate::Error> {

@@ -218,12 +218,12 @@ impl RayVisitor for Sum<'_> {
             let source = self.scene.optics.numbering.media;
             self.scene.media.add((number, j), source, &self.sources.media, &mut light);
             if let Some(path) = path {
-                self.add_spots((number, j), *time, ray, path, &mut light);
+                self.add_spots(number, j, *time, ray, path, &mut light);
             }
             if behind != [0.0; 3] {
                 light.add_behind(behind);
             }
-            self.finish((number, j), ray, light);
+            self.finish(number, j, ray, light);
         }
         Ok(())
     }
@@ -338,7 +338,8 @@ impl<'a> Sum<'a> {
     /// Light of the spots at time number `j`.
     fn add_spots(
         &mut self,
-        (k, j): (usize, usize),
+        k: usize,
+        j: usize,
         time: f64,
         ray: &TracedRay,
         along: PathOfRay<'_>,
@@ -355,7 +356,7 @@ impl<'a> Sum<'a> {
 
     /// Writes down what ray number `k` sees at time number `j`.
     #[inline(always)]
-    fn finish(&mut self, (k, j): (usize, usize), ray: &TracedRay, light: Accumulator) {
+    fn finish(&mut self, k: usize, j: usize, ray: &TracedRay, light: Accumulator) {
         let (x, y) = self.place(k);
         let place = j * self.block.alpha.len() + k;
         let Some(seen) = self.seen.get_mut(place) else { return };

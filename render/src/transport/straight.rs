@@ -118,7 +118,8 @@ impl Line {
     /// Fills `columns` with the nodes inside a sphere.
     fn nodes(
         &self,
-        (sphere, until): (f64, f64),
+        sphere: f64,
+        until: f64,
         (rule, split): (&PanelRule, u32),
         columns: &mut NodeColumns,
     ) {
@@ -165,7 +166,7 @@ impl Sum<'_> {
             let opaque = crossing.as_ref().filter(|crossing| self.is_opaque_at(crossing));
             let ray = line.traced(&ray, usize::from(crossing.is_some()), opaque);
             self.sources.media.forget_crossings();
-            self.add_media_along(&line, k, (&ray, crossing.as_slice()), &mut columns);
+            self.add_media_along(&line, k, &ray, crossing.as_slice(), &mut columns);
             self.take(k, &ray, crossing.as_slice(), None)?;
         }
         Ok(())
@@ -177,7 +178,8 @@ impl Sum<'_> {
         &mut self,
         line: &Line,
         k: usize,
-        (ray, crossings): (&TracedRay, &[PlaneCrossing]),
+        ray: &TracedRay,
+        crossings: &[PlaneCrossing],
         columns: &mut NodeColumns,
     ) {
         let times = self.block.times;
@@ -188,7 +190,7 @@ impl Sum<'_> {
                 let mut split = 1;
                 loop {
                     let rule = (self.sources.media.rule(), split);
-                    line.nodes((medium.sphere(), ray.last_time()), rule, columns);
+                    line.nodes(medium.sphere(), ray.last_time(), rule, columns);
                     let done =
                         self.radiate(m, k, (ray, crossings), (times, number * together), columns);
                     if done || split >= finest(medium) {

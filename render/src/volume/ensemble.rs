@@ -131,7 +131,7 @@ impl Ensemble {
                 continue;
             }
             label += 1;
-            let around = self.around((node, label), &mut labels);
+            let around = self.around(node, label, &mut labels);
             // What adjoins a brighter feature is its slope.
             if let Some(around) = around {
                 found.push(feature(volumes, &around, f64::from(peak)));
@@ -141,7 +141,7 @@ impl Ensemble {
     }
 
     /// The nodes joined to a peak and brighter than a part of it, which are marked; none if they join others.
-    fn around(&self, (peak, label): (usize, u32), labels: &mut [u32]) -> Option<Vec<usize>> {
+    fn around(&self, peak: usize, label: u32, labels: &mut [u32]) -> Option<Vec<usize>> {
         let least = (EDGE * f64::from(self.mean.values()[peak])) as f32;
         let [_, ny, nz] = self.mean.nodes();
         let [nx, ..] = self.mean.nodes();

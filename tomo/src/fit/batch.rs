@@ -108,7 +108,7 @@ impl<T: Float> Batch<T> {
     /// Collects the nodes of the pairs and pulls them back; leaves out those that do not shine yet or
     /// come to lie where nothing does.
     pub fn gather(&mut self, model: &ForwardModel<T>, axis: Axis, occupancy: Option<&Occupancy>) {
-        self.collect(model, (axis, model.fall.as_ref()), occupancy);
+        self.collect(model, axis, model.fall.as_ref(), occupancy);
     }
 
     /// The same with every node of the pairs; where the matter was outside of the region, its place is no number.
@@ -124,7 +124,7 @@ impl<T: Float> Batch<T> {
     pub fn gather_field(&mut self, model: &ForwardModel<T>, field: Field<'_, T>) {
         let carried = field.representation.is_carried();
         let fall = model.fall.as_ref().filter(|_| carried);
-        self.collect(model, (field.axis, fall), field.occupancy);
+        self.collect(model, field.axis, fall, field.occupancy);
     }
 
     /// The same of places and times of emission; nothing is carried along.
@@ -151,7 +151,8 @@ impl<T: Float> Batch<T> {
     fn collect(
         &mut self,
         model: &ForwardModel<T>,
-        (axis, fall): (Axis, Option<&Fall>),
+        axis: Axis,
+        fall: Option<&Fall>,
         occupancy: Option<&Occupancy>,
     ) {
         self.fill(model);

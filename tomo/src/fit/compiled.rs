@@ -68,7 +68,7 @@ macro_rules! in_precision {
                 time: f64,
                 points: [&[$number]; 3],
             ) -> Vec<$number> {
-                self.emitted(now, (motion, time), points)
+                self.emitted(now, motion, time, points)
             }
         }
     };
@@ -99,7 +99,8 @@ impl<T: Float> Trainer<'_, T> {
     fn emitted(
         &mut self,
         now: &Progress<T>,
-        (motion, time): (&Motion, f64),
+        motion: &Motion,
+        time: f64,
         points: [&[T]; 3],
     ) -> Vec<T> {
         let matter = motion.matter(now.axis, time, points);

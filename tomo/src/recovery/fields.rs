@@ -39,7 +39,7 @@ pub fn recovered(
     state: &State<f32>,
 ) -> Result<Volume, Error> {
     let region = file.region.limits();
-    on_nodes(file, (trainer, None), state, &|x| region.holds(x))
+    on_nodes(file, trainer, None, state, &|x| region.holds(x))
 }
 
 /// The field at the reference time at all nodes whose matter passes the region at some time, or next to it: what a
@@ -56,13 +56,14 @@ pub fn carried(
     let nodes = Box3::new(file);
     // The diagonal of a cell: values between nodes of the region need their neighbours.
     let margin = 2.0 * nodes.half / (nodes.nodes[0] - 1) as f64 * 3f64.sqrt();
-    on_nodes(file, (trainer, None), state, &|x| region.is_passed(axis, x, margin))
+    on_nodes(file, trainer, None, state, &|x| region.is_passed(axis, x, margin))
 }
 
 /// The field at the reference time or another one, zero where nothing is wanted.
 fn on_nodes(
     file: &FitFile,
-    (trainer, at): (&mut Trainer<'_, f32>, Option<(&Motion, f64)>),
+    trainer: &mut Trainer<'_, f32>,
+    at: Option<(&Motion, f64)>,
     state: &State<f32>,
     wanted: &dyn Fn([f64; 3]) -> bool,
 ) -> Result<Volume, Error> {
@@ -91,7 +92,7 @@ pub fn recovered_at(
     since: f64,
 ) -> Result<Volume, Error> {
     let region = file.region.limits();
-    on_nodes(file, (trainer, Some((motion, since))), state, &|x| region.holds(x))
+    on_nodes(file, trainer, Some((motion, since)), state, &|x| region.holds(x))
 }
 
 /// The truth at a time since the reference time, M.

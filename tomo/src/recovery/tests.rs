@@ -64,7 +64,7 @@ fn exact_images_that_are_read_are_fitted_as_those_that_are_simulated() {
     let frames = simulated.measured.movie.clone().unwrap();
     let pixels: Vec<f64> = frames.images().flat_map(|image| image.unwrap().to_vec()).collect();
     let flux = pixels.chunks(100).map(|image| image.iter().sum::<f64>()).fold(0.0, f64::max);
-    let read = settings(Kind::LinearGrid).with_images(10, [0.0, 50.0], (flux, 1e-2));
+    let read = settings(Kind::LinearGrid).with_images(10, [0.0, 50.0], flux, 1e-2);
     let grid = kerrlight_vlbi::operator::ImageGrid::new(10, 10, 1e-10).unwrap();
     let read = Problem::of_movie(read, Movie { grid, pixels }).unwrap();
     let recovery = fit(&read, &mut Silent).unwrap();

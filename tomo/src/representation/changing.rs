@@ -180,7 +180,7 @@ impl<T: Float> Changing<T> {
                     let event = (place.map(Float::double), t.double() - label);
                     part.push((k, share), event, carrier);
                 }
-                None => part.push_carried((k, share), place),
+                None => part.push_carried(k, share, place),
             }
         }
         if let Some(carrier) = &self.carrier {
@@ -193,7 +193,8 @@ impl<T: Float> Changing<T> {
     fn of_coordinates(
         &self,
         part: &Part<T>,
-        (values, slopes): (&[T], &[Vec<T>; 3]),
+        values: &[T],
+        slopes: &[Vec<T>; 3],
         cotangents: &[T],
         into: &mut CoordinatesMut<'_, T>,
     ) {
@@ -263,7 +264,7 @@ impl<T: Float> Part<T> {
     }
 
     /// A point that is given by the place that its matter has at the label time, with its share.
-    fn push_carried(&mut self, (point, share): (usize, (T, T)), place: [T; 3]) {
+    fn push_carried(&mut self, point: usize, share: (T, T), place: [T; 3]) {
         self.points.push(point);
         self.share.push(share);
         self.pulled.iter_mut().zip(place).for_each(|(column, x)| column.push(x));
@@ -381,7 +382,7 @@ impl<T: Float> Representation<T> for Changing<T> {
             let columns = CoordinatesMut::xyz(x, y, z);
             let gradient = Gradient { parameters: out, coordinates: Some(columns) };
             self.inner.vjp(own, part.coordinates(), &inner, gradient, workspace);
-            self.of_coordinates(&part, (&values, &slopes), cotangents, into);
+            self.of_coordinates(&part, &values, &slopes, cotangents, into);
         }
     }
 }

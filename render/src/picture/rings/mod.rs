@@ -144,7 +144,7 @@ impl RingStrata {
             let Part { center: (x, y), size, share, .. } = *part;
             let Some((plane, strata)) = strata else { return rays.push(Stratum { x, y, share }) };
             for (place, within) in strata {
-                let [dx, dy] = self.onto(plane, *place, (x, y), size);
+                let [dx, dy] = self.onto(plane, *place, x, y, size);
                 rays.push(Stratum { x: x + dx * size, y: y + dy * size, share: share * within });
             }
         });
@@ -191,7 +191,7 @@ impl RingStrata {
     }
 
     /// A place of the plane moved to where W is what the plane says, inside the square.
-    fn onto(&self, plane: &Plane, place: [f64; 2], (x, y): (f64, f64), size: f64) -> [f64; 2] {
+    fn onto(&self, plane: &Plane, place: [f64; 2], x: f64, y: f64, size: f64) -> [f64; 2] {
         let [dx, dy] = place;
         let height = self.height(x + dx * size, y + dy * size);
         let step = plane.step(place, height);

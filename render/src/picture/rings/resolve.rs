@@ -129,7 +129,7 @@ impl Resolver {
         for some in batches(&jobs) {
             work.clear();
             for ray in some.iter().flat_map(|job| &rays[job.rays.clone()]) {
-                work.push_ray((ray.x, ray.y));
+                work.push_ray(ray.x, ray.y);
             }
             let count = work.len();
             work.observe_at(prepared, times)?;
@@ -191,7 +191,7 @@ impl Resolver {
         {
             let half = 0.5 * size;
             for (dx, dy) in [(-half, -half), (half, -half), (-half, half), (half, half)] {
-                work.push_ray((x + dx, y + dy));
+                work.push_ray(x + dx, y + dy);
             }
         }
         let corners = work.observe(prepared)?;

@@ -57,7 +57,7 @@ impl Comparisons {
             for (k, other) in objective.data.others.iter().enumerate() {
                 let first = visibilities.len();
                 let compared = other.term.compared(frame)?;
-                visibilities.extend(all.frame(compared, (k, first, begin[1] as usize))?);
+                visibilities.extend(all.frame(compared, k, first, begin[1] as usize)?);
                 for seen in &visibilities[first..] {
                     all.push(seen, k);
                 }
@@ -83,7 +83,9 @@ impl Comparisons {
     fn frame(
         &mut self,
         compared: Compared,
-        (term, first, before): (usize, usize, usize),
+        term: usize,
+        first: usize,
+        before: usize,
     ) -> Option<Vec<Seen>> {
         let (sky, seen, with) = match compared {
             Compared::Nothing => return Some(Vec::new()),
@@ -113,7 +115,7 @@ impl Comparisons {
             Comparison::Closures { kind, scans, .. } => {
                 let is_phase = kind == ClosureKind::Phase;
                 for scan in &scans {
-                    self.scan(scan, (term, first, before), is_phase, &mut seen);
+                    self.scan(scan, term, first, before, is_phase, &mut seen);
                 }
             }
         }
@@ -124,7 +126,9 @@ impl Comparisons {
     fn scan(
         &mut self,
         scan: &ClosureScan,
-        (term, first, before): (usize, usize, usize),
+        term: usize,
+        first: usize,
+        before: usize,
         is_phase: bool,
         seen: &mut [Seen],
     ) {

@@ -113,7 +113,7 @@ fn shape(settings: &NetworkSettings) -> Shape {
 }
 
 /// Nodes of a box, so many along each axis.
-fn level(nodes: [usize; 3], (low, high): ([f64; 3], [f64; 3]), planes: usize) -> Level {
+fn level(nodes: [usize; 3], low: [f64; 3], high: [f64; 3], planes: usize) -> Level {
     let per_length = |k: usize| ((nodes[k] - 1) as f64 / (high[k] - low[k])) as f32;
     Level {
         low: low.map(|x| x as f32),
@@ -125,7 +125,7 @@ fn level(nodes: [usize; 3], (low, high): ([f64; 3], [f64; 3]), planes: usize) ->
 }
 
 fn voxels(settings: &GridSettings) -> Levels {
-    let all = vec![level(settings.nodes, (settings.low, settings.high), 1)];
+    let all = vec![level(settings.nodes, settings.low, settings.high, 1)];
     Levels { all, activation: number(settings.activation) }
 }
 

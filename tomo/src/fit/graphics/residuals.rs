@@ -25,7 +25,7 @@ impl GraphicsFit {
                 let scale = rays * variance / pairs.len() as f64;
                 let slope = (2.0 * image.weight * scale) as f32;
                 for (some, ends) in pieces(pairs, self.pieces.pairs, learns) {
-                    self.pairs(stretch, some, (slope, k), (ends, 0))?;
+                    self.pairs(stretch, some, slope, k, (ends, 0))?;
                 }
                 let squares = Squares { scale, dark: 0.0, weight: image.weight };
                 Ok(Pending::There(Some(squares), Vec::new()))
@@ -44,7 +44,8 @@ impl GraphicsFit {
         &self,
         stretch: &Stretch<'_, f32>,
         pairs: &[(u32, u32)],
-        (slope, record): (f32, usize),
+        slope: f32,
+        record: usize,
         (ends, frames): (Ends, usize),
     ) -> Result<(), GpuError> {
         let Self { device, pixels, .. } = self;
@@ -55,12 +56,12 @@ impl GraphicsFit {
         };
         let points = self.set(stretch, pairs, &datum, (slope, record))?;
         device.run(|commands| {
-            self.light(commands, (pairs.len(), points), ends);
+            self.light(commands, pairs.len(), points, ends);
             if let Some(visibilities) = self.visibilities.as_ref().filter(|_| frames > 0) {
                 visibilities.compare(commands, frames);
             }
             pixels.spread(commands, pairs.len());
-            self.back(commands, (pairs.len(), points), ends);
+            self.back(commands, pairs.len(), points, ends);
         })
     }
 
@@ -89,7 +90,7 @@ impl GraphicsFit {
                 visibilities.set(&self.device, some, &factors, record)?;
             }
             let pairs = pairs_of(stretch, some);
-            self.pairs(stretch, &pairs, (slope, record), (ends, some.len()))?;
+            self.pairs(stretch, &pairs, slope, record, (ends, some.len()))?;
         }
         Ok(Pending::There(image.map(|(_, squares)| squares), shares))
     }
@@ -108,13 +109,13 @@ impl GraphicsFit {
         for (some, ends) in pieces(frames, self.pieces.frames, learns) {
             let pairs = pairs_of(stretch, some);
             let points = self.set(stretch, &pairs, &|_, _| 0.0, (0.0, record))?;
-            device.run(|commands| self.light(commands, (pairs.len(), points), ends))?;
+            device.run(|commands| self.light(commands, pairs.len(), points, ends))?;
             let fluxes = pixels.fluxes(device, pairs.len())?;
-            let slopes = objective.of_frames((some, frames.len()), &fluxes, &mut loss);
+            let slopes = objective.of_frames(some, frames.len(), &fluxes, &mut loss);
             pixels.set_slopes(device, &slopes)?;
             device.run(|commands| {
                 pixels.spread(commands, pairs.len());
-                self.back(commands, (pairs.len(), points), ends);
+                self.back(commands, pairs.len(), points, ends);
             })?;
         }
         objective.add_terms(&mut loss);
@@ -122,7 +123,7 @@ impl GraphicsFit {
     }
 
     /// From pairs of a piece to the light of their rays; before the first piece of a step, a new gradient.
-    fn light(&self, commands: &mut Commands, (pairs, points): (usize, usize), ends: Ends) {
+    fn light(&self, commands: &mut Commands, pairs: usize, points: usize, ends: Ends) {
         if ends.is_first {
             commands.clear(&self.learning.gradient);
             self.pixels.axis.iter().for_each(|axis| axis.begin(commands));
@@ -133,7 +134,7 @@ impl GraphicsFit {
     }
 
     /// From the cotangents of a piece to the gradient; behind the last piece of a step that is taken, the step.
-    fn back(&self, commands: &mut Commands, (pairs, points): (usize, usize), ends: Ends) {
+    fn back(&self, commands: &mut Commands, pairs: usize, points: usize, ends: Ends) {
         self.field.backward(commands, points);
         self.pixels.axis.iter().for_each(|axis| axis.add(commands, pairs));
         if ends.is_last_and_learns {

@@ -13,13 +13,14 @@ impl Objective<f32> {
     /// Adds the terms of frames, some of `whole`, whose rays have this light, frame after frame; dL/dlight of each ray.
     pub(super) fn of_frames(
         &self,
-        (frames, whole): (&[usize], usize),
+        frames: &[usize],
+        whole: usize,
         light: &[f32],
         loss: &mut Loss,
     ) -> Vec<f32> {
         let of_frame = |(frame, light): (&usize, &[f32])| {
             let mut own = self.empty_loss();
-            (self.of_rays((*frame, whole), light, &mut own), own.terms)
+            (self.of_rays(*frame, whole, light, &mut own), own.terms)
         };
         let rays = self.model.rays();
         let all: Vec<_> = frames.par_iter().zip(light.par_chunks(rays)).map(of_frame).collect();
@@ -32,7 +33,7 @@ impl Objective<f32> {
     }
 
     /// Adds the terms of a frame, one of `whole`, whose rays have this light; dL/dlight of each ray.
-    fn of_rays(&self, (frame, whole): (usize, usize), light: &[f32], loss: &mut Loss) -> Vec<f32> {
+    fn of_rays(&self, frame: usize, whole: usize, light: &[f32], loss: &mut Loss) -> Vec<f32> {
         let model = &self.model;
         let (mut image, mut of_image) = (vec![0.0; model.pixels()], vec![0.0; model.pixels()]);
         light.iter().enumerate().for_each(|(ray, light)| model.put(&mut image, ray, *light));

@@ -243,7 +243,8 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
             let certificate = Certificate { value, dark, gap, violation, dark_slope, upper };
             return Ok(Some(self.solution(
                 x,
-                (convex, certificate),
+                convex,
+                certificate,
                 ending,
                 operator.active.count(),
             )));
@@ -259,7 +260,8 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
     fn solution(
         &self,
         x: &[f64],
-        (convex, certificate): (bool, Certificate),
+        convex: bool,
+        certificate: Certificate,
         ending: Ending,
         nodes: usize,
     ) -> LinearSolution<T> {

@@ -79,7 +79,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             let round = self.over(&data, &is_active, &least.x, how.settling)?;
             let (x, gradient) = (&round.least.x, &round.gradient);
             let [inside, outside] =
-                [true, false].map(|inside| violation(x, gradient, (&is_active, inside)));
+                [true, false].map(|inside| violation(x, gradient, &is_active, inside));
             let is_done = outside <= inside && round.ending != Ending::Exhausted;
             shines = x.iter().zip(gradient).map(|(x, g)| *x > 0.0 || *g < -inside).collect();
             least = round.least;
@@ -159,7 +159,7 @@ fn settling() -> LinearSettings {
 }
 
 /// The largest violation of the conditions for a minimum among the nodes that count, or among the others.
-fn violation(x: &[f64], gradient: &[f64], (is_active, counts): (&[bool], bool)) -> f64 {
+fn violation(x: &[f64], gradient: &[f64], is_active: &[bool], counts: bool) -> f64 {
     let all = x.iter().zip(gradient).zip(is_active).filter(|(_, active)| **active == counts);
     let wrong = all.map(|((x, g), _)| if *x > 0.0 { g.abs() } else { (-g).max(0.0) });
     wrong.fold(0.0, f64::max)

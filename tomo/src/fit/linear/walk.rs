@@ -175,7 +175,7 @@ impl<'a, T: Float> Walk<'a, T> {
         for knot in 0..self.knots.count {
             let wanted = wanted.map(|wanted| &wanted[knot * nodes..(knot + 1) * nodes]);
             if self.takes_part(knot, frame) && wanted.is_none_or(|wanted| wanted.contains(&true)) {
-                self.knot((frame, knot), wanted, buffers, &mut ray);
+                self.knot(frame, knot, wanted, buffers, &mut ray);
             }
         }
     }
@@ -196,7 +196,8 @@ impl<'a, T: Float> Walk<'a, T> {
 
     fn knot(
         &self,
-        (frame, knot): (usize, usize),
+        frame: usize,
+        knot: usize,
         wanted: Option<&[bool]>,
         buffers: &mut Buffers<T>,
         ray: &mut impl FnMut(u32, &[Place<T>]),
@@ -210,7 +211,7 @@ impl<'a, T: Float> Walk<'a, T> {
             self.pull(starts[first]..starts[next], self.model.times[frame] - label, buffers);
             for k in first..next {
                 let range = starts[k]..starts[k + 1];
-                self.places(range, starts[first], (frame, knot), wanted, buffers);
+                self.places(range, starts[first], frame, knot, wanted, buffers);
                 if !buffers.places.is_empty() {
                     self.hand_over(self.model.pixel[k], buffers, ray);
                 }
@@ -306,7 +307,8 @@ impl<'a, T: Float> Walk<'a, T> {
         &self,
         range: core::ops::Range<usize>,
         first: usize,
-        (frame, knot): (usize, usize),
+        frame: usize,
+        knot: usize,
         wanted: Option<&[bool]>,
         buffers: &mut Buffers<T>,
     ) {

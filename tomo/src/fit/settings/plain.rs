@@ -120,7 +120,8 @@ impl FitFile {
         mut self,
         pixels: usize,
         [from, to]: [f64; 2],
-        (flux_jy, sigma): (f64, f64),
+        flux_jy: f64,
+        sigma: f64,
     ) -> Self {
         self.screen.pixels = pixels;
         self.loss = vec![Loss { sigma: Some(sigma), ..Loss::new(LossKind::Image) }];

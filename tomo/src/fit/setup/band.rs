@@ -88,7 +88,7 @@ pub fn scan_band(
         if kept.is_some() {
             return Ok(kept);
         }
-        let found = weighed(file, measured, (settings, curve), *world)?;
+        let found = weighed(file, measured, settings, curve, *world)?;
         journal.keep(key, &BandWorld::numbers(&found));
         Ok(Some(found))
     };
@@ -97,9 +97,9 @@ pub fn scan_band(
     let worlds: Vec<BandWorld> = all.into_iter().flatten().collect();
     let better = |a: &usize, b: &usize| worlds[*a].ln_posterior.total_cmp(&worlds[*b].ln_posterior);
     let best = (0..worlds.len()).max_by(better).unwrap_or(0);
-    let [azimuth, radius] = placed(file, measured, (settings, curve), (&worlds, best))?;
+    let [azimuth, radius] = placed(file, measured, settings, curve, (&worlds, best))?;
     let world = &worlds[best];
-    let rows = rows(file, measured, (settings, curve), world.flow())?;
+    let rows = rows(file, measured, settings, curve, world.flow())?;
     let data = turned(curve, world.position_angle_deg);
     let validation = validation(&rows, &data, &world.band)?;
     let ln_bayes_factor = ln_bayes_factor(&rows, &data, &worlds, settings)?;
@@ -155,14 +155,15 @@ fn ln_bayes_factor(
 fn placed(
     file: &FitFile,
     measured: &Measured,
-    (settings, curve): (&BandSettings, &Curve),
+    settings: &BandSettings,
+    curve: &Curve,
     (worlds, best): (&[BandWorld], usize),
 ) -> Result<[Interval; 2]> {
     let most = worlds[best].ln_posterior;
     let likely: Vec<&BandWorld> =
         worlds.iter().filter(|world| world.ln_posterior > most - UNLIKELY).collect();
     let one = |world: &&BandWorld| {
-        let rows = rows(file, measured, (settings, curve), world.flow())?;
+        let rows = rows(file, measured, settings, curve, world.flow())?;
         let of = |(band, ln): &(Band, f64)| (*band, ln + direction(world.inclination_deg));
         let bands: Vec<(Band, f64)> = world.likely.iter().map(of).collect();
         places(&rows, &turned(curve, world.position_angle_deg), &bands)
@@ -260,10 +261,11 @@ fn worlds(settings: &BandSettings) -> Vec<(f64, f64)> {
 fn weighed(
     file: &FitFile,
     measured: &Measured,
-    (settings, curve): (&BandSettings, &Curve),
+    settings: &BandSettings,
+    curve: &Curve,
     world: (f64, f64),
 ) -> Result<Vec<BandWorld>> {
-    let rows = rows(file, measured, (settings, curve), world)?;
+    let rows = rows(file, measured, settings, curve, world)?;
     let data: Vec<Vec<f64>> =
         settings.position_angles_deg.iter().map(|angle| turned(curve, *angle)).collect();
     let weighed = evidence(&rows, &data, &prior(settings))?;
@@ -305,7 +307,8 @@ pub fn band_motion(file: &FitFile, measured: &Measured, factor: f64) -> Result<M
 fn rows(
     file: &FitFile,
     measured: &Measured,
-    (settings, curve): (&BandSettings, &Curve),
+    settings: &BandSettings,
+    curve: &Curve,
     (inclination_deg, factor): (f64, f64),
 ) -> Result<CurveRows> {
     let file = in_band_world(file, inclination_deg);

@@ -68,7 +68,8 @@ fn is_of_other_model(drawn: &FitFile) -> bool {
 pub(super) fn fine_images(
     file: &FitFile,
     world: &World,
-    (truth, times): (&Truth, &[f64]),
+    truth: &Truth,
+    times: &[f64],
     model: OtherModel<'_>,
 ) -> Result<Vec<Vec<f64>>> {
     let times: Vec<f64> = times.iter().map(|time| time - file.motion.reference_time).collect();

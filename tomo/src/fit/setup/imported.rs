@@ -80,7 +80,7 @@ impl Measured {
         };
         let losses = (&mut observation, &file.loss[..]);
         add_systematic("data.visibilities.systematic", systematic, losses)?;
-        medium::correct((&mut observation, &file.loss), (scattering, variability), name)?;
+        medium::correct(&mut observation, &file.loss, (scattering, variability), name)?;
         let (hours, of_rows) = frames_of(&mut observation);
         let per_m = hours_per_m(file)?;
         let times = hours.iter().map(|h| first_time + (h - hours[0]) / per_m).collect();
@@ -114,7 +114,7 @@ impl Measured {
         let losses = (&mut observation, &file.loss[..]);
         add_systematic("data.visibilities.systematic", data.systematic, losses)?;
         let sky = (data.scattering, data.variability);
-        medium::correct((&mut observation, &file.loss), sky, name)?;
+        medium::correct(&mut observation, &file.loss, sky, name)?;
         let (times, of_rows) = frames_of(&mut observation);
         let gains = gains::priors(file.instrument.as_ref(), &file.loss, &observation)?;
         let (visibilities, sky) = (Some((observation, of_rows)), Some(file.image.grid()?));
@@ -144,7 +144,7 @@ impl Measured {
         }
         let seen = (&mut observation, &losses[..]);
         add_systematic("data.visibilities.systematic", data.systematic, seen)?;
-        medium::correct((&mut observation, &losses), (data.scattering, None), name)?;
+        medium::correct(&mut observation, &losses, (data.scattering, None), name)?;
         medium::polarized_errors(&mut observation, data.variability, polarization);
         let (times, of_rows) = frames_of(&mut observation);
         let instrument = file.instrument.clone().map(|instrument| with_phases(instrument, file));

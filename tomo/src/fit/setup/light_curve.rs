@@ -155,7 +155,7 @@ pub(super) fn simulate(
     let mut fluxes = truth.movie_through(&mut instrument.summed(&motion, &parameters)?);
     truth.rings.add_to_fluxes(&mut fluxes, &parameters);
     if let Some(background) = &settings.background {
-        add_background(&mut fluxes, (&parameters, &hours), background, file.seed)?;
+        add_background(&mut fluxes, &parameters, &hours, background, file.seed)?;
     }
     let data = measure(&fluxes, &parameters, settings, file.seed)?;
     let movie = Some(truth.movie(file, instrument, &times)?);
@@ -167,7 +167,8 @@ pub(super) fn simulate(
 /// Adds a draw of a background to Q and U.
 fn add_background(
     fluxes: &mut [f64],
-    (parameters, hours): (&[StokesParameter], &[f64]),
+    parameters: &[StokesParameter],
+    hours: &[f64],
     settings: &SimulatedBackground,
     seed: u64,
 ) -> Result<()> {

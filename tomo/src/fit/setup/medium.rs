@@ -14,7 +14,8 @@ use kerrlight_vlbi::observation::{Basis, Observation};
 /// If the kernel of scattering needs a frequency that is not known, or errors of all products would need the
 /// variability of polarised light.
 pub(super) fn correct(
-    (observation, losses): (&mut Observation, &[Loss]),
+    observation: &mut Observation,
+    losses: &[Loss],
     (scattering, variability): (Option<Scattering>, Option<Variability>),
     name: &str,
 ) -> Result<()> {

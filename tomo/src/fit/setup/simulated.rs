@@ -70,7 +70,7 @@ fn simulate(
         let movie = match other {
             None => truth.movie(file, instrument, &times)?,
             Some((model, world)) => {
-                let images = fine_images(file, &world, (&truth, &times), model)?;
+                let images = fine_images(file, &world, &truth, &times, model)?;
                 binned(&images, file.screen.pixels)
             }
         };
@@ -88,12 +88,12 @@ fn simulate(
             (fill(&mut observation, from, &truth, (&hours, &times), sky)?, pulse(fit))
         }
         Some((model, world)) => {
-            let images = fine_images(file, &world, (&truth, &times), model)?;
+            let images = fine_images(file, &world, &truth, &times, model)?;
             let pixels = FINER * file.screen.pixels;
             let pixel_rad = sky.pixel_rad / FINER as f64;
             let grid = ImageGrid { width: pixels, height: pixels, pixel_rad };
             let fine = Frames::of(images.concat(), pixels * pixels);
-            simulate::fill_from(&mut observation, (grid, &fine), Pulse::Delta, &hours)?;
+            simulate::fill_from(&mut observation, grid, &fine, Pulse::Delta, &hours)?;
             let movie = lit(&truth, binned(&images, file.screen.pixels))?;
             (movie, fit.screen.pulse.map_or(Pulse::Delta, PixelShape::pulse))
         }
@@ -164,7 +164,7 @@ fn fill(
     let pulse = pulse(fit);
     if !is_polarized(&fit.loss) {
         let images = lit(truth, truth.movie(file, instrument, times)?)?;
-        simulate::fill_from(observation, (sky, &images), pulse, hours)?;
+        simulate::fill_from(observation, sky, &images, pulse, hours)?;
         return Ok(images);
     }
     let mut model = instrument.forward::<f64>(&motion(file, times.to_vec())?)?;

@@ -202,7 +202,7 @@ impl<T: Float + Default> Memory<T> {
         sums: &mut [T],
         coordinates: Option<CoordinatesMut<'_, T>>,
     ) {
-        self.through_network(field, (at, coordinates.is_some()), cotangents, sums);
+        self.through_network(field, at, coordinates.is_some(), cotangents, sums);
         self.add_to_nodes(field, at, sums);
         if let Some(mut coordinates) = coordinates {
             for (k, column) in coordinates.columns().iter_mut().enumerate() {
@@ -215,7 +215,8 @@ impl<T: Float + Default> Memory<T> {
     fn through_network(
         &mut self,
         Field { grid, geometries, parameters }: Field<'_, T>,
-        (at, wanted): (Coordinates<'_, T>, bool),
+        at: Coordinates<'_, T>,
+        wanted: bool,
         cotangents: &[T],
         sums: &mut [T],
     ) {

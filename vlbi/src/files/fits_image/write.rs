@@ -9,15 +9,10 @@ use crate::operator::ImageGrid;
 /// south, CDELT1 < 0. Source, place, frequency and day are those of the observation, as far as it knows them.
 pub fn write(images: &[&[f64]], grid: ImageGrid, seen: &Observation) -> Vec<u8> {
     let units = STOKES.iter().zip(images).enumerate();
-    units.flat_map(|(k, (name, image))| unit(name, image, (grid, seen), k == 0)).collect()
+    units.flat_map(|(k, (name, image))| unit(name, image, grid, seen, k == 0)).collect()
 }
 
-fn unit(
-    name: &str,
-    image: &[f64],
-    (grid, seen): (ImageGrid, &Observation),
-    first: bool,
-) -> Vec<u8> {
+fn unit(name: &str, image: &[f64], grid: ImageGrid, seen: &Observation, first: bool) -> Vec<u8> {
     let mut cards = Cards::default();
     if first {
         cards.value("SIMPLE", "T");

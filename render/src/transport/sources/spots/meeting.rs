@@ -38,7 +38,7 @@ impl Spots {
             }
             let ends = [&Node::at(path, from), &Node::at(path, to)];
             match self.spans.as_deref() {
-                Some(spans) => meeting.by_spans((spans, tree), ends, 0, (walk, met)),
+                Some(spans) => meeting.by_spans(spans, tree, ends, 0, (walk, met)),
                 None => meeting.through(tree, ends, walk, met),
             }
         }
@@ -95,7 +95,8 @@ impl Meeting<'_> {
     /// most, or else asks the tree of all times.
     fn by_spans(
         &self,
-        (spans, ever): (&SpotSpans, &SpotTree),
+        spans: &SpotSpans,
+        ever: &SpotTree,
         [start, end]: [&Node; 2],
         depth: u32,
         (walk, met): (&mut WalkScratch, &mut Vec<Met>),
@@ -113,8 +114,8 @@ impl Meeting<'_> {
         }
         let middle = 0.5 * (start.point.mino_time + end.point.mino_time);
         let middle = Node::at(self.path, middle);
-        self.by_spans((spans, ever), [start, &middle], depth + 1, (walk, met));
-        self.by_spans((spans, ever), [&middle, end], depth + 1, (walk, met));
+        self.by_spans(spans, ever, [start, &middle], depth + 1, (walk, met));
+        self.by_spans(spans, ever, [&middle, end], depth + 1, (walk, met));
     }
 }
 

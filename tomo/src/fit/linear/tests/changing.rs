@@ -51,7 +51,7 @@ fn exact_sparse_operator_is_the_changing_field_and_sums() {
     let voxels = Voxels { nodes: [7, 6, 8], ..Voxels::cube(2, 5.0, Degree::Linear) };
     for (allowed, delay) in ALLOWED.into_iter().flat_map(|a| [(a, false), (a, true)]) {
         let knots = knots(allowed);
-        compare_with_images(&model(delay), &changing(&voxels, knots), (voxels, knots));
+        compare_with_images(&model(delay), &changing(&voxels, knots), voxels, knots);
     }
 }
 
@@ -63,14 +63,15 @@ fn exact_sparse_operator_is_the_changing_field_of_a_falling_flow() {
     for (allowed, delay) in ALLOWED.into_iter().flat_map(|a| [(a, false), (a, true)]) {
         let knots = Knots { first: 1.0, spacing: 4.0, count: 4, allowed };
         let field = changing_of(law.angular(0, 0.0).unwrap(), &voxels, knots);
-        compare_with_images(&delayed(falling_model(), delay), &field, (voxels, knots));
+        compare_with_images(&delayed(falling_model(), delay), &field, voxels, knots);
     }
 }
 
 fn compare_with_images(
     model: &ForwardModel<f64>,
     field: &Changing<f64>,
-    (voxels, knots): (Voxels, Knots),
+    voxels: Voxels,
+    knots: Knots,
 ) {
     let dark = vec![0.0; FRAMES.len() * model.pixels()];
     let dark = ImageTerm::new(dark, model.pixels(), 1.0).unwrap();
