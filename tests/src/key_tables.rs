@@ -6,8 +6,9 @@
 use crate::documents::read;
 use crate::support::root;
 use kerrlight_common::toml_file::{Key, Keys, bound};
+use kerrlight_imaging::settings::StaticImageFile;
 use kerrlight_render::scene::Scene;
-use kerrlight_tomo::fit::settings::{FitFile, StaticImageFile};
+use kerrlight_tomo::fit::settings::FitFile;
 use std::collections::BTreeSet;
 
 /// Begins the line above a table.

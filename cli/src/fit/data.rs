@@ -6,10 +6,10 @@ use crate::paths;
 use anyhow::{Context, bail};
 use kerrlight_common::frames::Frames;
 use kerrlight_common::numpy;
+use kerrlight_imaging::data as imaging;
+use kerrlight_imaging::settings::{StaticImageFile, StrengthSettings};
 use kerrlight_tomo::Error;
-use kerrlight_tomo::fit::settings::{
-    DataFiles, FitFile, Simulation, StaticImageFile, StrengthSettings,
-};
+use kerrlight_tomo::fit::settings::{DataFiles, FitFile, Simulation};
 use kerrlight_tomo::fit::setup::{Drawn, Instrument, Measured};
 use kerrlight_validation::sky::{Screen, Sky};
 use kerrlight_vlbi::files;
@@ -173,8 +173,8 @@ pub fn of_static(
     for path in file.data.visibilities.path.all() {
         let path = paths::of_data(path, base_dir)?;
         let (measured, polarized) = visibilities(&path, |observation, name| {
-            let polarized = Measured::of_static_polarized(file, observation.clone(), name)?;
-            Ok((Measured::of_static(file, observation, name)?, polarized))
+            let polarized = imaging::polarized(file, observation.clone(), name)?;
+            Ok((imaging::total_intensity(file, observation, name)?, polarized))
         })?;
         let name = || path.display().to_string();
         all.push((name(), measured));
@@ -182,10 +182,10 @@ pub fn of_static(
     }
     let of = file.polarization.as_ref().map(|polarization| &polarization.strength);
     let joined = |strength: &Option<StrengthSettings>| {
-        Measured::joined(all_polarized, ("polarization.", strength.as_ref()))
+        imaging::joined(all_polarized, ("polarization.", strength.as_ref()))
     };
     let polarized = of.map(joined).transpose()?;
-    Ok((Measured::joined(all, ("", file.strength.as_ref()))?, polarized))
+    Ok((imaging::joined(all, ("", file.strength.as_ref()))?, polarized))
 }
 
 fn visibilities<R>(

@@ -71,7 +71,6 @@ pub mod setup;
 mod shift;
 mod sightlines;
 mod state;
-pub mod static_image;
 mod steps;
 mod stokes;
 mod terms;

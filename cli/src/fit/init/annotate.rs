@@ -1,7 +1,8 @@
 //! Comments for settings: what each key means, and what is left to the user.
 
 use kerrlight_common::toml_file::{Key, Keys};
-use kerrlight_tomo::fit::settings::{FitFile, StaticImageFile};
+use kerrlight_imaging::settings::StaticImageFile;
+use kerrlight_tomo::fit::settings::FitFile;
 
 /// Column at which comments start, unless the value is longer.
 const COLUMN: usize = 34;

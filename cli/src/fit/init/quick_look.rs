@@ -1,8 +1,7 @@
 //! Whether data of a source that varies ask for motion: a quick static image of them, before settings are guessed.
 
-use kerrlight_tomo::fit::settings::StaticImageFile;
-use kerrlight_tomo::fit::setup::Measured;
-use kerrlight_tomo::fit::static_image::survey;
+use kerrlight_imaging::settings::StaticImageFile;
+use kerrlight_imaging::{data, survey};
 use kerrlight_tomo::fit::verdict::CHANCE;
 use kerrlight_vlbi::observation::Observation;
 
@@ -18,7 +17,7 @@ impl QuickLook {
     pub fn new(settings: &str, observation: &Observation, name: &str) -> Option<Self> {
         let mut file = StaticImageFile::parse(settings).ok()?;
         (file.strength, file.ring, file.image.draws) = (None, None, None);
-        let measured = Measured::of_static(&file, observation.clone(), name).ok()?;
+        let measured = data::total_intensity(&file, observation.clone(), name).ok()?;
         let survey = survey(&file, &measured, &[], &|_, _| true).ok()??;
         let terms = measured.visibility_terms::<f64>(&file.loss, file.image.pixels.pow(2)).ok()?;
         let frames = 0..measured.times.len();

@@ -21,13 +21,14 @@ use crate::progress;
 use crate::session;
 use anyhow::bail;
 use kerrlight_common::frames::Frames;
-use kerrlight_tomo::fit::FrameTerm;
-use kerrlight_tomo::fit::settings::{Loss, LossKind, StaticImageFile, StrengthSettings};
-use kerrlight_tomo::fit::setup::Measured;
-use kerrlight_tomo::fit::static_image::{
+use kerrlight_imaging::settings::{StaticImageFile, StrengthSettings};
+use kerrlight_imaging::{
     Candidate, PolarizedSurvey, Ring, Shape, ShapeFit, Stage, Survey, fit_shapes, survey,
     survey_polarized,
 };
+use kerrlight_tomo::fit::FrameTerm;
+use kerrlight_tomo::fit::settings::{Loss, LossKind};
+use kerrlight_tomo::fit::setup::Measured;
 use kerrlight_tomo::fit::verdict::{Statistics, Tested};
 use kerrlight_vlbi::files::images;
 use polarized::Polarized;
@@ -231,8 +232,7 @@ fn beside(
 ) -> Vec<(&'static str, f64)> {
     let image = &survey.found().solution.image;
     let of = |kind: LossKind| {
-        let loss =
-            Loss { data: kind, weight: 1.0, sigma: None, stokes: None, least_snr: Some(3.0) };
+        let loss = Loss { least_snr: Some(3.0), ..Loss::new(kind) };
         let terms = measured.visibility_terms::<f64>(&[loss], image.len()).ok()?;
         let term = &terms.first()?.term;
         let frames = || 0..measured.times.len();

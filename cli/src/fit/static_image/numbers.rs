@@ -5,7 +5,7 @@ use crate::fit::closures;
 use crate::fit::results::verdict;
 use crate::session;
 use crate::usage::usage;
-use kerrlight_tomo::fit::static_image::{Candidate, Ring, ShapeFit, Survey};
+use kerrlight_imaging::{Candidate, Ring, ShapeFit, Survey};
 use serde_json::{Map, Value, json};
 
 /// A number of a ring.

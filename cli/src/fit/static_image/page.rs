@@ -9,8 +9,8 @@ use crate::fit::results::page::settings;
 use crate::fit::results::verdict::{self, Evidence};
 use crate::fit::results::{plots, residuals};
 use crate::report::{Axis, LinePlot, Marks, Outcome, Report, Series, Table};
-use kerrlight_tomo::fit::settings::StaticImageFile;
-use kerrlight_tomo::fit::static_image::{Candidate, ShapeFit};
+use kerrlight_imaging::settings::StaticImageFile;
+use kerrlight_imaging::{Candidate, ShapeFit};
 use serde_json::Value;
 
 /// What the numbers of a ring are called, their units and what they mean.

@@ -2,7 +2,7 @@
 
 use super::Found;
 use crate::report::{Figure, SkyPanel, sky};
-use kerrlight_tomo::fit::static_image::{Candidate, blurred};
+use kerrlight_imaging::{Candidate, blurred};
 use kerrlight_vlbi::files;
 
 /// Full width at half maximum of the beam of the published images of M87*, µas (EHT Collaboration 2019, ApJL 875, L4).

@@ -4,10 +4,11 @@ use super::numbers::with_error;
 use crate::fit::results::leakage::Leakage;
 use crate::report::{Axis, LinePlot, Marks, Outcome, Series};
 use anyhow::Context;
+use kerrlight_imaging::settings::{StaticImageFile, StaticPolarization};
+use kerrlight_imaging::{LinearPolarization, PolarizedSurvey};
 use kerrlight_tomo::fit::FrameTerm;
-use kerrlight_tomo::fit::settings::{LossKind, StaticImageFile, StaticPolarization};
+use kerrlight_tomo::fit::settings::LossKind;
 use kerrlight_tomo::fit::setup::{Measured, best_held};
-use kerrlight_tomo::fit::static_image::{LinearPolarization, PolarizedSurvey};
 use kerrlight_tomo::fit::verdict::{Errors, Statistics, Tested};
 use serde_json::{Value, json};
 

@@ -6,8 +6,9 @@ use super::polarized::Polarized;
 use crate::fit::closures;
 use crate::fit::results::medium;
 use crate::report::Part;
-use kerrlight_tomo::fit::settings::{LossKind, StartImage};
-use kerrlight_tomo::fit::static_image::{ShapeFit, Survey};
+use kerrlight_imaging::settings::StartImage;
+use kerrlight_imaging::{ShapeFit, Survey};
+use kerrlight_tomo::fit::settings::LossKind;
 
 impl Found<'_> {
     /// The ring in a sentence, where one is looked for.

@@ -60,13 +60,13 @@ fn line_prefix(line: Option<usize>) -> String {
 
 impl FitError {
     /// A value out of its range.
-    pub(crate) fn range(key: impl Into<String>, value: impl ToString, allowed: &str) -> Self {
+    pub fn range(key: impl Into<String>, value: impl ToString, allowed: &str) -> Self {
         let (key, value) = (key.into(), value.to_string());
         FitError::Range { line: None, key, value, allowed: allowed.to_owned() }
     }
 
     /// A key that is needed.
-    pub(crate) fn missing(key: &str, why: impl Into<String>) -> Self {
+    pub fn missing(key: &str, why: impl Into<String>) -> Self {
         FitError::Missing { key: key.to_owned(), why: why.into() }
     }
 
@@ -138,8 +138,11 @@ impl From<Box<dyn std::error::Error + Send + Sync>> for FitError {
 }
 
 /// Names the part of the settings that an error is about.
-pub(crate) trait Within<T> {
+pub trait Within<T> {
     /// The same result, whose error begins with the part.
+    ///
+    /// # Errors
+    /// That of the result.
     fn within(self, part: impl Into<String>) -> Result<T, Error>;
 }
 
@@ -151,10 +154,11 @@ impl<T, E: Into<FitError>> Within<T> for Result<T, E> {
     }
 }
 
-/// Refuses settings that contradict each other.
+/// Refuses settings that contradict each other: returns [`FitError::Conflict`] with these words, as `format!` takes them.
+#[macro_export]
 macro_rules! refuse {
     ($($words:tt)*) => {
-        return Err(crate::fit::settings::FitError::Conflict(format!($($words)*)).into())
+        return Err($crate::fit::settings::FitError::Conflict(format!($($words)*)).into())
     };
 }
-pub(crate) use refuse;
+pub use refuse;

@@ -1,11 +1,12 @@
 //! Keys of a fit's file: their ranges are checked, their documentation is handed on.
 
-use super::{FitError, FitFile, StaticImageFile};
+use super::{FitError, FitFile};
 use kerrlight_common::toml_file::{self, Keys, OutOfRange, shown};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::sync::LazyLock;
 
 static FIT: LazyLock<Keys> = LazyLock::new(Keys::of::<FitFile>);
-static IMAGE: LazyLock<Keys> = LazyLock::new(Keys::of::<StaticImageFile>);
 
 impl FitFile {
     /// All keys of such a file, with their documentation.
@@ -18,20 +19,30 @@ impl FitFile {
     /// # Errors
     /// With the key, its value and what is allowed.
     pub fn check_ranges(&self) -> Result<(), FitError> {
-        let table = toml_file::table_of(self)?;
-        FIT.check(&table).map_err(|wrong| range_error(&wrong))
+        check_ranges(self, &FIT)
     }
 }
 
-impl StaticImageFile {
-    /// All keys of such a file, with their documentation.
-    pub fn keys() -> &'static Keys {
-        &IMAGE
-    }
+/// Refuses the first number of settings that is out of the range of its key.
+///
+/// # Errors
+/// With the key, its value and what is allowed.
+pub fn check_ranges<T: Serialize>(settings: &T, keys: &Keys) -> Result<(), FitError> {
+    keys.check(&toml_file::table_of(settings)?).map_err(|wrong| range_error(&wrong))
+}
+
+/// Settings in a TOML text, which have these keys.
+///
+/// # Errors
+/// On syntax, unknown or missing keys, wrong types and numbers out of range: with the line, the key and what is allowed.
+pub fn read<T: DeserializeOwned>(text: &str, keys: &Keys) -> Result<T, FitError> {
+    let settings = toml_file::read(text)?;
+    check(text, keys)?;
+    Ok(settings)
 }
 
 /// Refuses the first number of a text that is out of its range, or not a number at all.
-pub(super) fn check(text: &str, keys: &Keys) -> Result<(), FitError> {
+fn check(text: &str, keys: &Keys) -> Result<(), FitError> {
     let table: toml::Table = toml_file::read(text)?;
     keys.check(&table).map_err(|wrong| range_error(&wrong).located(text))
 }

@@ -14,7 +14,6 @@ mod keys;
 mod light_curve;
 mod medium;
 mod merge;
-mod penalties;
 mod plain;
 mod quantity;
 mod quiescent;
@@ -22,8 +21,6 @@ mod recovery;
 mod representation;
 mod search;
 mod simulation;
-mod static_image;
-mod static_polarization;
 mod unknown_world;
 mod unknowns;
 mod view;
@@ -32,14 +29,14 @@ pub use band::{BackgroundSettings, BandSettings, Steps};
 pub use change::ChangeSettings;
 pub use data::{DataFiles, Loss, LossKind};
 pub use error::FitError;
-pub(crate) use error::{Within, refuse};
+pub use error::{Within, refuse};
 pub use gaussian::{FieldKind, FieldSettings, Negative, PriorOfVoxels};
 pub use held_out::{HeldOutSettings, Weight};
 pub use instrument::{GainPhases, GainSettings, InstrumentSettings, LeakageSettings};
+pub use keys::{check_ranges, read};
 pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedBackground, SimulatedCurve};
 pub use medium::{Scattering, Variability};
 pub use merge::merge;
-pub use penalties::{PenaltyKind, PenaltySettings};
 pub use quantity::{PriorSettings, Quantity};
 pub use quiescent::QuiescentSettings;
 pub use recovery::{AxisScan, AxisSearch, Linear, Occupancy, Optimiser, Start, Training};
@@ -48,16 +45,10 @@ pub use search::{WorldSearch, WorldSteps, WorldView};
 pub use simulation::{
     GlyphShape, Movie, Noise, Observation, Ring, Shines, Simulation, Spot, Truth, Tube,
 };
-pub use static_image::{
-    DataPaths, EnvelopeSettings, ImageSettings, RingSettings, StartImage, StaticData,
-    StaticImageFile, StaticVisibilities, StrengthSettings,
-};
-pub use static_polarization::StaticPolarization;
 pub use unknown_world::UnknownWorld;
 pub use view::{Absorption, Effects, Hole, Motion, Observer, PixelShape, Region, Screen, WidthOf};
 
 use crate::Error;
-use kerrlight_common::toml_file;
 use kerrlight_render::polarization::PolarizationLaw;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -145,9 +136,7 @@ impl FitFile {
     /// assert!(error.to_string().contains("missing field `hole`"));
     /// ```
     pub fn parse(text: &str) -> Result<Self, Error> {
-        let file = toml_file::read(text).map_err(FitError::Syntax)?;
-        keys::check(text, Self::keys())?;
-        Ok(file)
+        Ok(read(text, Self::keys())?)
     }
 
     /// Whether the data are visibilities, measured or simulated.

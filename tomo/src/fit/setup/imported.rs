@@ -9,8 +9,8 @@ use super::truth::SPOT;
 use super::visibilities::{VisibilitySettings, all_products, frames_of, prepared};
 use super::{Measured, Result, hours_per_m, sky};
 use crate::fit::settings::{
-    DataFiles, FitError, FitFile, GainPhases, InstrumentSettings, LossKind, PixelShape,
-    StaticImageFile, StrengthSettings, Within, refuse,
+    DataFiles, FitFile, InstrumentSettings, Loss, PixelShape, Scattering, Variability, Within,
+    refuse,
 };
 use kerrlight_common::frames::Frames;
 use kerrlight_vlbi::observation::Observation;
@@ -73,125 +73,68 @@ impl Measured {
         else {
             refuse!("{name} holds visibilities, and there is no [data.visibilities]")
         };
-        let settings = VisibilitySettings { average_s, uv_min };
-        let mut observation = match is_polarized(&file.loss) {
-            true => all_products(observation, &settings).within(name)?,
-            false => prepared(observation, &settings).within(name)?,
-        };
-        let losses = (&mut observation, &file.loss[..]);
-        add_systematic("data.visibilities.systematic", systematic, losses)?;
-        medium::correct(&mut observation, &file.loss, (scattering, variability), name)?;
-        let (hours, of_rows) = frames_of(&mut observation);
+        let rows = VisibilitySettings { average_s, uv_min };
+        let reduction = Reduction { rows, systematic, scattering, variability };
+        let observation = reduction.of(observation, &file.loss, name)?;
         let per_m = hours_per_m(file)?;
-        let times = hours.iter().map(|h| first_time + (h - hours[0]) / per_m).collect();
-        let gains = gains::priors(file.instrument.as_ref(), &file.loss, &observation)?;
-        let leakage = leakage::unknown(file.instrument.as_ref(), &observation)?;
-        let (visibilities, sky) = (Some((observation, of_rows)), Some(sky(file)?));
-        let varies = variability.is_some();
+        let mut all = Self::of_frames(observation, &file.loss, file.instrument.as_ref())?;
+        let first = all.times[0];
+        all.times.iter_mut().for_each(|time| *time = first_time + (*time - first) / per_m);
+        let (sky, varies) = (Some(sky(file)?), variability.is_some());
         let pulse = file.screen.pulse.unwrap_or(PixelShape::Delta).pulse();
-        Ok(Measured {
-            times,
-            visibilities,
-            varies,
-            sky,
-            pulse,
-            gains,
-            leakage,
-            ..Measured::empty()
-        })
+        Ok(Measured { sky, varies, pulse, ..all })
     }
 
-    /// Takes measured visibilities as the data of a static image, whose frames have hours of UTC for times. `name` is
-    /// what they are called in messages.
+    /// Visibilities as they are, with the gains and the leakage that a fit solves for. Times of frames are hours of UTC.
     ///
     /// # Errors
-    /// If a visibility has no error, none is left, or the kernel of scattering needs a frequency that is not known.
-    pub fn of_static(file: &StaticImageFile, observation: Observation, name: &str) -> Result<Self> {
-        let data = &file.data.visibilities;
-        let settings = VisibilitySettings { average_s: data.average_s, uv_min: data.uv_min };
-        let observation = cropped(observation, data.utc_h)?;
-        let mut observation = prepared(observation, &settings).within(name)?;
-        let losses = (&mut observation, &file.loss[..]);
-        add_systematic("data.visibilities.systematic", data.systematic, losses)?;
-        let sky = (data.scattering, data.variability);
-        medium::correct(&mut observation, &file.loss, sky, name)?;
+    /// If losses do not tell gains, a station has no prior, or leakage is asked of data without circular feeds.
+    pub fn of_frames(
+        mut observation: Observation,
+        losses: &[Loss],
+        instrument: Option<&InstrumentSettings>,
+    ) -> Result<Self> {
         let (times, of_rows) = frames_of(&mut observation);
-        let gains = gains::priors(file.instrument.as_ref(), &file.loss, &observation)?;
-        let (visibilities, sky) = (Some((observation, of_rows)), Some(file.image.grid()?));
-        let varies = data.variability.is_some();
-        Ok(Measured { times, visibilities, varies, sky, gains, ..Measured::empty() })
+        let gains = gains::priors(instrument, losses, &observation)?;
+        let leakage = leakage::unknown(instrument, &observation)?;
+        let visibilities = Some((observation, of_rows));
+        Ok(Measured { times, visibilities, gains, leakage, ..Measured::empty() })
     }
+}
 
-    /// The data of the polarisation of a static image, with all products of the feeds; none if no polarisation is asked for.
+/// What is done with measured visibilities before a model is compared with them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reduction {
+    /// Averages, and baselines that are left out.
+    pub rows: VisibilitySettings,
+    /// Part of each amplitude that is added to its error in quadrature, 0 or above.
+    pub systematic: f64,
+    /// Scattering that is undone.
+    pub scattering: Option<Scattering>,
+    /// What the source varies, which is added to errors of Stokes I in quadrature.
+    pub variability: Option<Variability>,
+}
+
+impl Reduction {
+    /// Averaged visibilities in order of time: Stokes I, or all products where a loss is polarised. `name` is what they are
+    /// called in messages.
     ///
     /// # Errors
-    /// As [`of_static`](Self::of_static), or if Q and U were not measured.
-    pub fn of_static_polarized(
-        file: &StaticImageFile,
-        observation: Observation,
-        name: &str,
-    ) -> Result<Option<Self>> {
-        let Some(polarization) = &file.polarization else { return Ok(None) };
-        let (data, losses) = (&file.data.visibilities, [polarization.loss()]);
-        let settings = VisibilitySettings { average_s: data.average_s, uv_min: data.uv_min };
-        let observation = cropped(observation, data.utc_h)?;
-        let mut observation = all_products(observation, &settings).within(name)?;
-        // The frames are those of total intensity.
-        let basis = observation.basis;
-        observation.rows.retain(|row| row.stokes_i(basis).is_some());
-        if !observation.is_polarized() {
-            refuse!("{name}: there is no RL or LR (nor Q and U): remove the table [polarization]");
-        }
-        let seen = (&mut observation, &losses[..]);
-        add_systematic("data.visibilities.systematic", data.systematic, seen)?;
-        medium::correct(&mut observation, &losses, (data.scattering, None), name)?;
-        medium::polarized_errors(&mut observation, data.variability, polarization);
-        let (times, of_rows) = frames_of(&mut observation);
-        let instrument = file.instrument.clone().map(|instrument| with_phases(instrument, file));
-        let gains = match polarization.data {
-            // They cancel.
-            LossKind::PolarimetricRatios => None,
-            _ => gains::priors(instrument.as_ref(), &losses, &observation)?,
+    /// If a visibility has no error, none is left, the frequency of scattered light is not known, or polarised light would
+    /// get the errors of a source that varies.
+    pub fn of(&self, observation: Observation, losses: &[Loss], name: &str) -> Result<Observation> {
+        let mut observation = match is_polarized(losses) {
+            true => all_products(observation, &self.rows).within(name)?,
+            false => prepared(observation, &self.rows).within(name)?,
         };
-        let leakage = leakage::unknown(instrument.as_ref(), &observation)?;
-        let (visibilities, sky) = (Some((observation, of_rows)), Some(file.image.grid()?));
-        let varies = data.variability.is_some() || polarization.variability.is_some();
-        let empty = Measured::empty();
-        Ok(Some(Measured { times, visibilities, varies, sky, gains, leakage, ..empty }))
+        add_systematic(
+            "data.visibilities.systematic",
+            self.systematic,
+            (&mut observation, losses),
+        )?;
+        medium::correct(&mut observation, losses, (self.scattering, self.variability), name)?;
+        Ok(observation)
     }
-}
-
-/// Rows between two hours of UTC.
-fn cropped(mut observation: Observation, utc_h: Option<[f64; 2]>) -> Result<Observation> {
-    let Some([from, to]) = utc_h else { return Ok(observation) };
-    observation.rows.retain(|row| (from..=to).contains(&row.time_h));
-    if observation.rows.is_empty() {
-        refuse!("data.visibilities.utc_h = [{from}, {to}] leaves no visibilities");
-    }
-    Ok(observation)
-}
-
-/// Phases that total intensity was fitted without are not known to polarisation either.
-fn with_phases(mut instrument: InstrumentSettings, file: &StaticImageFile) -> InstrumentSettings {
-    let knows = file.loss.iter().any(|loss| loss.data == LossKind::Visibilities);
-    if let (Some(gains), false) = (&mut instrument.gains, knows) {
-        gains.phases = GainPhases::Free;
-    }
-    instrument
-}
-
-/// Refuses more parts than half of the frames.
-pub(super) fn check_folds(
-    table: &str,
-    strength: Option<&StrengthSettings>,
-    frames: usize,
-) -> Result<()> {
-    let Some(strength) = strength.filter(|strength| frames < 2 * strength.folds) else {
-        return Ok(());
-    };
-    let allowed = format!("{} at most, half of the frames", frames / 2);
-    let key = format!("{table}strength.folds");
-    Err(FitError::range(key, strength.folds, &allowed).into())
 }
 
 /// Times of images that are read, M.

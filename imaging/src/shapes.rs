@@ -1,13 +1,13 @@
 //! Simple shapes that are fitted to the data of an image, with the same gains: what the image has to do better than.
 
-use super::ImageProblem;
-use super::solve::minimum;
 use crate::Error;
-use crate::fit::settings::{LossKind, StaticImageFile};
-use crate::fit::setup::Measured;
-use crate::fit::static_image::FluxPrior;
+use crate::problem::{FluxPrior, ImageProblem};
+use crate::settings::StaticImageFile;
+use crate::solve::minimum;
 use core::f64::consts::{LN_2, TAU};
 use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_tomo::fit::settings::LossKind;
+use kerrlight_tomo::fit::setup::Measured;
 use kerrlight_vlbi::operator::ImageGrid;
 use rayon::prelude::*;
 

@@ -3,8 +3,8 @@
 //! Parameters are the logarithms of the pixels' shares of the flux, up to a constant, and that of the flux over its
 //! expectation: every image is positive, and shape and flux are apart.
 
-use crate::fit::linear::Prior;
-use crate::fit::{FrameTerm, Shape, Weighted};
+use kerrlight_tomo::fit::linear::Prior;
+use kerrlight_tomo::fit::{FrameTerm, Shape, Weighted};
 
 /// Part of the mean light below which a pixel is dark.
 const DARK: f64 = 1e-3;

@@ -1,15 +1,19 @@
 //! All that is asked of a static image: the strength of its penalties, the best of several starts, what else the data
 //! allow, and how noise scatters it.
 
-use super::solve::{Solution, solve};
-use super::start;
-use super::{FluxPrior, ImageProblem, Ring, ShapeFit};
 use crate::Error;
-use crate::fit::linear::Prior;
-use crate::fit::settings::{StaticImageFile, StrengthSettings};
-use crate::fit::setup::{Held, Measured, best_held};
-use crate::fit::{FrameTerm, Weighted};
+use crate::data;
+use crate::problem::{FluxPrior, ImageProblem};
+use crate::ring::Ring;
+use crate::settings::{StaticImageFile, StrengthSettings};
+use crate::shapes::{ShapeFit, fit_shapes};
+use crate::solve::{Solution, solve};
+use crate::start;
 use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_tomo::fit::linear::Prior;
+use kerrlight_tomo::fit::setup::{Held, Measured, best_held};
+use kerrlight_tomo::fit::{FrameTerm, Weighted};
+use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::operator::ImageGrid;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -162,6 +166,19 @@ pub fn survey(
     let others = Others { starts: good, strengths: chosen };
     let draws = search.draws(measured, (&starts[best], &others), &frames)?;
     Ok(draws.map(|draws| Survey { held, strength, starts, best, strengths, draws }))
+}
+
+/// The image of visibilities of a source that does not change, as `kerrlight fit` finds it: from the starts of the settings and
+/// from simple shapes that fit the same data.
+///
+/// # Errors
+/// If a number of the settings is out of range, visibilities have no errors, or a loss has no data.
+pub fn image(file: &StaticImageFile, observation: Observation) -> Result<Survey, Error> {
+    file.check_all()?;
+    let measured = data::total_intensity(file, observation, "the observation")?;
+    let shapes = fit_shapes(file, &measured, &|| true)?.unwrap_or_default();
+    let found = survey(file, &measured, &shapes, &|_, _| true)?;
+    found.ok_or_else(|| Error::Failed("the search for an image was told to stop".to_owned()))
 }
 
 /// The start with the least loss.
@@ -328,7 +345,7 @@ impl Search<'_> {
     ) -> Result<Option<Vec<Candidate>>, Error> {
         let one = |k: usize| -> Result<Option<Candidate>, Error> {
             let seed = self.file.seed.wrapping_add(1 + k as u64);
-            let drawn = measured.redrawn(&self.file.loss, &best.solution.image, seed)?;
+            let drawn = data::redrawn(measured, &self.file.loss, &best.solution.image, seed)?;
             let terms = drawn.visibility_terms(&self.file.loss, self.grid.pixels())?;
             let mut random = Pcg64::seed_from_u64(seed);
             let [of_flux, of_width]: [f64; 2] = [(); 2].map(|()| random.sample(StandardNormal));

@@ -1,9 +1,11 @@
 //! Static images: gradients, rings of known shape, and rings seen through an array with gains.
 
-use super::*;
-use crate::fit::settings::{RingSettings, StartImage, StaticImageFile, Variability};
-use crate::fit::setup::Measured;
+use crate::data;
+use crate::settings::{RingSettings, StartImage, StaticImageFile};
+use crate::*;
 use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_tomo::fit::settings::Variability;
+use kerrlight_tomo::fit::setup::Measured;
 use kerrlight_vlbi::array;
 use kerrlight_vlbi::earth::{Frame, Ut1};
 use kerrlight_vlbi::noise::{GainErrors, ScatteringKernel, add_thermal_noise, apply_gains};
@@ -150,7 +152,7 @@ fn observed(seed: u64) -> Observation {
 }
 
 fn measured(file: &StaticImageFile, seed: u64) -> Measured {
-    Measured::of_static(file, observed(seed), "data").unwrap()
+    data::total_intensity(file, observed(seed), "data").unwrap()
 }
 
 /// Errors are those of a source that varies, in quadrature; visibilities and errors are those before scattering.
@@ -315,8 +317,8 @@ fn exact_the_search_can_be_stopped() {
     assert!(survey(&file, &measured(&file, 4), &[], &|_, _| false).unwrap().is_none());
     let text = format!("{SETTINGS}[strength]\nvalues = [0.5, 1.0]\nfolds = 9\n");
     let file = StaticImageFile::parse(&text).unwrap();
-    let data = Measured::of_static(&file, observed(4), "data").unwrap();
-    let joined = Measured::joined(vec![("data".to_owned(), data)], ("", file.strength.as_ref()));
+    let data = data::total_intensity(&file, observed(4), "data").unwrap();
+    let joined = data::joined(vec![("data".to_owned(), data)], ("", file.strength.as_ref()));
     let error = joined.err().unwrap().to_string();
     assert!(error.contains("strength.folds = 9 is not allowed: 8 at most"), "{error}");
 }

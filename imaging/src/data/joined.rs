@@ -1,9 +1,9 @@
 //! Data of several files as those of one static image.
 
-use super::imported::check_folds;
-use super::leakage::LeakageUnknown;
-use super::{Measured, Result};
-use crate::fit::settings::{StrengthSettings, refuse};
+use crate::Error;
+use crate::settings::StrengthSettings;
+use kerrlight_tomo::fit::settings::{FitError, refuse};
+use kerrlight_tomo::fit::setup::{LeakageUnknown, Measured};
 use kerrlight_vlbi::gains::GainPriors;
 use kerrlight_vlbi::observation::{Observation, Row};
 use kerrlight_vlbi::polarimetry::SharedLeakage;
@@ -14,77 +14,87 @@ const SAME_DEG: f64 = 0.01;
 /// Frequencies may differ by this part: an image changes with frequency.
 const SAME_FREQUENCY: f64 = 0.05;
 
-impl Measured {
-    /// Data of several files, each with what it is called in messages, as those of one static image, in order of the hour of UTC. Frames
-    /// and stations of a file are its own: no gain is shared between files, and nothing closes across them. From the second
-    /// file on ` (2)`, ` (3)` … stand behind the names of stations. `table` is that of the strength, for messages.
-    ///
-    /// # Errors
-    /// If there are none, files contradict each other, or there are too few frames for the strength.
-    pub fn joined(
-        parts: Vec<(String, Self)>,
-        (table, strength): (&str, Option<&StrengthSettings>),
-    ) -> Result<Self> {
-        let mut parts = parts.into_iter();
-        let Some((first, mut all)) = parts.next() else {
-            refuse!("data.visibilities.path = [] is not allowed: one file or more");
-        };
-        all.files = vec![0; all.times.len()];
-        for (file, (name, part)) in parts.enumerate() {
-            all.join((&first, &name), part, file + 1)?;
-        }
-        check_folds(table, strength, all.times.len())?;
-        all.in_order();
-        Ok(all)
+/// Data of several files, each with what it is called in messages, as those of one static image, in order of the hour of UTC. Frames
+/// and stations of a file are its own: no gain is shared between files, and nothing closes across them. From the second
+/// file on ` (2)`, ` (3)` … stand behind the names of stations. `table` is that of the strength, for messages.
+///
+/// # Errors
+/// If there are none, files contradict each other, or there are too few frames for the strength.
+pub fn joined(
+    parts: Vec<(String, Measured)>,
+    (table, strength): (&str, Option<&StrengthSettings>),
+) -> Result<Measured, Error> {
+    let mut parts = parts.into_iter();
+    let Some((first, mut all)) = parts.next() else {
+        refuse!("data.visibilities.path = [] is not allowed: one file or more");
+    };
+    all.files = vec![0; all.times.len()];
+    for (file, (name, part)) in parts.enumerate() {
+        join(&mut all, (&first, &name), part, file + 1)?;
     }
-
-    fn join(&mut self, names: (&str, &str), part: Self, file: usize) -> Result<()> {
-        let (Some((seen, of_rows)), Some((other, of_others))) =
-            (&mut self.visibilities, part.visibilities)
-        else {
-            return Ok(());
-        };
-        if let Some(why) = contradiction(seen, &other) {
-            refuse!("{} and {} cannot be one image: {why}", names.0, names.1);
-        }
-        let (stations, frames) = (seen.stations.len() as u16, self.times.len());
-        seen.stations.extend(other.stations.into_iter().map(|mut station| {
-            station.name = format!("{} ({})", station.name, file + 1);
-            station
-        }));
-        let own = |row: Row| Row { stations: row.stations.map(|k| k + stations), ..row };
-        seen.rows.extend(other.rows.into_iter().map(own));
-        of_rows.extend(of_others.into_iter().map(|frame| frame + frames));
-        self.files.extend(part.times.iter().map(|_| file));
-        self.times.extend(part.times);
-        if let (Some(GainPriors { amplitude_sigma, .. }), Some(more)) =
-            (&mut self.gains, part.gains)
-        {
-            amplitude_sigma.extend(more.amplitude_sigma);
-        }
-        if let Some(LeakageUnknown { shared, .. }) = &mut self.leakage {
-            *shared = SharedLeakage::none(seen.stations.len());
-        }
-        Ok(())
-    }
-
-    /// Puts frames in order of time, those of one time in the order of their files.
-    fn in_order(&mut self) {
-        let mut order: Vec<usize> = (0..self.times.len()).collect();
-        order.sort_by(|a, b| self.times[*a].total_cmp(&self.times[*b]));
-        let mut place = vec![0; order.len()];
-        order.iter().enumerate().for_each(|(new, old)| place[*old] = new);
-        self.times = order.iter().map(|old| self.times[*old]).collect();
-        self.files = order.iter().map(|old| self.files[*old]).collect();
-        let Some((seen, of_rows)) = &mut self.visibilities else { return };
-        let mut rows: Vec<(usize, Row)> =
-            of_rows.iter().zip(&seen.rows).map(|(frame, row)| (place[*frame], *row)).collect();
-        rows.sort_by_key(|(frame, _)| *frame);
-        (*of_rows, seen.rows) = rows.into_iter().unzip();
-    }
+    check_folds(table, strength, all.times.len())?;
+    in_order(&mut all);
+    Ok(all)
 }
 
-/// The name of a station of joined data without what [`Measured::joined`] has put behind it, and which file it is of.
+fn join(all: &mut Measured, names: (&str, &str), part: Measured, file: usize) -> Result<(), Error> {
+    let (Some((seen, of_rows)), Some((other, of_others))) =
+        (&mut all.visibilities, part.visibilities)
+    else {
+        return Ok(());
+    };
+    if let Some(why) = contradiction(seen, &other) {
+        refuse!("{} and {} cannot be one image: {why}", names.0, names.1);
+    }
+    let (stations, frames) = (seen.stations.len() as u16, all.times.len());
+    seen.stations.extend(other.stations.into_iter().map(|mut station| {
+        station.name = format!("{} ({})", station.name, file + 1);
+        station
+    }));
+    let own = |row: Row| Row { stations: row.stations.map(|k| k + stations), ..row };
+    seen.rows.extend(other.rows.into_iter().map(own));
+    of_rows.extend(of_others.into_iter().map(|frame| frame + frames));
+    all.files.extend(part.times.iter().map(|_| file));
+    all.times.extend(part.times);
+    if let (Some(GainPriors { amplitude_sigma, .. }), Some(more)) = (&mut all.gains, part.gains) {
+        amplitude_sigma.extend(more.amplitude_sigma);
+    }
+    if let Some(LeakageUnknown { shared, .. }) = &mut all.leakage {
+        *shared = SharedLeakage::none(seen.stations.len());
+    }
+    Ok(())
+}
+
+/// Puts frames in order of time, those of one time in the order of their files.
+fn in_order(all: &mut Measured) {
+    let mut order: Vec<usize> = (0..all.times.len()).collect();
+    order.sort_by(|a, b| all.times[*a].total_cmp(&all.times[*b]));
+    let mut place = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(new, old)| place[*old] = new);
+    all.times = order.iter().map(|old| all.times[*old]).collect();
+    all.files = order.iter().map(|old| all.files[*old]).collect();
+    let Some((seen, of_rows)) = &mut all.visibilities else { return };
+    let mut rows: Vec<(usize, Row)> =
+        of_rows.iter().zip(&seen.rows).map(|(frame, row)| (place[*frame], *row)).collect();
+    rows.sort_by_key(|(frame, _)| *frame);
+    (*of_rows, seen.rows) = rows.into_iter().unzip();
+}
+
+/// Refuses more parts than half of the frames.
+fn check_folds(
+    table: &str,
+    strength: Option<&StrengthSettings>,
+    frames: usize,
+) -> Result<(), Error> {
+    let Some(strength) = strength.filter(|strength| frames < 2 * strength.folds) else {
+        return Ok(());
+    };
+    let allowed = format!("{} at most, half of the frames", frames / 2);
+    let key = format!("{table}strength.folds");
+    Err(FitError::range(key, strength.folds, &allowed).into())
+}
+
+/// The name of a station of joined data without what [`joined`] has put behind it, and which file it is of.
 pub fn station_of_file(name: &str) -> (&str, usize) {
     let split = name.rsplit_once(" (").and_then(|(own, file)| {
         let file: usize = file.strip_suffix(')')?.parse().ok()?;
@@ -126,7 +136,6 @@ fn contradiction(a: &Observation, b: &Observation) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::setup::frames_of;
     use kerrlight_vlbi::Complex64;
     use kerrlight_vlbi::array::Station;
     use kerrlight_vlbi::earth::SourcePosition;
@@ -144,9 +153,8 @@ mod tests {
                 seen.rows.push(Row::total_intensity(time_h, stations, [1e9, 0.0], i));
             }
         }
-        let (times, of_rows) = frames_of(&mut seen);
         let gains = Some(GainPriors { free_phases: false, amplitude_sigma: vec![sigma; 3] });
-        Measured { times, visibilities: Some((seen, of_rows)), gains, ..Measured::empty() }
+        Measured { gains, ..Measured::of_frames(seen, &[], None).unwrap() }
     }
 
     /// Two bands of one night: as many closure phases as in both, none across, and gains of a file with its own priors.
@@ -154,7 +162,7 @@ mod tests {
     fn exact_files_share_neither_closures_nor_gains() {
         let of = |hz, sigma| file(hz, SourcePosition::M87, sigma);
         let parts = vec![("lo".to_owned(), of(227e9, 0.1)), ("hi".to_owned(), of(229e9, 0.2))];
-        let all = Measured::joined(parts, ("", None)).unwrap();
+        let all = joined(parts, ("", None)).unwrap();
         assert_eq!(
             (&all.times[..], &all.files[..]),
             (&[1.0, 1.0, 2.0, 2.0][..], &[0, 1, 0, 1][..])
@@ -184,7 +192,7 @@ mod tests {
             (file(229e9, SourcePosition::SGR_A, 0.1), "a and b cannot be one image: they observe"),
             (file(86e9, SourcePosition::M87, 0.1), "they are of 229.0 and 86.0 GHz"),
         ] {
-            let error = Measured::joined(vec![m87(), ("b".to_owned(), other)], ("", None));
+            let error = joined(vec![m87(), ("b".to_owned(), other)], ("", None));
             let error = error.err().unwrap().to_string();
             assert!(error.contains(says), "{error}");
         }

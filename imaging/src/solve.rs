@@ -1,7 +1,7 @@
 //! One minimum.
 
-use super::ImageProblem;
-use crate::optimise::{Lbfgs, LbfgsState, Step};
+use crate::problem::ImageProblem;
+use kerrlight_tomo::optimise::{Lbfgs, LbfgsState, Step};
 
 /// An image that no step improves, or that iterations have ended at.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 //! Q + iU = m I in every pixel with m = w/√(1 + |w|²): light is never polarised by more than all of it. Parameters are the
 //! real parts of w, pixel by pixel, then its imaginary parts; all are 0 where nothing is polarised.
 
-use crate::fit::FrameTerm;
+use kerrlight_tomo::fit::FrameTerm;
 
 /// What the polarisation of an image is judged by.
 pub struct PolarizedProblem<'a> {

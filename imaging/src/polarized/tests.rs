@@ -2,10 +2,10 @@
 //! gains and leakage.
 
 use super::*;
-use crate::fit::settings::StaticImageFile;
-use crate::fit::setup::Measured;
-use crate::fit::static_image::survey;
-use crate::fit::static_image::tests::{SETTINGS, night, spoil};
+use crate::data;
+use crate::settings::StaticImageFile;
+use crate::survey;
+use crate::tests::{SETTINGS, night, spoil};
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::noise::apply_leakage;
 use kerrlight_vlbi::observation::{Basis, Observation};
@@ -99,7 +99,7 @@ fn exact_gradients_of_the_polarised_loss() {
     for (kind, smoothness) in [("polarimetric-ratios", 0.3), ("polarized-visibilities", 0.0)] {
         let file =
             StaticImageFile::parse(&settings().replace("polarimetric-ratios", kind)).unwrap();
-        let measured = Measured::of_static_polarized(&file, observed(1, None), "data");
+        let measured = data::polarized(&file, observed(1, None), "data");
         let measured = measured.unwrap().unwrap();
         let loss = file.polarization.as_ref().unwrap().loss();
         let grid = file.image.grid().unwrap();
@@ -140,9 +140,9 @@ fn exact_gradients_of_the_polarised_loss() {
 fn found(text: &str, seed: u64, leakage: Option<f64>) -> PolarizedSurvey {
     let file = StaticImageFile::parse(text).unwrap();
     let seen = observed(seed, leakage);
-    let measured = Measured::of_static(&file, seen.clone(), "data").unwrap();
+    let measured = data::total_intensity(&file, seen.clone(), "data").unwrap();
     let intensity = survey(&file, &measured, &[], &|_, _| true).unwrap().unwrap();
-    let polarized = Measured::of_static_polarized(&file, seen, "data").unwrap().unwrap();
+    let polarized = data::polarized(&file, seen, "data").unwrap().unwrap();
     survey_polarized(&file, &polarized, &intensity, &|_, _| true).unwrap().unwrap()
 }
 
@@ -189,7 +189,7 @@ fn exact_a_spiral_is_found_beside_leakage() {
 fn exact_errors_of_polarised_data() {
     let rows = |text: &str| {
         let file = StaticImageFile::parse(text).unwrap();
-        let measured = Measured::of_static_polarized(&file, observed(1, None), "data");
+        let measured = data::polarized(&file, observed(1, None), "data");
         measured.unwrap().unwrap().visibilities.unwrap().0.rows
     };
     let plain = rows(&settings());
@@ -207,7 +207,7 @@ fn exact_errors_of_polarised_data() {
     }
     let file = StaticImageFile::parse(&settings()).unwrap();
     let intensity = observed(1, None).total_intensity();
-    let error = Measured::of_static_polarized(&file, intensity, "data").err().unwrap();
+    let error = data::polarized(&file, intensity, "data").err().unwrap();
     assert!(error.to_string().contains("there is no RL or LR"), "{error}");
 }
 

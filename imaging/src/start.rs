@@ -1,6 +1,6 @@
 //! Images to start from.
 
-use crate::fit::settings::StartImage;
+use crate::settings::StartImage;
 use core::f64::consts::LN_2;
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::operator::ImageGrid;

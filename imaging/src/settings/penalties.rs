@@ -1,9 +1,9 @@
 //! Settings of penalties on the brightness of a static image.
 
-use super::{FitError, Within, refuse};
 use crate::Error;
-use crate::fit::Regulariser;
-use crate::fit::linear::Prior;
+use kerrlight_tomo::fit::Regulariser;
+use kerrlight_tomo::fit::linear::Prior;
+use kerrlight_tomo::fit::settings::{FitError, Within, refuse};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

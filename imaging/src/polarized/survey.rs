@@ -3,12 +3,11 @@
 
 use super::{LinearPolarization, PolarizedProblem};
 use crate::Error;
-use crate::fit::settings::{StaticImageFile, StaticPolarization};
-use crate::fit::setup::{Held, Measured, SolvedLeakage, best_held};
-use crate::fit::static_image::solve::minimum;
-use crate::fit::static_image::survey::{allowed, held};
-use crate::fit::static_image::{Stage, Survey, SurveyWatch};
-use crate::fit::{FrameTerm, Weighted};
+use crate::settings::{StaticImageFile, StaticPolarization};
+use crate::solve::minimum;
+use crate::survey::{Stage, Survey, SurveyWatch, allowed, held};
+use kerrlight_tomo::fit::setup::{Held, Measured, SolvedLeakage, best_held};
+use kerrlight_tomo::fit::{FrameTerm, Weighted};
 use kerrlight_vlbi::data_terms::DataTermError;
 use kerrlight_vlbi::operator::ImageGrid;
 use rayon::prelude::*;
@@ -69,7 +68,7 @@ impl PolarizedSurvey {
 }
 
 /// Finds the polarisation of the image that a survey of total intensity has found; none if `watch` said no, or if no
-/// polarisation is asked for. `measured` are the data of [`Measured::of_static_polarized`].
+/// polarisation is asked for. `measured` are the data of [`data::polarized`](crate::data::polarized).
 ///
 /// # Errors
 /// If there are no data.

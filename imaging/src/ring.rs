@@ -1,6 +1,6 @@
 //! A ring in an image, as the EHT Collaboration (2019, ApJL 875, L4, section 9.1) measures it.
 
-use crate::fit::settings::RingSettings;
+use crate::settings::RingSettings;
 use core::f64::consts::{PI, TAU};
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::operator::ImageGrid;

@@ -1,7 +1,8 @@
 //! Settings of the linear polarisation of a static image.
 
-use super::{FitError, Loss, LossKind, StaticImageFile, StrengthSettings, Variability, refuse};
+use super::{StaticImageFile, StrengthSettings};
 use crate::Error;
+use kerrlight_tomo::fit::settings::{FitError, Loss, LossKind, Variability, refuse};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -40,7 +41,7 @@ impl StaticPolarization {
     /// What is compared, as the loss of a fit.
     pub fn loss(&self) -> Loss {
         let Self { data, least_snr, .. } = *self;
-        Loss { data, weight: 1.0, sigma: None, stokes: None, least_snr }
+        Loss { least_snr, ..Loss::new(data) }
     }
 
     pub(super) fn check(&self, file: &StaticImageFile) -> Result<(), Error> {

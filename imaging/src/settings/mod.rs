@@ -1,19 +1,29 @@
 //! Settings of a static image: of a source that does not change while it is observed. No hole, no gas and no motion
 //! are assumed.
 
-use super::penalties::priors_of;
-use super::static_polarization::check_strength;
-use super::{FitError, InstrumentSettings, Loss, LossKind, PenaltySettings, Within};
-use super::{Scattering, StaticPolarization, Variability};
-use super::{keys, refuse};
+mod penalties;
+mod polarization;
+
+pub use penalties::{PenaltyKind, PenaltySettings};
+pub use polarization::StaticPolarization;
+
 use crate::Error;
-use crate::fit::linear::Prior;
-use kerrlight_common::toml_file;
+use kerrlight_common::toml_file::Keys;
 use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_tomo::fit::linear::Prior;
+use kerrlight_tomo::fit::settings::{
+    FitError, InstrumentSettings, Loss, LossKind, Scattering, Variability, Within, check_ranges,
+    read, refuse,
+};
 use kerrlight_vlbi::operator::ImageGrid;
+use penalties::priors_of;
+use polarization::check_strength;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
+use std::sync::LazyLock;
+
+static KEYS: LazyLock<Keys> = LazyLock::new(Keys::of::<StaticImageFile>);
 
 /// The settings of a fit of a static image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -218,6 +228,38 @@ impl ImageSettings {
 }
 
 impl StaticImageFile {
+    /// Settings of an image and of the data that it explains, which are handed over as an observation: without gains,
+    /// penalties, ring and polarisation, which are fields to be set.
+    pub fn new(image: ImageSettings, loss: Vec<Loss>) -> Self {
+        let visibilities = StaticVisibilities {
+            path: DataPaths::Several(Vec::new()),
+            average_s: 0.0,
+            systematic: 0.0,
+            uv_min: None,
+            utc_h: None,
+            scattering: None,
+            variability: None,
+        };
+        Self {
+            title: String::new(),
+            seed: 1,
+            image,
+            data: StaticData { visibilities },
+            instrument: None,
+            loss,
+            regulariser: Vec::new(),
+            envelope: None,
+            strength: None,
+            ring: None,
+            polarization: None,
+        }
+    }
+
+    /// All keys of such a file, with their documentation.
+    pub fn keys() -> &'static Keys {
+        &KEYS
+    }
+
     /// Whether a fit's text asks for a static image: it has a table `image`.
     pub fn is_meant(text: &str) -> bool {
         text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("image"))
@@ -230,13 +272,13 @@ impl StaticImageFile {
     ///
     /// # Examples
     /// ```
-    /// # use kerrlight_tomo::fit::settings::StaticImageFile;
+    /// # use kerrlight_imaging::settings::StaticImageFile;
     /// let error = StaticImageFile::parse("title = \"M87*\"\nseed = 1").unwrap_err();
     /// assert!(error.to_string().contains("missing field `image`"));
     /// ```
     pub fn parse(text: &str) -> Result<Self, Error> {
-        let file: Self = toml_file::read(text).map_err(FitError::Syntax)?;
-        keys::check(text, Self::keys())?;
+        let file: Self = read(text, Self::keys())?;
+        file.data.visibilities.path.check()?;
         file.check()?;
         Ok(file)
     }
@@ -249,11 +291,11 @@ impl StaticImageFile {
         priors_of(&self.regulariser)
     }
 
-    fn check(&self) -> Result<(), Error> {
+    /// Refuses settings that contradict each other.
+    pub(crate) fn check(&self) -> Result<(), Error> {
         if self.image.starts.is_empty() {
             return Err(FitError::range("length of image.starts", 0, "1 image or more").into());
         }
-        self.data.visibilities.path.check()?;
         if self.loss.is_empty() {
             refuse!("loss is empty: there is nothing to fit; add a table [[loss]]");
         }
@@ -274,6 +316,12 @@ impl StaticImageFile {
             }
             None => Ok(()),
         }
+    }
+
+    /// The same, and numbers out of range.
+    pub(crate) fn check_all(&self) -> Result<(), Error> {
+        check_ranges(self, Self::keys())?;
+        self.check()
     }
 
     fn check_penalties(&self) -> Result<(), Error> {

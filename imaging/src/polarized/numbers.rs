@@ -1,7 +1,7 @@
 //! What is measured of a polarised image, as the EHT Collaboration (2021, ApJL 910, L13) does; β₂ is that of Palumbo, Wong &
 //! Prather (2020, ApJ 894, 156).
 
-use crate::fit::static_image::beam::blurred;
+use crate::beam::blurred;
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::operator::ImageGrid;
 use num_complex::Complex;
