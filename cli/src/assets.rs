@@ -57,7 +57,7 @@ pub fn load(
     let paths = RefCell::new(Vec::new());
     let read = |path: &Path| {
         paths.borrow_mut().push(path.to_owned());
-        outputs.iter().try_for_each(|output| output.spares(path))?;
+        outputs.iter().try_for_each(|output| output.must_differ_from(path))?;
         let bytes = output::read(path)?;
         let checksum = crc32fast::hash(&bytes);
         // Writing to a string never fails.

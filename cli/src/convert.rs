@@ -98,8 +98,11 @@ impl Convert {
     /// Converts.
     pub fn run(&self) -> anyhow::Result<Answer> {
         let output = ObservationFile::new(&self.output, self.format, self.comments)?;
-        output.spares(&self.input)?;
-        self.gains.iter().chain(&self.leakage).try_for_each(|table| output.spares(table))?;
+        output.must_differ_from(&self.input)?;
+        self.gains
+            .iter()
+            .chain(&self.leakage)
+            .try_for_each(|table| output.must_differ_from(table))?;
         self.check_numbers()?;
         let (_, mut observation) = interferometry::read(&self.input)?;
         self.complete(&mut observation)?;
@@ -194,7 +197,7 @@ impl Convert {
             );
         }
         let output = Output::or_pipe(&self.output, &["csv"])?;
-        output.spares(&self.input)?;
+        output.must_differ_from(&self.input)?;
         let comments =
             if self.comments { files::observation_comments(observation) } else { String::new() };
         output.write((comments + &files::light_curve_to_csv(&curve)).as_bytes())?;
@@ -289,7 +292,7 @@ fn agree(told: f64, given: f64) -> bool {
 /// An error, with the options that give what the data lack where that is the error.
 fn told(error: anyhow::Error) -> anyhow::Error {
     match error.downcast_ref() {
-        Some(Error::Unknown(_) | Error::File(FileError::Unknown(_))) => {
+        Some(Error::MissingMetadata(_) | Error::File(FileError::MissingMetadata(_))) => {
             anyhow!(
                 "{} with --source, --array, --mjd, --frequency or --bandwidth",
                 crate::plain::reasons(&error)

@@ -124,12 +124,12 @@ pub struct Interrupted(pub String);
 
 /// Work that looks whether there was a signal, of which there is one at a time. Without it, and at a second signal, the
 /// program ends at once.
-pub struct Keeper(&'static Requests);
+pub struct SignalGuard(&'static Requests);
 
 /// For how long the end waits for work that keeps nothing more.
 const MOMENT: Duration = Duration::from_millis(800);
 
-impl Keeper {
+impl SignalGuard {
     /// Work that saves its state when it stops, and says `words` to the first signal.
     pub fn saving(words: &'static str) -> Self {
         Self::of(Kept::Waits(words))
@@ -143,7 +143,7 @@ impl Keeper {
     fn of(kept: Kept) -> Self {
         let requests = here();
         requests.now().keeper = Some(kept);
-        Keeper(requests)
+        SignalGuard(requests)
     }
 
     /// Whether there was a signal.
@@ -152,7 +152,7 @@ impl Keeper {
     }
 }
 
-impl Drop for Keeper {
+impl Drop for SignalGuard {
     fn drop(&mut self) {
         self.0.now().keeper = None;
     }

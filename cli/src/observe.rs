@@ -113,11 +113,11 @@ impl Observe {
     pub fn run(&self) -> anyhow::Result<Answer> {
         let output = ObservationFile::new(&self.output, None, self.comments)?;
         let files = self.files()?;
-        files.iter().try_for_each(|file| output.spares(file))?;
+        files.iter().try_for_each(|file| output.must_differ_from(file))?;
         if let Some(FrameTimes::File(path)) = &self.frame_times {
-            output.spares(path)?;
+            output.must_differ_from(path)?;
         }
-        output.spares(self.array.as_ref())?;
+        output.must_differ_from(self.array.as_ref())?;
         let seed = self.seed()?;
         let array = arguments::array_of(&self.array)?;
         let (schedule, setup) = (self.observing.schedule()?, self.observing.setup()?);

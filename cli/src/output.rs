@@ -121,7 +121,7 @@ impl Output {
     }
 
     /// Refuses to take the place of a file that is read.
-    pub fn spares(&self, input: &Path) -> anyhow::Result<()> {
+    pub fn must_differ_from(&self, input: &Path) -> anyhow::Result<()> {
         match (self.path.canonicalize(), input.canonicalize()) {
             (Ok(output), Ok(input)) if output == input && !self.piped => {
                 bail!(

@@ -59,9 +59,9 @@ pub fn cases(count: u64) -> ProgressBar {
     styled(count, "{bar:30} {pos} of {len} done  {elapsed} gone, {eta} left  {msg}")
 }
 
-/// A bar that counts worlds, and says which search goes on.
-pub fn worlds(count: u64) -> ProgressBar {
-    styled(count, "{bar:30} world {pos} of at most {len}  {msg}  {elapsed} gone, {eta} left")
+/// A bar that counts trials, and says which search goes on.
+pub fn geometries(count: u64) -> ProgressBar {
+    styled(count, "{bar:30} trial {pos} of at most {len}  {msg}  {elapsed} gone, {eta} left")
 }
 
 /// A bar that counts draws from a posterior, and says what the present one does.

@@ -120,7 +120,7 @@ impl Trace {
         let place = |path| Output::or_pipe(path, &["csv", "npz"]);
         let output = self.output.as_deref().map(place).transpose()?;
         if let Some(output) = &output {
-            output.spares(&self.rays)?;
+            output.must_differ_from(&self.rays)?;
         }
         let name = self.rays.display().to_string();
         let table = Table::parse(&self.read()?).with_context(|| name.clone())?;

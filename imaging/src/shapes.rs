@@ -7,7 +7,7 @@ use crate::solve::minimum;
 use core::f64::consts::{LN_2, TAU};
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_tomo::fit::settings::LossKind;
-use kerrlight_tomo::fit::setup::Measured;
+use kerrlight_tomo::fit::setup::FitData;
 use kerrlight_vlbi::operator::ImageGrid;
 use rayon::prelude::*;
 
@@ -165,7 +165,7 @@ impl Shape {
 /// If a loss has no data.
 pub fn fit_shapes(
     file: &StaticImageFile,
-    measured: &Measured,
+    measured: &FitData,
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Option<Vec<ShapeFit>>, Error> {
     let grid = file.image.grid()?;

@@ -11,7 +11,7 @@ use crate::solve::{Solution, solve};
 use crate::start;
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_tomo::fit::linear::Prior;
-use kerrlight_tomo::fit::setup::{Held, Measured, best_held};
+use kerrlight_tomo::fit::setup::{FitData, Held, best_held};
 use kerrlight_tomo::fit::{FrameTerm, Weighted};
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::operator::ImageGrid;
@@ -129,7 +129,7 @@ impl Survey {
 /// If a loss has no data.
 pub fn survey(
     file: &StaticImageFile,
-    measured: &Measured,
+    measured: &FitData,
     shapes: &[ShapeFit],
     watch: &SurveyWatch<'_>,
 ) -> Result<Option<Survey>, Error> {
@@ -315,7 +315,7 @@ impl Search<'_> {
     }
 
     /// The loss of frames that were not fitted, for each strength; nothing where one is given.
-    fn hold_out(&self, start: usize, measured: &Measured) -> Option<Vec<Held>> {
+    fn hold_out(&self, start: usize, measured: &FitData) -> Option<Vec<Held>> {
         let Some(settings) = &self.file.strength else { return Some(Vec::new()) };
         let folds = settings.folds;
         let times = &measured.times;
@@ -339,7 +339,7 @@ impl Search<'_> {
     /// priors, each from one of the starts that are as good, with one of the strengths that are.
     fn draws(
         &self,
-        measured: &Measured,
+        measured: &FitData,
         (best, others): (&Candidate, &Others<'_>),
         frames: &[usize],
     ) -> Result<Option<Vec<Candidate>>, Error> {

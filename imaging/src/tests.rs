@@ -5,7 +5,7 @@ use crate::settings::{RingSettings, StartImage, StaticImageFile};
 use crate::*;
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_tomo::fit::settings::Variability;
-use kerrlight_tomo::fit::setup::Measured;
+use kerrlight_tomo::fit::setup::FitData;
 use kerrlight_vlbi::array;
 use kerrlight_vlbi::earth::{Frame, Ut1};
 use kerrlight_vlbi::noise::{GainErrors, ScatteringKernel, add_thermal_noise, apply_gains};
@@ -151,7 +151,7 @@ fn observed(seed: u64) -> Observation {
     seen
 }
 
-fn measured(file: &StaticImageFile, seed: u64) -> Measured {
+fn measured(file: &StaticImageFile, seed: u64) -> FitData {
     data::total_intensity(file, observed(seed), "data").unwrap()
 }
 
@@ -162,12 +162,16 @@ fn exact_scattering_and_variability_of_data() {
         let text = SETTINGS.replace("systematic = 0.01", &format!("systematic = 0.01\n{line}"));
         measured(&StaticImageFile::parse(&text).unwrap(), 1)
     };
-    let rows = |measured: &Measured| measured.visibilities.as_ref().unwrap().0.rows.clone();
+    let rows = |measured: &FitData| measured.visibilities.as_ref().unwrap().0.rows.clone();
     let plain = with("");
     let law = Variability { jy: 0.02, uv: 2e9, power: 1.25 };
     let varying = with("variability = { jy = 0.02, uv = 2e9, power = 1.25 }");
     let scattered = with("scattering = \"sgra\"");
-    assert!(varying.varies && !plain.varies && !scattered.varies);
+    assert!(
+        varying.has_intrinsic_variability
+            && !plain.has_intrinsic_variability
+            && !scattered.has_intrinsic_variability
+    );
     for ((a, b), c) in rows(&plain).iter().zip(rows(&varying)).zip(rows(&scattered)) {
         let expected = a.noise_sigma[0].hypot(law.sigma(a.uv[0].hypot(a.uv[1])));
         assert!((b.noise_sigma[0] - expected).abs() < 1e-15 && a.products[0] == b.products[0]);

@@ -305,7 +305,7 @@ class Fit:
         threads: int | None = None,
         memory: str | None = None,
     ) -> Posterior:
-        """How sure the fit is: draws volumes, and worlds where the world is not known, that the data leave possible,
+        """How sure the fit is: draws volumes, and geometries where the geometry is not known, that the data leave possible,
         as ``kerrlight posterior`` does.
 
         :param samples: number of draws, those of earlier calls included; each takes about as long as the fit.

@@ -20,7 +20,7 @@ __all__ = ["Posterior"]
 
 
 class Posterior:
-    """Draws around a finished fit, each a volume, and a world where that is not known.
+    """Draws around a finished fit, each a volume, and a geometry where that is not known.
 
     ``len(posterior)`` is their number, ``posterior[k]`` the volume of a draw.
     """
@@ -32,7 +32,7 @@ class Posterior:
         if not path.is_file():
             raise FileNotFoundError(f"{folder} holds no posterior: Fit.posterior(samples) draws one")
         self.summary: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        """All numbers of ``posterior.json``: ``world``, ``light_above_3_sigma`` and so on."""
+        """All numbers of ``posterior.json``: ``geometry``, ``light_above_3_sigma`` and so on."""
 
     def __len__(self) -> int:
         return int(self.summary["samples"])
@@ -60,23 +60,23 @@ class Posterior:
         return Volume(self.folder / "deviation.npz")
 
     @cached_property
-    def worlds(self) -> dict[str, Floats]:
-        """Each free parameter of the world in all draws; empty where the world is known."""
-        path = self.folder / "worlds.csv"
+    def geometries(self) -> dict[str, Floats]:
+        """Each free parameter of the geometry in all draws; empty where the geometry is known."""
+        path = self.folder / "geometries.csv"
         if not path.is_file():
             return {}
         table = np.genfromtxt(path, delimiter=",", names=True, comments="#", ndmin=1)
-        names = [name for name in table.dtype.names or () if name in self.summary["world"]]
+        names = [name for name in table.dtype.names or () if name in self.summary["geometry"]]
         return {name: np.ascontiguousarray(table[name]) for name in names}
 
     def interval(self, name: str, probability: float = 0.95) -> tuple[float, float]:
-        """The central interval of a parameter of the world that holds so much of the draws."""
+        """The central interval of a parameter of the geometry that holds so much of the draws."""
         if not 0 < probability < 1:
             raise ValueError(f"probability = {probability} is not allowed: between 0 and 1")
-        if name not in self.worlds:
-            known = ", ".join(self.worlds) or "none: the world is known"
-            raise ValueError(f"{name} is no free parameter of the world, which are {known}")
-        ends = np.quantile(self.worlds[name], [0.5 - 0.5 * probability, 0.5 + 0.5 * probability])
+        if name not in self.geometries:
+            known = ", ".join(self.geometries) or "none: the geometry is known"
+            raise ValueError(f"{name} is no free parameter of the geometry, which are {known}")
+        ends = np.quantile(self.geometries[name], [0.5 - 0.5 * probability, 0.5 + 0.5 * probability])
         return float(ends[0]), float(ends[1])
 
     def report(self) -> Report:

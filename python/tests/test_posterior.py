@@ -28,20 +28,20 @@ def test_draws(tmp_path):
     np.testing.assert_allclose(more.deviation.emission, draws.std(0, ddof=1), atol=1e-4 * draws.max())
     np.testing.assert_array_equal(few[-1].emission, more[1].emission)
     assert more.features[0].radius.value > 0 and more.features[0].light.error >= 0
-    assert more.worlds == {} and more.summary["samples"] == 3
+    assert more.geometries == {} and more.summary["samples"] == 3
     assert more.report().path.is_file() and "3 draws" in repr(more)
-    with pytest.raises(ValueError, match="the world is known"):
+    with pytest.raises(ValueError, match="the geometry is known"):
         more.interval("spin")
     with pytest.raises(IndexError):
         more[3]
 
 
-def test_worlds(tmp_path):
-    """What a posterior of a world holds, read back."""
-    (tmp_path / "posterior.json").write_text('{"samples": 4, "world": {"spin": {}, "inclination_deg": {}}}')
+def test_geometries(tmp_path):
+    """What a posterior of a geometry holds, read back."""
+    (tmp_path / "posterior.json").write_text('{"samples": 4, "geometry": {"spin": {}, "inclination_deg": {}}}')
     rows = ["spin,inclination_deg,chi2", *(f"{0.1 * k},{60 + k},1.0" for k in range(4))]
-    (tmp_path / "worlds.csv").write_text("\n".join(rows) + "\n")
-    worlds = Posterior(tmp_path).worlds
-    assert list(worlds) == ["spin", "inclination_deg"]
-    np.testing.assert_allclose(worlds["spin"], [0.0, 0.1, 0.2, 0.3])
+    (tmp_path / "geometries.csv").write_text("\n".join(rows) + "\n")
+    geometries = Posterior(tmp_path).geometries
+    assert list(geometries) == ["spin", "inclination_deg"]
+    np.testing.assert_allclose(geometries["spin"], [0.0, 0.1, 0.2, 0.3])
     assert Posterior(tmp_path).interval("inclination_deg", 0.5) == (60.75, 62.25)

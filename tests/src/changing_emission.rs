@@ -121,14 +121,14 @@ fn exact_held_out_frames_choose_the_price_of_a_network() {
     assert_eq!(results["held_out"]["chosen"].as_f64(), Some(0.003));
 }
 
-/// Draws around an unknown world in which emission changes: each has a world of its own.
+/// Draws around an unknown geometry in which emission changes: each has a geometry of its own.
 #[test]
 #[ignore = "long"]
-fn exact_worlds_are_drawn_where_emission_changes() {
+fn exact_geometries_are_drawn_where_emission_changes() {
     let folder = tempfile::tempdir().unwrap();
     let prior = "observer.inclination_deg={uniform=[40.0,80.0]}";
-    let search = "search={starts=1,coarse={worlds=20,nodes=12,iterations=30,pixels=20,frames=15},\
-        fine={worlds=20,nodes=14,iterations=40,pixels=20,frames=15}}";
+    let search = "search={starts=1,coarse={trials=20,nodes=12,iterations=30,pixels=20,frames=15},\
+        fine={trials=20,nodes=14,iterations=40,pixels=20,frames=15}}";
     let truth = "simulation.observer.inclination_deg=60.0";
     fit(folder.path(), &[prior, truth, search, "linear.iterations=15", "linear.rounds=1"]);
     let run = kerrlight(folder.path(), &["posterior", "run", "--samples", "3"]);
@@ -137,12 +137,12 @@ fn exact_worlds_are_drawn_where_emission_changes() {
         serde_json::from_slice(&std::fs::read(folder.path().join("run").join(name)).unwrap())
             .unwrap()
     };
-    let known = read("world.json");
+    let known = read("geometry.json");
     let sigma = known["sigma"]["inclination_deg"].as_f64().unwrap();
-    let best = known["world"]["inclination_deg"].as_f64().unwrap();
+    let best = known["geometry"]["inclination_deg"].as_f64().unwrap();
     let drawn: Vec<f64> = (1..=3)
         .map(|k| read(&format!("posterior/sample_000{k}.json")))
-        .map(|draw| draw["world"]["inclination_deg"].as_f64().unwrap())
+        .map(|draw| draw["geometry"]["inclination_deg"].as_f64().unwrap())
         .collect();
     assert!(drawn.iter().all(|x| (x - best).abs() < 5.0 * sigma), "{drawn:?} {best} {sigma}");
     assert!(drawn.windows(2).all(|pair| pair[0] != pair[1]), "{drawn:?}");

@@ -8,7 +8,7 @@ use kerrlight_render::scene::Scene;
 use kerrlight_render::transport::Assets;
 
 /// A disc that absorbing gas surrounds, and a spot, with light of all images.
-const WORLD: &str = r#"
+const GEOMETRY: &str = r#"
     hole = { spin = 0.7, mass_msun = 6.5e9, distance_kpc = 16800.0 }
     observer = { inclination_deg = 65.0 }
     screen = { field_of_view_m = 30.0, width = 40, channels = ["default"] }
@@ -89,7 +89,7 @@ fn exact_alpha_is_what_is_missing_of_a_white_sky() {
         &["effects.half_orbits=1"],
         &["screen.rings=\"regular-grid\"", "tracer.integrator=\"taylor-mino\""],
     ] {
-        let base = scene(WORLD, &["sky.image={path=\"-\",brightness=1.0}"]);
+        let base = scene(GEOMETRY, &["sky.image={path=\"-\",brightness=1.0}"]);
         let scene = asking(&base.to_toml(), r#""A","coverage","sky""#, more);
         let seen = picture(&scene, Some(sky(|_, _| [1.0; 3])));
         let (alpha, sky) = (seen.channel("A").unwrap(), color(&seen, "sky")[1]);
@@ -123,7 +123,8 @@ fn exact_alpha_has_the_area_of_the_shadow() {
 /// Images add up to the emission, and emission and sky to the whole.
 #[test]
 fn exact_layers_add_up() {
-    let base = scene(WORLD, &["sky.image={path=\"-\",brightness=1e-4}", "effects.absorption=true"]);
+    let base =
+        scene(GEOMETRY, &["sky.image={path=\"-\",brightness=1e-4}", "effects.absorption=true"]);
     let scene = asking(&base.to_toml(), r#""default","emission","sky","n0","n1","n2""#, &[]);
     let seen = picture(&scene, Some(sky(|u, v| [u, v, 1.0])));
     for c in 0..3 {
@@ -151,11 +152,11 @@ fn code_images_are_those_of_half_orbits() {
         &[grid, "effects.absorption=true"],
         &[grid, "tracer.integrator=\"dop853-mino\""],
     ] {
-        let whole = picture(&asking(WORLD, r#""n0","n1","n2""#, more), None);
+        let whole = picture(&asking(GEOMETRY, r#""n0","n1","n2""#, more), None);
         for orders in 0..2 {
             let most = format!("effects.half_orbits={orders}");
             let cut: Vec<&str> = more.iter().copied().chain([most.as_str()]).collect();
-            let cut = picture(&asking(WORLD, r#""default""#, &cut), None);
+            let cut = picture(&asking(GEOMETRY, r#""default""#, &cut), None);
             for c in 0..3 {
                 let images: Vec<_> =
                     (0..=orders).map(|n| color(&whole, &format!("n{n}"))[c]).collect();
@@ -324,14 +325,14 @@ fn exact_motion_between_two_pictures() {
 #[test]
 fn exact_identifiers_and_refusals() {
     let raster = |scene: &Scene| kerrlight_render::picture::Raster::new(scene, None);
-    let scene = asking(WORLD, r#""id""#, &[]);
+    let scene = asking(GEOMETRY, r#""id""#, &[]);
     let names = raster(&scene).unwrap().identifiers().unwrap();
     assert_eq!(names, "0 sky\n1 hole\n2 disc\n3 gas\n4 spot.0\n");
     let seen = picture(&scene, None);
     let id = seen.channel("id").unwrap();
     assert!((2..=4).all(|source| id.contains(&(source as f32))), "{id:?}");
     let fail = |channels: &str, more: &[&str]| {
-        raster(&asking(WORLD, channels, more)).unwrap_err().to_string()
+        raster(&asking(GEOMETRY, channels, more)).unwrap_err().to_string()
     };
     assert!(fail(r#""sky""#, &[]).contains("no channel `sky`"));
     let said = fail(r#""A""#, &["screen.image_error=1e-2"]);

@@ -57,7 +57,7 @@ mod static_sky;
 mod station_gains;
 mod support;
 mod system_limits;
-mod unknown_world;
+mod unknown_geometry;
 mod verdict;
 mod view;
 mod view_input;

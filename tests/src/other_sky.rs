@@ -1,10 +1,10 @@
-//! Worlds whose movies another forward model has made: its own rays, pixels that are means over many of them, emission and
+//! Geometries whose movies another forward model has made: its own rays, pixels that are means over many of them, emission and
 //! motion in closed form.
 
 use crate::support::{root, succeed};
 use kerrlight_render::dynamics::Velocity;
 use kerrlight_tomo::fit::settings::{FitFile, PriorSettings};
-use kerrlight_tomo::fit::setup::{Drawn, Instrument, Measured};
+use kerrlight_tomo::fit::setup::{Drawn, FitData, Instrument};
 use kerrlight_validation::sky::{Arc, Screen, Sky, add_noise, shining};
 use kerrlight_vlbi::array::built_in;
 use kerrlight_vlbi::files::images::movie_archive;
@@ -59,15 +59,20 @@ fn film(path: &Path, (sky, arcs): &(Sky, Vec<Arc>), noise: f64) -> f64 {
 }
 
 /// What a search finds in a movie of the sky.
-fn found(folder: &Path, sky: &(Sky, Vec<Arc>), noise: f64, [starts, worlds]: [usize; 2]) -> Value {
+fn found(
+    folder: &Path,
+    sky: &(Sky, Vec<Arc>),
+    noise: f64,
+    [starts, geometries]: [usize; 2],
+) -> Value {
     let sigma = film(&folder.join("film.npz"), sky, noise);
     succeed(folder, &["fit", "--init", "film.npz", "-o", "fit.toml"]);
-    let view = |worlds: usize, nodes: usize, iterations: usize, pixels: usize| {
+    let view = |geometries: usize, nodes: usize, iterations: usize, pixels: usize| {
         format!(
-            "{{worlds={worlds},nodes={nodes},iterations={iterations},pixels={pixels},frames=20}}"
+            "{{trials={geometries},nodes={nodes},iterations={iterations},pixels={pixels},frames=20}}"
         )
     };
-    let (coarse, fine) = (view(worlds, 16, 30, 16), view(48, 24, 60, 32));
+    let (coarse, fine) = (view(geometries, 16, 30, 16), view(48, 24, 60, 32));
     let angle = sky.0.position_angle_deg;
     let sets = [
         "hole.spin={uniform=[-0.95,0.95]}".to_owned(),
@@ -91,7 +96,7 @@ fn found(folder: &Path, sky: &(Sky, Vec<Arc>), noise: f64, [starts, worlds]: [us
     let mut words = vec!["fit", "fit.toml", "-o", "run"];
     sets.iter().for_each(|set| words.extend(["--set", set]));
     succeed(folder, &words);
-    let text = std::fs::read(folder.join("run/world.json")).expect("a world");
+    let text = std::fs::read(folder.join("run/geometry.json")).expect("a geometry");
     serde_json::from_slice(&text).expect("JSON")
 }
 
@@ -122,9 +127,9 @@ fn exact_a_distant_spot_is_where_its_orbit_is() {
     assert!((turned[0] + upright[1]).abs() < 0.05 && (turned[1] - upright[0]).abs() < 0.05);
 }
 
-/// A world that is drawn for calibration looks as the fit's own rays see it, with its view, azimuth and time.
+/// A geometry that is drawn for calibration looks as the fit's own rays see it, with its view, azimuth and time.
 #[test]
-fn code_drawn_worlds_look_alike_through_both_forward_models() {
+fn code_drawn_geometries_look_alike_through_both_forward_models() {
     let text = std::fs::read_to_string(root().join("cli/src/fit/built_in.toml")).expect("a file");
     let mut file: FitFile = kerrlight_common::toml_file::read(&text).expect("settings");
     let simulation = file.simulation.as_mut().expect("a simulation");
@@ -151,8 +156,8 @@ fn code_drawn_worlds_look_alike_through_both_forward_models() {
         Ok(sky.movie(screen, drawn.times, at)?)
     };
     let array = built_in("ngEHT");
-    let own = Measured::simulated(&file, &instrument, array.as_ref()).expect("own");
-    let by = Measured::simulated_by(&other, &file, &instrument, array.as_ref()).expect("other");
+    let own = FitData::simulated(&file, &instrument, array.as_ref()).expect("own");
+    let by = FitData::simulated_by(&other, &file, &instrument, array.as_ref()).expect("other");
     let movies = [own, by].map(|measured| measured.movie.expect("images"));
     // Pixels are single rays of the fit and means over 16 of the other model: what they have in common are flux and place.
     let moments = |image: &[f64]| {
@@ -175,7 +180,7 @@ fn code_drawn_worlds_look_alike_through_both_forward_models() {
 /// is wrong by 300 of them. A search of a single start that gives up early has to know as well.
 #[test]
 #[ignore = "long"]
-fn exact_intervals_hold_the_worlds_of_another_forward_model() {
+fn exact_intervals_hold_the_geometries_of_another_forward_model() {
     for (starts, (sky, noise)) in [
         ([2, 250], (filaments(), 0.01)),
         ([2, 250], (spots_and_arc(), 0.02)),
@@ -183,20 +188,21 @@ fn exact_intervals_hold_the_worlds_of_another_forward_model() {
         ([1, 100], (spots_and_arc(), 0.02)),
     ] {
         let folder = tempfile::tempdir().expect("a folder");
-        let world = found(folder.path(), &sky, noise, starts);
+        let geometry = found(folder.path(), &sky, noise, starts);
         for (name, truth, most) in [
             ("spin", sky.0.spin, 0.4),
             ("inclination_deg", sky.0.inclination_deg, 3.0),
             ("position_angle_deg", sky.0.position_angle_deg, 3.0),
         ] {
-            let [found, sigma] = ["world", "sigma"].map(|of| world[of][name].as_f64().unwrap());
-            let own = |source: &str| world["model_error"][source][name].as_f64().unwrap();
+            let [found, sigma] =
+                ["geometry", "sigma"].map(|of| geometry[of][name].as_f64().unwrap());
+            let own = |source: &str| geometry["model_error"][source][name].as_f64().unwrap();
             let own = ["voxels", "pixels", "sums along rays"].map(own);
             println!("{name} = {found:.4} ± {sigma:.4}, {truth}: {own:?}");
-            let is_open = world["open"][name] == true;
+            let is_open = geometry["open"][name] == true;
             let holds = (found - truth).abs() < 3.0 * sigma && sigma < most;
-            assert!(is_open || holds, "{world}");
-            assert!(own.iter().all(|own| *own <= sigma * (1.0 + 1e-9)) || is_open, "{world}");
+            assert!(is_open || holds, "{geometry}");
+            assert!(own.iter().all(|own| *own <= sigma * (1.0 + 1e-9)) || is_open, "{geometry}");
         }
     }
 }

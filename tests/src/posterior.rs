@@ -1,7 +1,7 @@
 //! Draws around a finished fit.
 
 use crate::support::{binary, kerrlight, root};
-use crate::unknown_world::{NEAR, of_unknown_view};
+use crate::unknown_geometry::{NEAR, of_unknown_view};
 use serde_json::Value;
 use std::path::Path;
 
@@ -39,7 +39,7 @@ fn exact_draws_of_voxels_resume_to_the_same_bytes() {
     run(folder.path(), &["posterior", "run", "--samples", "4"]);
     let of = |name: &str| std::fs::read(folder.path().join("run/posterior").join(name)).unwrap();
     let numbers = read(&folder.path().join("run/posterior/posterior.json"));
-    assert_eq!((&numbers["samples"], &numbers["world"]), (&4.into(), &serde_json::json!({})));
+    assert_eq!((&numbers["samples"], &numbers["geometry"]), (&4.into(), &serde_json::json!({})));
     let feature = &numbers["features"][0];
     let [radius, azimuth] = ["radius", "azimuth_deg"].map(|key| feature[key][0].as_f64().unwrap());
     assert!((radius - 5.5).abs() < 0.5 && azimuth.abs() < 5.0, "{feature}");
@@ -238,9 +238,9 @@ fn exact_priors_that_mean_nothing_are_refused() {
 
 #[test]
 #[ignore = "long"]
-fn exact_draws_of_an_unknown_world_have_worlds() {
+fn exact_draws_of_an_unknown_geometry_have_geometries() {
     let folder = tempfile::tempdir().unwrap();
-    let view = "{ worlds = 60, nodes = 16, iterations = 40, pixels = 20, frames = 12 }";
+    let view = "{ trials = 60, nodes = 16, iterations = 40, pixels = 20, frames = 12 }";
     let search = format!("starts = 1\ncoarse = {view}\nfine = {view}\n");
     let text = of_unknown_view(&settings(), NEAR, &search);
     std::fs::write(folder.path().join("fit.toml"), text).unwrap();
@@ -251,10 +251,10 @@ fn exact_draws_of_an_unknown_world_have_worlds() {
         &[&["fit", "fit.toml", "-o", "run", "--samples", "3"][..], &kind[..]].concat(),
     );
     assert!(told.contains("inclination_deg = "), "{told}");
-    let world = read(&folder.path().join("run/world.json"));
-    assert!(world["sigma"]["inclination_deg"].as_f64().unwrap() > 0.0, "{world}");
+    let geometry = read(&folder.path().join("run/geometry.json"));
+    assert!(geometry["sigma"]["inclination_deg"].as_f64().unwrap() > 0.0, "{geometry}");
     let numbers = read(&folder.path().join("run/posterior/posterior.json"));
-    let inclination = &numbers["world"]["inclination_deg"];
+    let inclination = &numbers["geometry"]["inclination_deg"];
     assert!((inclination["mean"].as_f64().unwrap() - 60.0).abs() < 3.0, "{inclination}");
     assert_eq!(inclination["quantiles"].as_array().map(Vec::len), Some(5));
     let rank = inclination["rank"].as_f64().unwrap();
@@ -262,7 +262,8 @@ fn exact_draws_of_an_unknown_world_have_worlds() {
     let inside = |part: &str| numbers[format!("inclination_drawn_within_{part}")].as_f64();
     assert_eq!(inside("68"), Some(f64::from(u8::from((rank - 0.5).abs() <= 0.34))));
     assert_eq!(inside("95"), Some(f64::from(u8::from((rank - 0.5).abs() <= 0.475))));
-    let table = std::fs::read_to_string(folder.path().join("run/posterior/worlds.csv")).unwrap();
+    let table =
+        std::fs::read_to_string(folder.path().join("run/posterior/geometries.csv")).unwrap();
     assert!(table.starts_with("inclination_deg,position_angle_deg\n"), "{table}");
     assert_eq!(table.lines().count(), 4);
     let triangle =

@@ -29,21 +29,21 @@ fn on_public_data(name: &str) -> Option<Vec<String>> {
 }
 
 /// Experiments of what the gate looks at: holes, flows and matter that are not known.
-const WORLDS: [&str; 3] = ["world", "soft-flow", "calibration"];
+const GEOMETRIES: [&str; 3] = ["geometry", "soft-flow", "calibration"];
 
 #[test]
 #[ignore = "long"]
-fn exact_quick_variants_of_worlds_run() {
+fn exact_quick_variants_of_geometries_run() {
     let all = experiments();
-    assert!(WORLDS.iter().all(|name| all.iter().any(|known| known == name)), "{all:?}");
-    quick_looks(WORLDS.map(str::to_owned).to_vec());
+    assert!(GEOMETRIES.iter().all(|name| all.iter().any(|known| known == name)), "{all:?}");
+    quick_looks(GEOMETRIES.map(str::to_owned).to_vec());
 }
 
 #[test]
 #[ignore = "long"]
 fn exact_quick_variants_of_all_other_experiments_run() {
     let mut names = experiments();
-    names.retain(|name| !WORLDS.contains(&name.as_str()));
+    names.retain(|name| !GEOMETRIES.contains(&name.as_str()));
     assert!(names.len() >= 9, "{names:?}");
     quick_looks(names);
 }

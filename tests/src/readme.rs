@@ -63,9 +63,9 @@ fn fresh(to: &Path) {
 /// What is added to a command so that it takes seconds, not minutes; whatever it is, it is printed.
 fn shorter(line: &str) -> &'static str {
     let is_whole = line.contains("--resume") || line.contains("--init");
-    if line.contains("unknown_world.toml") {
-        return " --set training.steps=5 --set search.starts=1 --set search.coarse.worlds=40 \
-                --set 'search.fine={worlds=20,nodes=16,iterations=30,pixels=20,frames=12}'";
+    if line.contains("unknown_geometry.toml") {
+        return " --set training.steps=5 --set search.starts=1 --set search.coarse.trials=40 \
+                --set 'search.fine={trials=20,nodes=16,iterations=30,pixels=20,frames=12}'";
     }
     if line.contains(" fit") && line.contains("linear") {
         return " --set training.steps=5 --set output.nodes=24 --set screen.pixels=12 --set linear.iterations=10";

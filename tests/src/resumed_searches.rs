@@ -1,7 +1,7 @@
 //! Searches for what a fit does not know: killed, they resume where they were, to the same bytes.
 
 use crate::support::{binary, kerrlight, root, succeed};
-use crate::unknown_world::{NEAR, of_unknown_view};
+use crate::unknown_geometry::{NEAR, of_unknown_view};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -49,14 +49,14 @@ fn resumes_to_the_same_bytes(at: &Path, words: &[&str], results: usize, names: &
 }
 
 #[test]
-fn exact_a_killed_search_for_a_world_resumes_to_the_same_bytes() {
+fn exact_a_killed_search_for_a_geometry_resumes_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let view = "{ worlds = 30, nodes = 12, iterations = 20, pixels = 12, frames = 8 }";
+    let view = "{ trials = 30, nodes = 12, iterations = 20, pixels = 12, frames = 8 }";
     let search = format!("starts = 2\ncoarse = {view}\nfine = {view}\n");
     let text = of_unknown_view(&crate::posterior::settings(), NEAR, &search);
     std::fs::write(at.join("fit.toml"), text).unwrap();
-    resumes_to_the_same_bytes(at, &VOXELS, 45, &["world.json", "volume.npz"]);
+    resumes_to_the_same_bytes(at, &VOXELS, 45, &["geometry.json", "volume.npz"]);
 }
 
 #[test]

@@ -56,7 +56,7 @@ fn regress_a_fit_with_right_settings_explains_its_data() {
     assert!((found["data"][0]["expected"]["mean"].as_f64().unwrap() - 1.0).abs() < 1e-12);
 }
 
-/// A world that is seen from another side than the fit assumes, one with more spin, and one that turns the other way.
+/// A geometry that is seen from another side than the fit assumes, one with more spin, and one that turns the other way.
 #[test]
 fn regress_a_fit_with_wrong_settings_says_so() {
     let folder = tempfile::tempdir().unwrap();

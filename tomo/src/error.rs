@@ -47,7 +47,7 @@ pub enum Error {
     Failed(String),
     /// A fit that was told to stop.
     Stopped(#[from] Stopped),
-    /// What happened in a part of a fit, such as `world.search`.
+    /// What happened in a part of a fit, such as `geometry.search`.
     #[error("{part}: {error}")]
     In {
         /// The part.

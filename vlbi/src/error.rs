@@ -4,7 +4,7 @@ use crate::array::ArrayError;
 use crate::data_terms::DataTermError;
 use crate::earth::EarthError;
 use crate::files::FileError;
-use crate::observation::Unknown;
+use crate::observation::MissingMetadata;
 use crate::polarimetry::NoFeeds;
 use crate::schedule::ScheduleError;
 use kerrlight_common::numpy::NumpyError;
@@ -24,7 +24,7 @@ pub enum Error {
     /// A file of visibilities or images.
     File(#[from] FileError),
     /// Metadata that the data lack.
-    Unknown(#[from] Unknown),
+    MissingMetadata(#[from] MissingMetadata),
     /// Products that are not of feeds.
     Feeds(#[from] NoFeeds),
     /// Data that make no χ².

@@ -2,7 +2,7 @@
 
 use super::Accuracy;
 use crate::answer::Answer;
-use crate::interrupt::{Interrupted, Keeper};
+use crate::interrupt::{Interrupted, SignalGuard};
 use crate::progress;
 use anyhow::anyhow;
 use kerrlight_validation::accuracy::hard::{self, Tally};
@@ -73,7 +73,7 @@ pub fn run(arguments: &Accuracy, rays: u64) -> anyhow::Result<Answer> {
     let csv = arguments.place("hard.csv", "csv")?;
     let json = arguments.place("hard.json", "json")?;
     let (integrator, tolerance) = (arguments.integrator, arguments.tolerance);
-    let (bar, keeper) = (progress::bar(rays), Keeper::saving("stopping"));
+    let (bar, keeper) = (progress::bar(rays), SignalGuard::saving("stopping"));
     let tallies = hard::run(integrator, tolerance, rays, arguments.seed, |done| {
         bar.inc(done);
         !keeper.stopped()

@@ -126,13 +126,13 @@ pub struct TableAsked {
     pub best_of: Option<String>,
     /// Rows of numbers from elsewhere.
     #[serde(default)]
-    pub beside: Vec<Beside>,
+    pub beside: Vec<Companion>,
 }
 
 /// A row of numbers from elsewhere, to hold the others against.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Beside {
+pub struct Companion {
     /// What they are, and whose.
     pub name: String,
     /// One for each combination of the columns' levels, the last factor fastest; NaN where there is none.
@@ -191,7 +191,7 @@ pub enum FigureKind {
     /// Angular velocities: what was simulated and what was assumed.
     Velocities,
     /// What light curves say of inclination, position angle, radius and period, a curve for each case of the first seed.
-    Worlds,
+    Geometries,
     /// Loops in Q and U of data and model, a plot for each case of the first seed.
     Loops,
 }

@@ -21,7 +21,7 @@ mod tables;
 mod verdicts;
 
 use crate::answer::Answer;
-use crate::interrupt::{Interrupted, Keeper};
+use crate::interrupt::{Interrupted, SignalGuard};
 use crate::lock::Lock;
 use crate::plain;
 use crate::program::Program;
@@ -275,7 +275,7 @@ fn with_known(chosen: Vec<Case>, all: Vec<Case>, runner: &Runner<'_>) -> Vec<Cas
 
 /// Runs what is not done yet, until a signal; why which of them failed.
 fn run(cases: &[Case], runner: &Runner<'_>) -> HashMap<String, String> {
-    let keeper = Keeper::saving("stopping after the fit's step; a second signal ends at once");
+    let keeper = SignalGuard::saving("stopping after the fit's step; a second signal ends at once");
     let is_to_do = |case: &&Case| !matches!(runner.known(case), Status::Done(_));
     let is_wrong = |case: &&Case| case.early_error().is_some();
     let (wrong, open): (Vec<&Case>, Vec<&Case>) =

@@ -4,7 +4,7 @@ use super::cases::{Case, Status};
 use super::runner::Runner;
 use super::{Failed, runner};
 use crate::answer::Answer;
-use crate::interrupt::{Interrupted, Keeper};
+use crate::interrupt::{Interrupted, SignalGuard};
 use crate::lock::Lock;
 use crate::output::{self, Output};
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ pub fn run(case: &Case, runner: &Runner<'_>, folder: &Path) -> anyhow::Result<An
     let Some(lock) = Lock::of_file(&lock_of(folder, case))? else {
         return Err(Busy(case.slug()).into());
     };
-    let keeper = Keeper::saving("stopping after the fit's step; a second signal ends at once");
+    let keeper = SignalGuard::saving("stopping after the fit's step; a second signal ends at once");
     let failure = failure_of(folder, case);
     match runner.run(case, &keeper) {
         Status::Done(results) => {

@@ -5,7 +5,7 @@ use super::labels::RESULTS;
 use crate::checksum::is_whole;
 use crate::file_sums::FileSums;
 use crate::fit::{Inputs, from_folder, posterior};
-use crate::interrupt::Keeper;
+use crate::interrupt::SignalGuard;
 use crate::lock::Lock;
 use crate::output::{self, Output};
 use crate::program::Program;
@@ -99,7 +99,7 @@ impl<'a> Runner<'a> {
     }
 
     /// Runs a case to its end, from where it is; `Open` if a signal has stopped it.
-    pub fn run(&self, case: &Case, keeper: &Keeper) -> Status {
+    pub fn run(&self, case: &Case, keeper: &SignalGuard) -> Status {
         let run = &self.run_of(case);
         match self.known(case) {
             Status::Open => {}
@@ -126,7 +126,7 @@ impl<'a> Runner<'a> {
         &self,
         case: &Case,
         run: &Path,
-        keeper: &Keeper,
+        keeper: &SignalGuard,
     ) -> anyhow::Result<(ExitStatus, String)> {
         // Paths in it start from the root.
         let settings = self.folder.join(format!("{}.toml", case.slug()));
@@ -167,7 +167,7 @@ impl<'a> Runner<'a> {
 
 /// The end of a fit, whose input is held open until a signal comes: it is closed then, or by the system if this
 /// process is killed, and the fit stops.
-fn wait(mut child: Child, keeper: &Keeper) -> anyhow::Result<ExitStatus> {
+fn wait(mut child: Child, keeper: &SignalGuard) -> anyhow::Result<ExitStatus> {
     let mut input = child.stdin.take();
     loop {
         if let Some(status) = child.try_wait().context("cannot wait for the fit")? {

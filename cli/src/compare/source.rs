@@ -35,7 +35,7 @@ const CARRIED: &[(&str, &str)] = &carried![
     "experiments/effects.toml",
     "experiments/cost.toml",
     "experiments/spin-mismatch.toml",
-    "experiments/world.toml",
+    "experiments/geometry.toml",
     "experiments/calibration.toml",
     "experiments/coverage-of-volumes.toml",
     "experiments/soft-flow.toml",

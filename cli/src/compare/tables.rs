@@ -1,7 +1,7 @@
 //! Tables of means over seeds.
 
 use super::cases::{Case, Status};
-use super::experiment::{Beside, Experiment, Level, TableAsked};
+use super::experiment::{Companion, Experiment, Level, TableAsked};
 use super::labels::{called, combinations, described, number, pairs};
 use super::results::Results;
 use super::summary::{Spread, Summary};
@@ -117,7 +117,7 @@ const NONE: &str = "–";
 fn beside(
     experiment: &Experiment,
     asked: &TableAsked,
-    row: &Beside,
+    row: &Companion,
     columns: &[Vec<(&str, &str)>],
     digits: usize,
 ) -> Vec<String> {

@@ -7,7 +7,7 @@ use crate::changed::Changed;
 use anyhow::Context;
 use kerrlight_render::scene::apply_override;
 use kerrlight_tomo::fit::settings::FitFile;
-use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
+use kerrlight_tomo::fit::setup::{self, FitData, Instrument};
 use kerrlight_tomo::representation::Registry;
 use std::path::Path;
 
@@ -51,7 +51,7 @@ pub fn turned(text: &str, later: f64) -> anyhow::Result<[impl Fn(f64) -> f64; 2]
 
 /// (u, v) of the data, wavelengths; none without visibilities.
 pub fn coverage(text: &str, base_dir: &Path) -> anyhow::Result<Vec<[f64; 2]>> {
-    let Measured { visibilities, .. } = match Work::read(text)? {
+    let FitData { visibilities, .. } = match Work::read(text)? {
         Work::Emission(file) => data::measure(&file, &Instrument::new(&file)?, base_dir)?,
         Work::Image(file) => data::of_static(&file, base_dir)?.0,
     };

@@ -1,4 +1,4 @@
-//! Plots of a fit to a light curve: what the data say of the world, and the loop in Q and U.
+//! Plots of a fit to a light curve: what the data say of the geometry, and the loop in Q and U.
 
 use crate::report::{Axis, LinePlot, Marks, Series};
 use serde_json::Value;
@@ -13,7 +13,7 @@ const QUANTITIES: [(&str, &str, &str); 4] = [
 /// Curves of a plot, at most.
 const CURVES: usize = 6;
 
-/// The probability of each value of the world, one curve for each run that is named.
+/// The probability of each value of the geometry, one curve for each run that is named.
 pub fn of_runs(runs: &[(String, Value)], caption: &str) -> Vec<LinePlot> {
     let plot = |(key, words, unit): (&str, &str, &str)| {
         let curve = |(name, results): &(String, Value)| {

@@ -1,4 +1,4 @@
-//! Worlds that are weighed by the light curve of a flare in an orbital band, before the emission is fitted.
+//! Geometries that are weighed by the light curve of a flare in an orbital band, before the emission is fitted.
 
 use super::folder::Folder;
 use crate::checksum::sealed;
@@ -6,7 +6,7 @@ use crate::output;
 use anyhow::Context;
 use kerrlight_tomo::fit::band::Interval;
 use kerrlight_tomo::fit::settings::FitFile;
-use kerrlight_tomo::fit::setup::{BandScan, BandWorld};
+use kerrlight_tomo::fit::setup::{BandGeometry, BandScan};
 use kerrlight_tomo::recovery::{Choice, Problem};
 use serde_json::{Value, json};
 
@@ -16,12 +16,12 @@ pub const FILE: &str = "band.json";
 /// Bins of periods.
 const BINS: usize = 24;
 
-/// Keeps the worlds that were weighed.
+/// Keeps the geometries that were weighed.
 pub fn write(folder: &Folder, problem: &Problem, scan: &BandScan) -> anyhow::Result<()> {
     folder.file(FILE)?.write(sealed(results(scan, &problem.settings)?).as_bytes())
 }
 
-/// The world that a run has found, which is told; none if it has not looked.
+/// The geometry that a run has found, which is told; none if it has not looked.
 pub fn chosen(folder: &Folder) -> anyhow::Result<Option<Choice>> {
     let path = folder.path().join(FILE);
     let damaged = || format!("{} is damaged: remove it to look again", path.display());
@@ -41,14 +41,15 @@ pub fn chosen(folder: &Folder) -> anyhow::Result<Option<Choice>> {
 }
 
 /// Shares of the probability of values, in their order.
-fn shares(worlds: &[BandWorld], of: fn(&BandWorld) -> f64) -> Vec<[f64; 2]> {
-    let most = worlds.iter().map(|world| world.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
+fn shares(geometries: &[BandGeometry], of: fn(&BandGeometry) -> f64) -> Vec<[f64; 2]> {
+    let most =
+        geometries.iter().map(|geometry| geometry.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
     let mut all: Vec<[f64; 2]> = Vec::new();
-    for world in worlds {
-        let share = (world.ln_posterior - most).exp();
-        match all.iter_mut().find(|[value, _]| *value == of(world)) {
+    for geometry in geometries {
+        let share = (geometry.ln_posterior - most).exp();
+        match all.iter_mut().find(|[value, _]| *value == of(geometry)) {
             Some([_, sum]) => *sum += share,
-            None => all.push([of(world), share]),
+            None => all.push([of(geometry), share]),
         }
     }
     normalised(all)
@@ -61,25 +62,25 @@ fn normalised(mut all: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     all
 }
 
-/// How probable each radius is in each world, up to a factor.
+/// How probable each radius is in each geometry, up to a factor.
 fn orbits(scan: &BandScan) -> Vec<Vec<f64>> {
-    let all = scan.worlds.iter().flat_map(|world| world.by_radius.iter().copied());
+    let all = scan.geometries.iter().flat_map(|geometry| geometry.by_radius.iter().copied());
     let most = all.fold(f64::NEG_INFINITY, f64::max);
-    let of = |world: &BandWorld| {
-        let prior = world.inclination_deg.to_radians().sin().max(1e-6);
-        world.by_radius.iter().map(|ln| (ln - most).exp() * prior).collect()
+    let of = |geometry: &BandGeometry| {
+        let prior = geometry.inclination_deg.to_radians().sin().max(1e-6);
+        geometry.by_radius.iter().map(|ln| (ln - most).exp() * prior).collect()
     };
-    scan.worlds.iter().map(of).collect()
+    scan.geometries.iter().map(of).collect()
 }
 
-/// Shares of the radii of all worlds.
+/// Shares of the radii of all geometries.
 fn radii(scan: &BandScan) -> Vec<[f64; 2]> {
     let orbits = orbits(scan);
-    let share = |k: usize| orbits.iter().map(|of_world| of_world[k]).sum::<f64>();
+    let share = |k: usize| orbits.iter().map(|of_geometry| of_geometry[k]).sum::<f64>();
     normalised(scan.radii.iter().enumerate().map(|(k, radius)| [*radius, share(k)]).collect())
 }
 
-/// Shares of the periods of the orbits of all worlds, minutes; where matter stands still there is none.
+/// Shares of the periods of the orbits of all geometries, minutes; where matter stands still there is none.
 fn periods(scan: &BandScan) -> Vec<[f64; 2]> {
     let shares = orbits(scan).into_iter().flatten();
     let all = scan.periods_min.iter().flatten().copied().zip(shares);
@@ -103,14 +104,15 @@ fn binned(shares: &[[f64; 2]], bins: usize) -> Vec<[f64; 2]> {
 /// The probability that matter turns clockwise on the sky: the axis is that of the hole, right-handed about
 /// `motion.axis`.
 fn clockwise(scan: &BandScan, axis_z: f64) -> f64 {
-    let towards =
-        |world: &BandWorld| world.rotation_factor * world.inclination_deg.to_radians().cos();
+    let towards = |geometry: &BandGeometry| {
+        geometry.rotation_factor * geometry.inclination_deg.to_radians().cos()
+    };
     // Seen edge-on there is no sense; standing matter has none.
     let share = |towards: f64| match towards * axis_z {
         x if x.abs() < 1e-9 => 0.5,
         x => f64::from(u8::from(x < 0.0)),
     };
-    shares(&scan.worlds, towards).iter().map(|[of, probability]| share(*of) * probability).sum()
+    shares(&scan.geometries, towards).iter().map(|[of, probability]| share(*of) * probability).sum()
 }
 
 /// The value below which a part of the probability lies, each share spread evenly half way to its neighbours.
@@ -144,12 +146,12 @@ fn azimuth(Interval { median, low, high }: Interval) -> Value {
 }
 
 fn results(scan: &BandScan, file: &FitFile) -> anyhow::Result<Value> {
-    let best = &scan.worlds[scan.best];
-    let inclinations = shares(&scan.worlds, |world| world.inclination_deg);
-    let probabilities = |of: fn(&BandWorld) -> f64, best: f64| json!({"best": best, "probabilities": shares(&scan.worlds, of)});
-    let row = |world: &BandWorld| {
-        let BandWorld { inclination_deg, rotation_factor, position_angle_deg, .. } = world;
-        let ln = world.ln_posterior - best.ln_posterior;
+    let best = &scan.geometries[scan.best];
+    let inclinations = shares(&scan.geometries, |geometry| geometry.inclination_deg);
+    let probabilities = |of: fn(&BandGeometry) -> f64, best: f64| json!({"best": best, "probabilities": shares(&scan.geometries, of)});
+    let row = |geometry: &BandGeometry| {
+        let BandGeometry { inclination_deg, rotation_factor, position_angle_deg, .. } = geometry;
+        let ln = geometry.ln_posterior - best.ln_posterior;
         json!([inclination_deg, rotation_factor, position_angle_deg, ln])
     };
     let truth = match file.simulation {
@@ -160,8 +162,8 @@ fn results(scan: &BandScan, file: &FitFile) -> anyhow::Result<Value> {
     Ok(json!({
         "inclination_deg": interval(&inclinations, Some(best.inclination_deg)),
         "inclinations": inclinations,
-        "rotation_factor": probabilities(|world| world.rotation_factor, best.rotation_factor),
-        "position_angle_deg": probabilities(|world| world.position_angle_deg, best.position_angle_deg),
+        "rotation_factor": probabilities(|geometry| geometry.rotation_factor, best.rotation_factor),
+        "position_angle_deg": probabilities(|geometry| geometry.position_angle_deg, best.position_angle_deg),
         "clockwise": clockwise(scan, file.motion.axis.map_or(1.0, |axis| axis[2])),
         "radius": interval(&radii(scan), Some(band.radius)),
         "radii": radii(scan),
@@ -185,7 +187,7 @@ fn results(scan: &BandScan, file: &FitFile) -> anyhow::Result<Value> {
         "background_jy": scan.background,
         "validation_chi2_per_datum": scan.validation,
         "truth": {"inclination_deg": truth},
-        "worlds": scan.worlds.iter().map(row).collect::<Vec<_>>(),
+        "geometries": scan.geometries.iter().map(row).collect::<Vec<_>>(),
     }))
 }
 

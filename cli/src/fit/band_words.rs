@@ -3,10 +3,10 @@
 use crate::report::Part;
 use kerrlight_render::polarization::PolarizationLaw;
 use kerrlight_tomo::fit::settings::{BackgroundSettings, BandSettings, DataFiles, FitFile, Steps};
-use kerrlight_tomo::fit::setup::Measured;
+use kerrlight_tomo::fit::setup::FitData;
 
-/// Paragraphs under headings, of a fit that compares worlds.
-pub fn parts(file: &FitFile, measured: &Measured) -> Vec<Part> {
+/// Paragraphs under headings, of a fit that compares geometries.
+pub fn parts(file: &FitFile, measured: &FitData) -> Vec<Part> {
     let Some(band) = &file.band else { return Vec::new() };
     let part = |heading: &str, text: Vec<String>| Part { heading: heading.to_owned(), text };
     vec![
@@ -17,7 +17,7 @@ pub fn parts(file: &FitFile, measured: &Measured) -> Vec<Part> {
     ]
 }
 
-fn data(file: &FitFile, measured: &Measured) -> Vec<String> {
+fn data(file: &FitFile, measured: &FitData) -> Vec<String> {
     let Some(curve) = &measured.curve else { return Vec::new() };
     let fitted = curve.fitted.iter().filter(|fitted| **fitted).count();
     let names: Vec<&str> = curve.parameters.iter().map(|parameter| parameter.name()).collect();
@@ -53,9 +53,9 @@ fn data(file: &FitFile, measured: &Measured) -> Vec<String> {
 
 fn model(file: &FitFile, band: &BandSettings) -> Vec<String> {
     let mut text = vec![format!(
-        "A hole of spin {}. In each world the emission is a Gaussian random field in a band about a circle; gas carries it round \
-         with an angular velocity that is a multiple of the one in motion.velocity. No volume is fitted to compare worlds: \
-         the field is integrated out. The volume that is shown is that of the most probable world.",
+        "A hole of spin {}. In each geometry the emission is a Gaussian random field in a band about a circle; gas carries it round \
+         with an angular velocity that is a multiple of the one in motion.velocity. No volume is fitted to compare geometries: \
+         the field is integrated out. The volume that is shown is that of the most probable geometry.",
         file.hole.spin.value()
     )];
     text.extend(file.polarization.as_ref().map(law));

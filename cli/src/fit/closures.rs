@@ -1,12 +1,12 @@
 //! How many of the closure quantities of the data a fit uses.
 
 use kerrlight_tomo::fit::settings::{Loss, LossKind};
-use kerrlight_tomo::fit::setup::Measured;
+use kerrlight_tomo::fit::setup::FitData;
 use kerrlight_vlbi::products::{ClosureCount, ClosureKind};
 use serde_json::{Value, json};
 
 /// The counts of every loss of closure quantities.
-fn counts<'a>(measured: &Measured, losses: &'a [Loss]) -> Vec<(&'a Loss, ClosureCount)> {
+fn counts<'a>(measured: &FitData, losses: &'a [Loss]) -> Vec<(&'a Loss, ClosureCount)> {
     let Some((observation, _)) = &measured.visibilities else { return Vec::new() };
     let count = |loss: &'a Loss| {
         let kind = match loss.data {
@@ -20,7 +20,7 @@ fn counts<'a>(measured: &Measured, losses: &'a [Loss]) -> Vec<(&'a Loss, Closure
 }
 
 /// A sentence for each of them.
-pub fn sentences(measured: &Measured, losses: &[Loss]) -> Vec<String> {
+pub fn sentences(measured: &FitData, losses: &[Loss]) -> Vec<String> {
     let sentence = |(loss, count): &(&Loss, ClosureCount)| {
         let ClosureCount { used, possible, of_scans } = count;
         let label = loss.data.label();
@@ -39,7 +39,7 @@ pub fn sentences(measured: &Measured, losses: &[Loss]) -> Vec<String> {
 }
 
 /// The same for results.json.
-pub fn json(measured: &Measured, losses: &[Loss]) -> Option<Value> {
+pub fn json(measured: &FitData, losses: &[Loss]) -> Option<Value> {
     let one = |(loss, count): &(&Loss, ClosureCount)| {
         json!({
             "data": loss.data.name(),

@@ -10,7 +10,7 @@ use kerrlight_imaging::data as imaging;
 use kerrlight_imaging::settings::{StaticImageFile, StrengthSettings};
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{DataFiles, FitFile, Simulation};
-use kerrlight_tomo::fit::setup::{Drawn, Instrument, Measured};
+use kerrlight_tomo::fit::setup::{Drawn, FitData, Instrument};
 use kerrlight_validation::sky::{Screen, Sky};
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::files::images::{WithSize, npy_frames, npz_frames};
@@ -25,33 +25,33 @@ pub fn measure(
     file: &FitFile,
     instrument: &Instrument,
     base_dir: &Path,
-) -> anyhow::Result<Measured> {
+) -> anyhow::Result<FitData> {
     match &file.data {
         None => {
             let file = &with_times(file, base_dir)?;
             let array = file.observation().map(|seen| {
                 arguments::array_near(&seen.array, base_dir).context("simulation.observation.array")
             });
-            Ok(Measured::simulated_by(&sky, file, instrument, array.transpose()?.as_ref())?)
+            Ok(FitData::simulated_by(&sky, file, instrument, array.transpose()?.as_ref())?)
         }
         Some(DataFiles::Movie { path, .. }) => {
             let path = base_dir.join(path);
             let movie = images(file, &path)?;
-            Ok(Measured::of_movie(file, movie, &path.display().to_string())?)
+            Ok(FitData::of_movie(file, movie, &path.display().to_string())?)
         }
         Some(DataFiles::LightCurve(settings)) => {
             let path = paths::of_data(&settings.path, base_dir)?;
             let name = path.display().to_string();
-            Ok(Measured::of_light_curve(file, light_curve(&path)?, &name)?)
+            Ok(FitData::of_light_curve(file, light_curve(&path)?, &name)?)
         }
         Some(DataFiles::Visibilities { path, .. }) => {
-            let of = |observation, name: &str| Measured::of_visibilities(file, observation, name);
+            let of = |observation, name: &str| FitData::of_visibilities(file, observation, name);
             visibilities(&paths::of_data(path, base_dir)?, of)
         }
     }
 }
 
-/// A drawn world as the program's second forward model sees it.
+/// A drawn geometry as the program's second forward model sees it.
 fn sky(
     drawn: &Drawn<'_>,
     emission: &(dyn Fn([f64; 3]) -> f64 + Sync),
@@ -168,7 +168,7 @@ fn movie(file: &FitFile, path: &Path) -> anyhow::Result<Movie> {
 pub fn of_static(
     file: &StaticImageFile,
     base_dir: &Path,
-) -> anyhow::Result<(Measured, Option<Measured>)> {
+) -> anyhow::Result<(FitData, Option<FitData>)> {
     let (mut all, mut all_polarized) = (Vec::new(), Vec::new());
     for path in file.data.visibilities.path.all() {
         let path = paths::of_data(path, base_dir)?;

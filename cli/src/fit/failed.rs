@@ -1,6 +1,6 @@
 //! Fits that fail while they run: exit code 1.
 
-use super::delegate;
+use super::device_runner;
 use super::folder::Folder;
 use crate::interrupt::Interrupted;
 use kerrlight_tomo::Error;
@@ -20,7 +20,7 @@ pub fn told(error: anyhow::Error, folder: &Folder) -> anyhow::Error {
             let path = folder.path().display();
             Interrupted(format!("{stopped}; resume with: kerrlight fit --resume {path}")).into()
         }
-        Ok(Error::Device(error)) => delegate::failed(error, folder),
+        Ok(Error::Device(error)) => device_runner::failed(error, folder),
         Ok(error) => failed(error),
         Err(other) => other,
     }

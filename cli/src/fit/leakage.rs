@@ -3,7 +3,7 @@
 use super::folder::Folder;
 use crate::output;
 use anyhow::Context;
-use kerrlight_tomo::fit::setup::{Measured, SolvedLeakage};
+use kerrlight_tomo::fit::setup::{FitData, SolvedLeakage};
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::polarimetry::LeakageTable;
 use serde_json::json;
@@ -19,7 +19,7 @@ pub fn keep(folder: &Folder, step: Option<u64>, found: &SolvedLeakage) -> anyhow
 }
 
 /// What a run has found last, if it has solved for leakage.
-pub fn kept(measured: &Measured, folder: &Folder) -> anyhow::Result<Option<LeakageTable>> {
+pub fn kept(measured: &FitData, folder: &Folder) -> anyhow::Result<Option<LeakageTable>> {
     let path = folder.path().join(TABLE);
     if measured.leakage.is_none() || !path.exists() {
         return Ok(None);

@@ -2,7 +2,7 @@
 
 use kerrlight_tomo::fit::linear::{Ending, LinearSolution};
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
-use kerrlight_tomo::fit::setup::Imprinted;
+use kerrlight_tomo::fit::setup::WarmStarted;
 use serde_json::{Value, json};
 
 /// A line of the log.
@@ -29,7 +29,7 @@ pub fn solved(solution: &LinearSolution<f32>) -> Value {
 }
 
 /// A line of the log.
-pub fn imprinted(found: &Imprinted) -> Value {
+pub fn imprinted(found: &WarmStarted) -> Value {
     json!({
         "step": 0,
         "imprint": { "steps": found.steps, "relative_error": found.relative_error },

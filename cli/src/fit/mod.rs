@@ -8,9 +8,11 @@ mod band_words;
 mod closures;
 mod curves;
 mod data;
-mod delegate;
+mod device_runner;
 mod failed;
 mod folder;
+mod geometry_results;
+mod geometry_search;
 mod held_out;
 mod init;
 mod inputs;
@@ -22,8 +24,6 @@ mod results;
 mod run;
 mod static_image;
 mod work;
-mod world_results;
-mod world_search;
 
 use crate::answer::Answer;
 use crate::changed::{self, Changed};
@@ -74,7 +74,7 @@ pub struct Fit {
     resume: Option<PathBuf>,
     #[command(flatten)]
     device: StepsOption,
-    /// Draw so many samples of volume and world when the fit is finished, as `kerrlight posterior` does
+    /// Draw so many samples of volume and geometry when the fit is finished, as `kerrlight posterior` does
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
     samples: Option<u32>,
     /// Write the settings that would be used and stop
@@ -302,7 +302,7 @@ fn base_dir_of(text: &str) -> PathBuf {
 }
 
 fn parse(text: &str) -> anyhow::Result<FitFile> {
-    if StaticImageFile::is_meant(text) {
+    if StaticImageFile::is_static_image(text) {
         bail!("there is a table [image]: a static image has no volume, and this needs one");
     }
     FitFile::parse(text).map_err(work::explained)

@@ -64,7 +64,7 @@ impl Work {
     }
 
     fn parse(text: &str) -> Result<Self, Error> {
-        Ok(match StaticImageFile::is_meant(text) {
+        Ok(match StaticImageFile::is_static_image(text) {
             true => Work::Image(Box::new(StaticImageFile::parse(text)?)),
             false => Work::Emission(Box::new(FitFile::parse(text)?)),
         })

@@ -55,7 +55,7 @@ impl Inspect {
         let (format, observation) = files::decode(&output::read(&self.file)?).with_context(name)?;
         let answer = visibilities::describe(&name(), format, &observation);
         let Some(plot) = plot else { return Ok(answer) };
-        plot.spares(&self.file)?;
+        plot.must_differ_from(&self.file)?;
         plot.write(plots::amplitudes(&observation, &observation.source))?;
         Ok(answer.outputs([plot.output()]))
     }

@@ -31,8 +31,8 @@ impl PlotFile {
     }
 
     /// Refuses to take the place of a file that is read.
-    pub fn spares(&self, input: &Path) -> anyhow::Result<()> {
-        self.output.spares(input)
+    pub fn must_differ_from(&self, input: &Path) -> anyhow::Result<()> {
+        self.output.must_differ_from(input)
     }
 
     /// Draws and writes.

@@ -74,7 +74,7 @@ impl Movie {
         let times = self.span.times(self.frames.all, &scene)?;
         let animations = self.viewing.outputs()?;
         let files = assets::load(&scene, &source.folder, &animations.files(), self.reach)?;
-        animations.files().iter().try_for_each(|output| output.spares(&self.scene))?;
+        animations.files().iter().try_for_each(|output| output.must_differ_from(&self.scene))?;
         let mut film = Film::new(&scene, files.decoded).with_context(|| source.name.clone())?;
         if animations.any() && !self.frames.are_all() {
             bail!(

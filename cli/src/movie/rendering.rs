@@ -1,7 +1,7 @@
 //! The frames that are missing, batch by batch.
 
 use super::frames::Sequence;
-use crate::interrupt::{Interrupted, Keeper};
+use crate::interrupt::{Interrupted, SignalGuard};
 use crate::progress;
 use crate::render::exr_options::ExrOptions;
 use indicatif::ProgressBar;
@@ -38,7 +38,7 @@ impl<'a> Rendering<'a> {
     pub fn run(mut self) -> anyhow::Result<usize> {
         let (missing, start) = (self.sequence.missing(), Instant::now());
         if self.sequence.lacks_scale() {
-            let keeper = Keeper::brief(self.there());
+            let keeper = SignalGuard::brief(self.there());
             let first = self.frames(&[self.sequence.time(0)], &keeper)?;
             first.iter().try_for_each(|first| self.sequence.scale_like(self.film, first))?;
         }
@@ -56,13 +56,13 @@ impl<'a> Rendering<'a> {
     }
 
     fn batch(&mut self, batch: &[usize]) -> anyhow::Result<()> {
-        let keeper = Keeper::brief(self.there());
+        let keeper = SignalGuard::brief(self.there());
         let times: Vec<f64> = batch.iter().map(|k| self.sequence.time(*k)).collect();
         let frames = self.frames(&times, &keeper)?;
         self.sequence.write(self.film, self.style, batch, frames)
     }
 
-    fn frames(&mut self, times: &[f64], keeper: &Keeper) -> anyhow::Result<Vec<Frame>> {
+    fn frames(&mut self, times: &[f64], keeper: &SignalGuard) -> anyhow::Result<Vec<Frame>> {
         let bar = &self.bar;
         let frames = self.film.frames(times, &|rows| {
             bar.inc(rows as u64);

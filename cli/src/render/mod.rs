@@ -123,7 +123,7 @@ impl Render {
     fn checked_outputs(&self, source: &Source) -> anyhow::Result<Outputs> {
         let outputs = self.outputs(source)?;
         if let Some(input) = &self.scene {
-            outputs.all().iter().try_for_each(|output| output.spares(input))?;
+            outputs.all().iter().try_for_each(|output| output.must_differ_from(input))?;
         }
         outputs.differ()?;
         Ok(outputs)

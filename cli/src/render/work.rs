@@ -3,7 +3,7 @@
 use super::exr_options::ExrOptions;
 use super::partial::Partial;
 use super::report;
-use crate::interrupt::{Interrupted, Keeper};
+use crate::interrupt::{Interrupted, SignalGuard};
 use crate::output::Output;
 use crate::progress;
 use anyhow::Context;
@@ -81,7 +81,7 @@ impl Work<'_> {
         let all = self.raster.bands();
         let bar = progress::bar(all as u64);
         bar.set_position((all - journal.missing().len()) as u64);
-        let keeper = Keeper::brief(stopped);
+        let keeper = SignalGuard::brief(stopped);
         let done = self.raster.fill(journal, &|_| {
             bar.inc(1);
             !keeper.stopped()

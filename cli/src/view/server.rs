@@ -1,7 +1,7 @@
 //! The page on this computer alone, for as long as the program runs.
 
 use super::page::Page;
-use crate::interrupt::Keeper;
+use crate::interrupt::SignalGuard;
 use crate::threads;
 use anyhow::Context;
 use std::io::{BufRead, BufReader, Write};
@@ -22,7 +22,7 @@ pub fn serve(page: &Page, port: Option<u16>, browser: bool) -> anyhow::Result<()
         .with_context(|| format!("--port {wanted}: cannot listen at this port"))?;
     let address = format!("http://{}/", listener.local_addr()?);
     eprintln!("{address}: open it in a browser with WebGPU; Ctrl-C ends");
-    let _keeper = Keeper::brief("the page is no longer served");
+    let _keeper = SignalGuard::brief("the page is no longer served");
     if browser {
         open(&address);
     }

@@ -1,7 +1,7 @@
 //! How bright the scene is, from a small picture of it.
 
 use super::subject::Subject;
-use crate::interrupt::Keeper;
+use crate::interrupt::SignalGuard;
 use anyhow::Context;
 use kerrlight_render::picture::Raster;
 use kerrlight_render::scene::{Rings, Scene};
@@ -22,7 +22,7 @@ pub fn white(subject: &Subject) -> anyhow::Result<f64> {
         volumes: volumes.clone(),
     };
     let raster = Raster::new(&scene, assets).context("the scene")?;
-    let keeper = Keeper::brief("stopped; nothing is written");
+    let keeper = SignalGuard::brief("stopped; nothing is written");
     let picture = raster.render(&|_| !keeper.stopped())?.picture;
     let lit = |name: &str| {
         let values = picture.channel(name).into_iter().flatten().copied();

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::settings::StrengthSettings;
 use kerrlight_tomo::fit::settings::{FitError, refuse};
-use kerrlight_tomo::fit::setup::{LeakageUnknown, Measured};
+use kerrlight_tomo::fit::setup::{FitData, LeakageUnknown};
 use kerrlight_vlbi::gains::GainPriors;
 use kerrlight_vlbi::observation::{Observation, Row};
 use kerrlight_vlbi::polarimetry::SharedLeakage;
@@ -21,9 +21,9 @@ const SAME_FREQUENCY: f64 = 0.05;
 /// # Errors
 /// If there are none, files contradict each other, or there are too few frames for the strength.
 pub fn joined(
-    parts: Vec<(String, Measured)>,
+    parts: Vec<(String, FitData)>,
     (table, strength): (&str, Option<&StrengthSettings>),
-) -> Result<Measured, Error> {
+) -> Result<FitData, Error> {
     let mut parts = parts.into_iter();
     let Some((first, mut all)) = parts.next() else {
         refuse!("data.visibilities.path = [] is not allowed: one file or more");
@@ -37,7 +37,7 @@ pub fn joined(
     Ok(all)
 }
 
-fn join(all: &mut Measured, names: (&str, &str), part: Measured, file: usize) -> Result<(), Error> {
+fn join(all: &mut FitData, names: (&str, &str), part: FitData, file: usize) -> Result<(), Error> {
     let (Some((seen, of_rows)), Some((other, of_others))) =
         (&mut all.visibilities, part.visibilities)
     else {
@@ -66,7 +66,7 @@ fn join(all: &mut Measured, names: (&str, &str), part: Measured, file: usize) ->
 }
 
 /// Puts frames in order of time, those of one time in the order of their files.
-fn in_order(all: &mut Measured) {
+fn in_order(all: &mut FitData) {
     let mut order: Vec<usize> = (0..all.times.len()).collect();
     order.sort_by(|a, b| all.times[*a].total_cmp(&all.times[*b]));
     let mut place = vec![0; order.len()];
@@ -143,7 +143,7 @@ mod tests {
     use kerrlight_vlbi::products::{ClosureKind, ClosureSet};
 
     /// Three stations at two times, with gains of this prior.
-    fn file(frequency_hz: f64, position: SourcePosition, sigma: f64) -> Measured {
+    fn file(frequency_hz: f64, position: SourcePosition, sigma: f64) -> FitData {
         let mut seen = Observation::empty(Basis::Stokes);
         seen.stations = ["A", "B", "C"].map(Station::named).to_vec();
         (seen.frequency_hz, seen.position) = (Some(frequency_hz), Some(position));
@@ -154,7 +154,7 @@ mod tests {
             }
         }
         let gains = Some(GainPriors { free_phases: false, amplitude_sigma: vec![sigma; 3] });
-        Measured { gains, ..Measured::of_frames(seen, &[], None).unwrap() }
+        FitData { gains, ..FitData::of_frames(seen, &[], None).unwrap() }
     }
 
     /// Two bands of one night: as many closure phases as in both, none across, and gains of a file with its own priors.

@@ -12,7 +12,7 @@ use core::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use kerrlight_tomo::fit::settings::{
     GainPhases, InstrumentSettings, LossKind, Variability, refuse,
 };
-use kerrlight_tomo::fit::setup::{Measured, Reduction, VisibilitySettings};
+use kerrlight_tomo::fit::setup::{FitData, Reduction, VisibilitySettings};
 use kerrlight_vlbi::observation::{Basis, Observation};
 
 /// Measured visibilities as the data of a static image, whose frames have hours of UTC for times. `name` is what they are
@@ -24,15 +24,15 @@ pub fn total_intensity(
     file: &StaticImageFile,
     observation: Observation,
     name: &str,
-) -> Result<Measured, Error> {
+) -> Result<FitData, Error> {
     let variability = file.data.visibilities.variability;
     let observation = cropped(observation, file.data.visibilities.utc_h)?;
     let observation = reduction(file, variability).of(observation, &file.loss, name)?;
     let instrument =
         file.instrument.clone().map(|known| InstrumentSettings { leakage: None, ..known });
-    let measured = Measured::of_frames(observation, &file.loss, instrument.as_ref())?;
-    let (sky, varies) = (Some(file.image.grid()?), variability.is_some());
-    Ok(Measured { sky, varies, ..measured })
+    let measured = FitData::of_frames(observation, &file.loss, instrument.as_ref())?;
+    let (sky, has_intrinsic_variability) = (Some(file.image.grid()?), variability.is_some());
+    Ok(FitData { sky, has_intrinsic_variability, ..measured })
 }
 
 /// The data of the polarisation of a static image, with all products of the feeds; none if no polarisation is asked for.
@@ -43,7 +43,7 @@ pub fn polarized(
     file: &StaticImageFile,
     observation: Observation,
     name: &str,
-) -> Result<Option<Measured>, Error> {
+) -> Result<Option<FitData>, Error> {
     let Some(polarization) = &file.polarization else { return Ok(None) };
     let (data, losses) = (&file.data.visibilities, [polarization.loss()]);
     let observation = cropped(observation, data.utc_h)?;
@@ -56,9 +56,10 @@ pub fn polarized(
     }
     polarized_errors(&mut observation, data.variability, polarization);
     let instrument = file.instrument.clone().map(|instrument| with_phases(instrument, file));
-    let measured = Measured::of_frames(observation, &losses, instrument.as_ref())?;
-    let varies = data.variability.is_some() || polarization.variability.is_some();
-    Ok(Some(Measured { sky: Some(file.image.grid()?), varies, ..measured }))
+    let measured = FitData::of_frames(observation, &losses, instrument.as_ref())?;
+    let has_intrinsic_variability =
+        data.variability.is_some() || polarization.variability.is_some();
+    Ok(Some(FitData { sky: Some(file.image.grid()?), has_intrinsic_variability, ..measured }))
 }
 
 fn reduction(file: &StaticImageFile, variability: Option<Variability>) -> Reduction {
@@ -111,12 +112,14 @@ fn polarized_errors(
     for row in &mut observation.rows {
         let length = row.uv[0].hypot(row.uv[1]);
         let light = row.stokes_i(basis).map_or(0.0, |i| i.visibility.norm());
-        let varies = |law: Option<Variability>| law.map_or(0.0, |law| law.sigma(length));
+        let has_intrinsic_variability =
+            |law: Option<Variability>| law.map_or(0.0, |law| law.sigma(length));
         // Half of the sum of two hands has the error that the law says.
         let hands = row.parts_of_i(basis).iter().flatten().count().max(1) as f64;
-        let of_light = varies(of_light) * hands.sqrt();
+        let of_light = has_intrinsic_variability(of_light) * hands.sqrt();
         let leaked = SQRT_2 * polarization.leakage_left * light;
-        let of_polarized = share * varies(polarization.variability).hypot(leaked);
+        let of_polarized =
+            share * has_intrinsic_variability(polarization.variability).hypot(leaked);
         for (k, sigma) in row.noise_sigma.iter_mut().enumerate() {
             *sigma = sigma.hypot(if crossed.contains(&k) { of_polarized } else { of_light });
         }

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use kerrlight_tomo::fit::settings::Loss;
-use kerrlight_tomo::fit::setup::Measured;
+use kerrlight_tomo::fit::setup::FitData;
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::noise::add_thermal_noise;
 use kerrlight_vlbi::operator::{Method, Operator, Transform};
@@ -13,11 +13,11 @@ use kerrlight_vlbi::operator::{Method, Operator, Transform};
 /// # Errors
 /// If data make no term.
 pub fn redrawn(
-    measured: &Measured,
+    measured: &FitData,
     losses: &[Loss],
     image: &[f64],
     seed: u64,
-) -> Result<Measured, Error> {
+) -> Result<FitData, Error> {
     let mut copy = measured.without_truth();
     let (Some((observation, _)), Some(sky)) = (&mut copy.visibilities, measured.sky) else {
         return Ok(copy);

@@ -6,7 +6,7 @@ use crate::Error;
 use crate::settings::{StaticImageFile, StaticPolarization};
 use crate::solve::minimum;
 use crate::survey::{Stage, Survey, SurveyWatch, allowed, held};
-use kerrlight_tomo::fit::setup::{Held, Measured, SolvedLeakage, best_held};
+use kerrlight_tomo::fit::setup::{FitData, Held, SolvedLeakage, best_held};
 use kerrlight_tomo::fit::{FrameTerm, Weighted};
 use kerrlight_vlbi::data_terms::DataTermError;
 use kerrlight_vlbi::operator::ImageGrid;
@@ -74,7 +74,7 @@ impl PolarizedSurvey {
 /// If there are no data.
 pub fn survey_polarized(
     file: &StaticImageFile,
-    measured: &Measured,
+    measured: &FitData,
     survey: &Survey,
     watch: &SurveyWatch<'_>,
 ) -> Result<Option<PolarizedSurvey>, Error> {
@@ -121,7 +121,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    fn term(&self, measured: &Measured) -> Result<Weighted<dyn FrameTerm<f64>>, Error> {
+    fn term(&self, measured: &FitData) -> Result<Weighted<dyn FrameTerm<f64>>, Error> {
         let terms = measured.visibility_terms(&[self.settings.loss()], self.grid.pixels())?;
         terms.into_iter().next().ok_or_else(|| DataTermError::Empty.into())
     }
@@ -190,7 +190,7 @@ impl Search<'_> {
     /// Images of the data with their noise once more, each beside the total intensity of a draw.
     fn draws(
         &self,
-        measured: &Measured,
+        measured: &FitData,
         survey: &Survey,
         strength: f64,
     ) -> Result<Option<Vec<PolarizedCandidate>>, Error> {

@@ -261,7 +261,7 @@ impl StaticImageFile {
     }
 
     /// Whether a fit's text asks for a static image: it has a table `image`.
-    pub fn is_meant(text: &str) -> bool {
+    pub fn is_static_image(text: &str) -> bool {
         text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("image"))
     }
 
@@ -399,7 +399,10 @@ most_radius_uas = 40.0
         let file = StaticImageFile::parse(TEXT).unwrap();
         let again = StaticImageFile::parse(&toml::to_string(&file).unwrap()).unwrap();
         assert_eq!(file, again);
-        assert!(StaticImageFile::is_meant(TEXT) && !StaticImageFile::is_meant("title = \"x\""));
+        assert!(
+            StaticImageFile::is_static_image(TEXT)
+                && !StaticImageFile::is_static_image("title = \"x\"")
+        );
     }
 
     #[test]

@@ -85,7 +85,7 @@ pub trait StepDevice<T>: Send {
 }
 
 /// A device with the steps that somebody wants to look at.
-pub struct Delegate<T> {
+pub struct DeviceRunner<T> {
     pub(super) device: Box<dyn StepDevice<T>>,
     pub(super) pause: u64,
     pub(super) end: u64,
@@ -93,7 +93,7 @@ pub struct Delegate<T> {
     pub(super) pace: u64,
 }
 
-impl<T: Float> Delegate<T> {
+impl<T: Float> DeviceRunner<T> {
     /// A stretch ends at multiples of `pause` steps and at `end`.
     pub fn new(device: Box<dyn StepDevice<T>>, pause: u64, end: u64) -> Self {
         Self { device, pause: pause.max(1), end, pace: 1 }

@@ -6,7 +6,7 @@ use super::occupancy::Occupancy;
 use super::quiescent::Quiescent;
 use super::shift::Shift;
 use super::sightlines::Sightlines;
-use super::stokes::{Planes, Seen};
+use super::stokes::{Observable, Planes};
 use crate::Error;
 use crate::representation::Representation;
 use kerrlight_common::simd::Float;
@@ -126,7 +126,7 @@ impl<T: Float> ForwardModel<T> {
     ///
     /// # Errors
     /// If there are no parameters, or no factors for all of them.
-    pub fn seen(mut self, factors: Option<&[Stokes]>, seen: &Seen) -> Result<Self, Error> {
+    pub fn seen(mut self, factors: Option<&[Stokes]>, seen: &Observable) -> Result<Self, Error> {
         let parameters = seen.parameters();
         let known = factors.map_or(0, <[Stokes]>::len);
         if factors.is_some() && known != self.points() {
@@ -170,7 +170,7 @@ impl<T: Float> ForwardModel<T> {
     }
 
     /// The same with an image beside the emission: fields then have its parameters behind their own
-    /// ([`Beside`](super::Beside)).
+    /// ([`WithStaticImage`](super::WithStaticImage)).
     ///
     /// # Errors
     /// If a number of the image is out of its range, or it has other pixels.

@@ -2,7 +2,7 @@
 //!
 //! Subrings are narrower than pixels and as bright as what they are images of (Gralla, Holz & Wald 2019): a single ray
 //! in the middle of a pixel meets one or misses it. The mean over several rays is the pixel's flux, and changes
-//! smoothly with the world.
+//! smoothly with the geometry.
 
 use kerrlight_geodesic::analytic::CriticalCurve;
 use kerrlight_geodesic::{Kerr, Observer};

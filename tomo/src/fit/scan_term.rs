@@ -1,6 +1,6 @@
 //! What an array of telescopes sees of frames.
 
-use super::compared::Compared;
+use super::device_observable::Compared;
 use super::terms::FrameTerm;
 use kerrlight_common::simd::Float;
 use kerrlight_vlbi::data_terms::{DataTerm, Residual};

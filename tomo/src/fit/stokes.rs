@@ -126,7 +126,7 @@ impl Node {
 
 /// What data see of a model.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Seen {
+pub enum Observable {
     /// Every pixel, of total intensity.
     Images,
     /// Every pixel, an image for each of these parameters, one after the other.
@@ -135,18 +135,18 @@ pub enum Seen {
     Fluxes(Vec<StokesParameter>),
 }
 
-impl Seen {
+impl Observable {
     /// The parameters, in the order of the images.
     pub fn parameters(&self) -> &[StokesParameter] {
         match self {
-            Seen::Images => &[StokesParameter::I],
-            Seen::StokesImages(parameters) | Seen::Fluxes(parameters) => parameters,
+            Observable::Images => &[StokesParameter::I],
+            Observable::StokesImages(parameters) | Observable::Fluxes(parameters) => parameters,
         }
     }
 
     /// Whether pixels are added up.
     pub fn is_flux(&self) -> bool {
-        matches!(self, Seen::Fluxes(_))
+        matches!(self, Observable::Fluxes(_))
     }
 }
 

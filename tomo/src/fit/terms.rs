@@ -1,6 +1,6 @@
 //! Data of a movie, frame by frame: χ² of an image, and its gradient with respect to pixels.
 
-use super::compared::Compared;
+use super::device_observable::Compared;
 use crate::Error;
 use kerrlight_common::frames::Frames;
 use kerrlight_common::simd::Float;

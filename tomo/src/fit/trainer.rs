@@ -1,7 +1,7 @@
 //! A fit with its memory.
 
 use super::change_price::ChangeBuffers;
-use super::device::Delegate;
+use super::device::DeviceRunner;
 use super::objective::{Buffers, Objective};
 use super::training::Training;
 use crate::representation::{Representation, WeightMatrix};
@@ -16,7 +16,7 @@ pub struct Trainer<'a, T> {
     /// How it is run.
     pub training: Training,
     /// A device that takes the steps in place of this processor, if there is one.
-    pub device: Option<Delegate<T>>,
+    pub device: Option<DeviceRunner<T>>,
     pub(super) observed: Vec<usize>,
     pub(super) buffers: Buffers<T>,
     pub(super) changes: ChangeBuffers<T>,

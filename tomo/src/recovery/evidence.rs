@@ -2,14 +2,14 @@
 
 use crate::Error;
 use crate::fit::settings::{DataFiles, FitFile, Loss, LossKind, Noise};
-use crate::fit::setup::Measured;
+use crate::fit::setup::FitData;
 use crate::fit::verdict::{Errors, Expected, Statistics, Tested, Verdict, ZeroSpacing, judge};
 use kerrlight_common::frames::Frames;
 use kerrlight_vlbi::products::debiased_amplitude;
 
 /// A verdict with all that it is made of.
 #[derive(Clone, Debug)]
-pub struct Judged {
+pub struct DataVerdict {
     /// What came out.
     pub verdict: Verdict,
     /// The kinds of data with their names.
@@ -63,7 +63,7 @@ pub struct Evidence<'a> {
     /// Seed of the settings.
     pub seed: u64,
     /// Data.
-    pub measured: &'a Measured,
+    pub measured: &'a FitData,
 }
 
 /// Kinds of data with their names, in the order of the losses, images first.
@@ -74,7 +74,11 @@ impl Evidence<'_> {
     ///
     /// # Errors
     /// If images cannot be read.
-    pub fn judged(&self, compared: Compared<'_>, movie: &Frames<f32>) -> Result<Judged, Error> {
+    pub fn judged(
+        &self,
+        compared: Compared<'_>,
+        movie: &Frames<f32>,
+    ) -> Result<DataVerdict, Error> {
         self.judged_beside(compared, movie, Vec::new())
     }
 
@@ -87,13 +91,13 @@ impl Evidence<'_> {
         (names, statistics): Compared<'_>,
         movie: &Frames<f32>,
         others: Vec<(String, Tested)>,
-    ) -> Result<Judged, Error> {
+    ) -> Result<DataVerdict, Error> {
         let model = self.model_visibilities(movie)?;
         let mut terms = Vec::new();
         for ((loss, name), statistics) in ordered(self.losses).zip(names).zip(statistics) {
             let has_background =
                 self.measured.curve.as_ref().is_some_and(|curve| curve.background.is_some());
-            let shared = has_background || self.measured.varies;
+            let shared = has_background || self.measured.has_intrinsic_variability;
             let errors = match self.file {
                 _ if shared => Errors::Shared,
                 Some(file) => errors(file, loss.data),
@@ -118,7 +122,7 @@ impl Evidence<'_> {
         let judged = flux.filter(|_| flux_counts);
         let observation = self.measured.visibilities.as_ref().map(|(observation, _)| observation);
         let stations = observation.map(|o| o.stations.iter().map(|s| s.name.clone()).collect());
-        Ok(Judged {
+        Ok(DataVerdict {
             verdict: judge(&tested, judged),
             terms,
             flux,
@@ -156,7 +160,7 @@ impl Evidence<'_> {
     }
 }
 
-impl Judged {
+impl DataVerdict {
     /// Judges once more with what fits of the same model to other noise leave of each kind of data: mean and standard
     /// deviation of χ² per datum. `count` is how many fits these are.
     pub fn expect(&mut self, drawn: &[[f64; 2]], count: usize) {

@@ -2,18 +2,18 @@
 
 use super::problem::Problem;
 use crate::fit::FluxDatum;
+use crate::fit::geometry::Geometry;
 use crate::fit::scan::{AxisLoss, AxisScan};
-use crate::fit::settings::{FitFile, UnknownWorld};
-use crate::fit::setup::{self, BandScan, FoundWorld, Held};
-use crate::fit::world::World;
+use crate::fit::settings::{FitFile, UnknownGeometry};
+use crate::fit::setup::{self, BandScan, FoundGeometry, Held};
 use kerrlight_render::dynamics::Axis;
 
 /// What is looked for before the emission is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Stage {
-    /// The parameters of the world that are not known.
-    World,
+    /// The parameters of the geometry that are not known.
+    Geometry,
     /// The same, by the light curve of a flare in an orbital band.
     Band,
     /// A weight, by data that are held out.
@@ -24,9 +24,9 @@ pub enum Stage {
 #[derive(Clone, Copy)]
 #[non_exhaustive]
 pub enum Found<'a> {
-    /// The world, of these settings and data.
-    World(&'a Problem, &'a UnknownWorld, &'a FoundWorld),
-    /// Worlds and bands.
+    /// The geometry, of these settings and data.
+    Geometry(&'a Problem, &'a UnknownGeometry, &'a FoundGeometry),
+    /// Geometries and bands.
     Band(&'a Problem, &'a BandScan),
     /// Values of a weight.
     Weight(&'a FitFile, &'a [Held]),
@@ -36,9 +36,9 @@ pub enum Found<'a> {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum Searched {
-    /// The world, with its errors.
-    World(Box<FoundWorld>),
-    /// Worlds and bands, with their probabilities.
+    /// The geometry, with its errors.
+    Geometry(Box<FoundGeometry>),
+    /// Geometries and bands, with their probabilities.
     Band(BandScan),
 }
 
@@ -46,8 +46,8 @@ pub enum Searched {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Choice {
-    /// The world.
-    World(World),
+    /// The geometry.
+    Geometry(Geometry),
     /// The best band.
     Band {
         /// Degrees.
@@ -67,9 +67,9 @@ impl Found<'_> {
     /// What the fit goes on with.
     pub fn choice(&self) -> Choice {
         match self {
-            Found::World(_, _, found) => Choice::World(found.world),
+            Found::Geometry(_, _, found) => Choice::Geometry(found.geometry),
             Found::Band(_, scan) => {
-                let best = &scan.worlds[scan.best];
+                let best = &scan.geometries[scan.best];
                 Choice::Band {
                     inclination_deg: best.inclination_deg,
                     position_angle_deg: best.position_angle_deg,

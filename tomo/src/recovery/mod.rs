@@ -1,6 +1,6 @@
 //! A fit as a function: from settings and data to the emission, its movie and a verdict.
 //!
-//! [`Problem`] (settings, rays, data) → searches for what of the world is not known → start → steps → [`Recovery`].
+//! [`Problem`] (settings, rays, data) → searches for what of the geometry is not known → start → steps → [`Recovery`].
 //! [`Progress`] follows a fit, stops it and keeps what it finds.
 
 mod evidence;
@@ -17,17 +17,17 @@ mod steps;
 mod tests;
 mod words;
 
-pub use evidence::{Compared, Evidence, Judged};
+pub use evidence::{Compared, DataVerdict, Evidence};
 pub use fields::{carried, compare, recovered, recovered_at, true_volume, true_volume_at};
 pub use found::{Choice, Found, FoundAxis, Searched, Stage};
 pub use problem::Problem;
 pub use progress::{At, Event, Now, Progress, Resumed, Silent};
-pub use search::{Placed, settled};
+pub use search::{ResolvedFit, settled};
 pub use words::{range_of, short};
 
 use crate::Error;
 use crate::fit::settings::{FitFile, Kind};
-use crate::fit::setup::{self, Instrument, Measured};
+use crate::fit::setup::{self, FitData, Instrument};
 use crate::fit::{Loss, Motion, State, Trainer};
 use kerrlight_common::frames::Frames;
 use kerrlight_render::volume::Volume;
@@ -49,17 +49,17 @@ pub enum Stopped {
 
 /// A fit that has come to its end, with all that it is made of.
 pub struct Fit<'a, 't> {
-    /// Settings, with what was found of the world.
+    /// Settings, with what was found of the geometry.
     pub file: &'a FitFile,
     /// Rays.
     pub instrument: &'a Instrument,
     /// Motion.
     pub motion: &'a Motion,
     /// Data.
-    pub measured: &'a Measured,
+    pub measured: &'a FitData,
     /// The truth at the reference time, where data are simulated.
     pub true_volume: Option<Volume>,
-    /// What a search for the world has found in this call.
+    /// What a search for the geometry has found in this call.
     pub searched: Option<Searched>,
     /// The fit with its memory.
     pub trainer: Trainer<'t, f32>,
@@ -68,9 +68,9 @@ pub struct Fit<'a, 't> {
 /// What a fit recovers.
 #[derive(Debug)]
 pub struct Recovery {
-    /// Settings, with what was found of the world in place of what was assumed.
+    /// Settings, with what was found of the geometry in place of what was assumed.
     pub settings: FitFile,
-    /// What a search for the world has found; none if the world was known.
+    /// What a search for the geometry has found; none if the geometry was known.
     pub searched: Option<Searched>,
     /// Emission at the reference time, dimensionless, zero outside the region of recovery.
     pub volume: Volume,
@@ -81,7 +81,7 @@ pub struct Recovery {
     /// The loss of all data, without penalties.
     pub loss: Loss,
     /// Residuals of each kind of data, and whether the model explains them.
-    pub judged: Judged,
+    pub judged: DataVerdict,
     /// How close the volume is to the truth inside the region, where data are simulated.
     pub closeness: Option<Comparison>,
     /// Parameters of the representation, and the axis.
@@ -108,7 +108,7 @@ pub fn fit_with<R, E: From<Error>>(
 ) -> Result<R, E> {
     let (placed, searched) = search::placed(problem, progress)?.unzip();
     let (file, instrument, motion, measured) = match &placed {
-        Some(Placed { file, instrument, motion, measured }) => {
+        Some(ResolvedFit { file, instrument, motion, measured }) => {
             (file, instrument, motion, measured.as_ref().unwrap_or(&problem.measured))
         }
         None => (&problem.settings, &problem.instrument, &problem.motion, &problem.measured),
@@ -184,7 +184,7 @@ impl<'t> Fit<'_, 't> {
         state: &State<f32>,
         seen: &Frames<f32>,
         movie: &Frames<f32>,
-    ) -> Result<Judged, Error> {
+    ) -> Result<DataVerdict, Error> {
         let objective = &self.trainer.objective;
         let mut statistics = objective.statistics(seen)?;
         let data: usize = statistics.iter().map(|of| of.all.count).sum();

@@ -3,7 +3,7 @@
 use super::Fit;
 use super::steps::named;
 use crate::Error;
-use crate::fit::{Batch, Seen, State};
+use crate::fit::{Batch, Observable, State};
 use crate::representation::Workspace;
 use kerrlight_common::frames::Frames;
 
@@ -13,7 +13,7 @@ impl Fit<'_, '_> {
     /// # Errors
     /// If they are larger than memory and cannot be written.
     pub fn pictured(&self, state: &State<f32>, seen: &Frames<f32>) -> Result<Frames<f32>, Error> {
-        if self.instrument.seen == Seen::Images {
+        if self.instrument.seen == Observable::Images {
             return Ok(seen.clone());
         }
         let mut model = self.instrument.pictured::<f32>(self.motion)?;
@@ -35,7 +35,8 @@ impl Fit<'_, '_> {
 
     /// The light of what does not move in the images of total intensity; nothing where it is not recovered.
     pub fn quiescent_light(&self, state: &State<f32>) -> Vec<f32> {
-        let is_image = matches!(self.instrument.seen, Seen::Images | Seen::StokesImages(_));
+        let is_image =
+            matches!(self.instrument.seen, Observable::Images | Observable::StokesImages(_));
         match self.trainer.objective.model.quiescent().filter(|_| is_image) {
             Some(image) => image.images(&state.now.parameters)[..image.pixels].to_vec(),
             None => Vec::new(),

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::fit::settings::{AxisSearch, FitError, FitFile};
-use crate::fit::setup::{self, Instrument, Measured};
+use crate::fit::setup::{self, FitData, Instrument};
 use crate::fit::{Motion, Objective};
 use crate::representation::Registry;
 use kerrlight_vlbi::array::Array;
@@ -19,7 +19,7 @@ pub struct Problem {
     /// Rays.
     pub instrument: Instrument,
     /// Data.
-    pub measured: Measured,
+    pub measured: FitData,
     /// Motion.
     pub motion: Motion,
 }
@@ -31,7 +31,7 @@ impl Problem {
     /// If settings are missing, out of range or contradict each other.
     pub fn simulated(settings: FitFile, array: Option<&Array>) -> Result<Self, Error> {
         let measure = |settings: &FitFile, instrument: &Instrument| {
-            Measured::simulated(settings, instrument, array)
+            FitData::simulated(settings, instrument, array)
         };
         Self::new(settings, Registry::new(), measure)
     }
@@ -42,7 +42,7 @@ impl Problem {
     /// As [`Problem::simulated`], and if visibilities lack errors, mass or distance.
     pub fn of_visibilities(settings: FitFile, observation: Observation) -> Result<Self, Error> {
         let measure = |settings: &FitFile, _: &Instrument| {
-            Measured::of_visibilities(settings, observation, "the observation")
+            FitData::of_visibilities(settings, observation, "the observation")
         };
         Self::new(settings, Registry::new(), measure)
     }
@@ -55,7 +55,7 @@ impl Problem {
         let measure = |settings: &FitFile, _: &Instrument| {
             let Movie { grid, pixels } = movie;
             let frames = kerrlight_common::frames::Frames::of(pixels, grid.pixels());
-            Measured::of_movie(settings, (frames, [grid.width, grid.height]), "the movie")
+            FitData::of_movie(settings, (frames, [grid.width, grid.height]), "the movie")
         };
         Self::new(settings, Registry::new(), measure)
     }
@@ -66,7 +66,7 @@ impl Problem {
     /// As [`Problem::simulated`], and if a Stokes parameter or an error is missing.
     pub fn of_light_curve(settings: FitFile, curve: LightCurve) -> Result<Self, Error> {
         let measure = |settings: &FitFile, _: &Instrument| {
-            Measured::of_light_curve(settings, curve, "the light curve")
+            FitData::of_light_curve(settings, curve, "the light curve")
         };
         Self::new(settings, Registry::new(), measure)
     }
@@ -78,13 +78,13 @@ impl Problem {
     pub fn new<E: From<Error>>(
         settings: FitFile,
         registry: Registry,
-        measure: impl FnOnce(&FitFile, &Instrument) -> Result<Measured, E>,
+        measure: impl FnOnce(&FitFile, &Instrument) -> Result<FitData, E>,
     ) -> Result<Self, E> {
         settings.check_ranges().map_err(Error::from)?;
-        setup::afford_all(&settings, &registry)?;
+        setup::check_memory_budget(&settings, &registry)?;
         setup::check(&settings, &registry)?;
         let instrument = Instrument::new(&settings)?;
-        Measured::check_origin(&settings)?;
+        FitData::check_origin(&settings)?;
         let measured = measure(&settings, &instrument)?;
         let motion = setup::motion(&settings, measured.times.clone())?;
         let problem = Self { settings, registry, instrument, measured, motion };
@@ -100,9 +100,9 @@ impl Problem {
         }
         // Times at which emission may change are those of the rays.
         setup::representation(settings, registry, setup::emission_times(instrument, motion))?;
-        if settings.unknown_world()?.is_some() {
-            let world = setup::known_world(settings);
-            setup::in_world(settings, instrument, measured, &world, 0)?;
+        if settings.unknown_geometry()?.is_some() {
+            let geometry = setup::known_geometry(settings);
+            setup::in_geometry(settings, instrument, measured, &geometry, 0)?;
         }
         let seen = self.objective(instrument, motion, measured)?.observed().len();
         if let Some(held_out) = &settings.held_out {
@@ -123,7 +123,7 @@ impl Problem {
         &self,
         instrument: &Instrument,
         motion: &Motion,
-        measured: &Measured,
+        measured: &FitData,
     ) -> Result<Objective<f32>, Error> {
         let pixels = self.settings.screen.pixels * self.settings.screen.pixels;
         let data = measured.terms(&self.settings.loss, pixels)?;

@@ -5,8 +5,8 @@ use crate::Error;
 use crate::fit::journal::{Forgetful, Journal};
 use crate::fit::linear::{LinearProgress, LinearSolution};
 use crate::fit::settings::FitFile;
-use crate::fit::setup::{Imprinted, Instrument, Measured, SolvedLeakage};
-use crate::fit::{Delegate, Outcome, State, Trainer};
+use crate::fit::setup::{FitData, Instrument, SolvedLeakage, WarmStarted};
+use crate::fit::{DeviceRunner, Outcome, State, Trainer};
 use kerrlight_render::volume::Volume;
 use kerrlight_vlbi::polarimetry::LeakageTable;
 
@@ -14,18 +14,18 @@ use kerrlight_vlbi::polarimetry::LeakageTable;
 #[derive(Clone, Copy)]
 #[non_exhaustive]
 pub enum At<'a> {
-    /// The search for the world.
-    World {
+    /// The search for the geometry.
+    Geometry {
         /// Which search, from 0.
         search: usize,
         /// Of so many.
         of: usize,
-        /// Worlds that it has evaluated.
-        worlds: usize,
+        /// Geometries that it has evaluated.
+        trials: usize,
         /// Least χ²/2 so far.
         least: f64,
     },
-    /// Worlds that were weighed by the light curve of a band.
+    /// Geometries that were weighed by the light curve of a band.
     Band(usize),
     /// A value, and a part of the data that is held out, from 0.
     HeldOut(usize, usize),
@@ -46,7 +46,7 @@ pub enum Event<'a> {
     /// The linear problem is solved.
     Linear(&'a LinearSolution<f32>),
     /// The representation has learnt that solution.
-    Imprinted(&'a Imprinted),
+    WarmStarted(&'a WarmStarted),
     /// Leakage, in a round of the linear problem.
     Round(usize, &'a SolvedLeakage),
     /// Leakage of the last round, or before a step.
@@ -55,12 +55,12 @@ pub enum Event<'a> {
 
 /// A fit before its first step, or after one.
 pub struct Now<'a, 't> {
-    /// Settings, with what was found of the world.
+    /// Settings, with what was found of the geometry.
     pub settings: &'a FitFile,
     /// Rays.
     pub instrument: &'a Instrument,
     /// Data.
-    pub measured: &'a Measured,
+    pub measured: &'a FitData,
     /// The truth at the reference time, where data are simulated.
     pub true_volume: Option<&'a Volume>,
     /// The fit with its memory.
@@ -120,7 +120,7 @@ pub trait Progress: Send {
         &mut self,
         _: &FitFile,
         _: &Trainer<'_, f32>,
-    ) -> Result<Option<Delegate<f32>>, Error> {
+    ) -> Result<Option<DeviceRunner<f32>>, Error> {
         Ok(None)
     }
 

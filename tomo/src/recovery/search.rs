@@ -1,18 +1,18 @@
-//! Searches that come before the emission: the world, a band, a rotation of position angles, a weight.
+//! Searches that come before the emission: the geometry, a band, a rotation of position angles, a weight.
 
 use super::found::{Choice, Found, Searched, Stage};
 use super::progress::{At, Progress};
 use super::{Problem, Stopped};
 use crate::Error;
-use crate::fit::settings::{FitFile, Kind, UnknownWorld};
-use crate::fit::setup::{self, BandScan, FoundWorld, Instrument, Measured};
-use crate::fit::world::World;
+use crate::fit::geometry::Geometry;
+use crate::fit::settings::{FitFile, Kind, UnknownGeometry};
+use crate::fit::setup::{self, BandScan, FitData, FoundGeometry, Instrument};
 use crate::fit::{Motion, Objective};
 use kerrlight_render::dynamics::Axis;
 use std::sync::{Mutex, PoisonError};
 
-/// Settings, rays, motion and data in the world that was found.
-pub struct Placed {
+/// Settings, rays, motion and data in the geometry that was found.
+pub struct ResolvedFit {
     /// Settings with what was found in place of what was assumed.
     pub file: FitFile,
     /// Rays.
@@ -20,30 +20,30 @@ pub struct Placed {
     /// Motion.
     pub motion: Motion,
     /// The data, where they are not those that were read.
-    pub measured: Option<Measured>,
+    pub measured: Option<FitData>,
 }
 
-impl Placed {
-    /// In a world; rays are those of this number near the critical curve.
+impl ResolvedFit {
+    /// In a geometry; rays are those of this number near the critical curve.
     ///
     /// # Errors
-    /// If the world is out of range.
-    pub fn in_world(
+    /// If the geometry is out of range.
+    pub fn in_geometry(
         problem: &Problem,
         file: &FitFile,
-        (world, rays): (&World, u64),
+        (geometry, rays): (&Geometry, u64),
     ) -> Result<Self, Error> {
         let Problem { instrument, measured, .. } = problem;
-        let (instrument, motion) = setup::in_world(file, instrument, measured, world, rays)?;
-        Ok(Self { file: settled(file, world), instrument, motion, measured: None })
+        let (instrument, motion) = setup::in_geometry(file, instrument, measured, geometry, rays)?;
+        Ok(Self { file: settled(file, geometry), instrument, motion, measured: None })
     }
 
     fn of(problem: &Problem, choice: &Choice) -> Result<Option<Self>, Error> {
         let Problem { settings, measured, .. } = problem;
         let placed = match choice {
-            Choice::World(world) => Self::in_world(problem, settings, (world, 0))?,
+            Choice::Geometry(geometry) => Self::in_geometry(problem, settings, (geometry, 0))?,
             Choice::Band { inclination_deg, position_angle_deg, rotation_factor, background } => {
-                let mut file = setup::in_band_world(settings, *inclination_deg);
+                let mut file = setup::in_band_geometry(settings, *inclination_deg);
                 if let Some(law) = &mut file.polarization {
                     law.turn_deg += position_angle_deg;
                 }
@@ -58,44 +58,44 @@ impl Placed {
     }
 }
 
-/// Looks for what of the world is not known; none if all of it is.
+/// Looks for what of the geometry is not known; none if all of it is.
 pub(super) fn placed(
     problem: &Problem,
     progress: &mut dyn Progress,
-) -> Result<Option<(Placed, Option<Searched>)>, Error> {
+) -> Result<Option<(ResolvedFit, Option<Searched>)>, Error> {
     let settings = &problem.settings;
-    let unknown = settings.unknown_world()?;
+    let unknown = settings.unknown_geometry()?;
     let stage = match (&unknown, &settings.band) {
-        (Some(_), _) => Stage::World,
+        (Some(_), _) => Stage::Geometry,
         (None, Some(_)) => Stage::Band,
         _ => return Ok(None),
     };
     let (choice, searched) = match (progress.chosen(stage)?, stage, &unknown) {
         (Some(choice), ..) => (choice, None),
-        (None, Stage::World, Some(unknown)) => {
-            let found = world(problem, unknown, progress)?;
-            let choice = progress.keep(&Found::World(problem, unknown, &found))?;
-            (choice, Some(Searched::World(Box::new(found))))
+        (None, Stage::Geometry, Some(unknown)) => {
+            let found = geometry(problem, unknown, progress)?;
+            let choice = progress.keep(&Found::Geometry(problem, unknown, &found))?;
+            (choice, Some(Searched::Geometry(Box::new(found))))
         }
         _ => {
             let found = band(problem, progress)?;
             (progress.keep(&Found::Band(problem, &found))?, Some(Searched::Band(found)))
         }
     };
-    Ok(Placed::of(problem, &choice)?.map(|placed| (placed, searched)))
+    Ok(ResolvedFit::of(problem, &choice)?.map(|placed| (placed, searched)))
 }
 
-fn world(
+fn geometry(
     problem: &Problem,
-    unknown: &UnknownWorld,
+    unknown: &UnknownGeometry,
     progress: &mut dyn Progress,
-) -> Result<FoundWorld, Error> {
+) -> Result<FoundGeometry, Error> {
     let journal = progress.journal()?;
-    let mut watch = |(search, of): (usize, usize), worlds: usize, least: f64| {
-        progress.goes_on(At::World { search, of, worlds, least })
+    let mut watch = |(search, of): (usize, usize), trials: usize, least: f64| {
+        progress.goes_on(At::Geometry { search, of, trials, least })
     };
     let Problem { settings, measured, .. } = problem;
-    let found = setup::find_world(settings, measured, unknown, &*journal, &mut watch)
+    let found = setup::find_geometry(settings, measured, unknown, &*journal, &mut watch)
         .map_err(|error| error.while_in("search"))?;
     Ok(found.ok_or(Stopped::Kept)?)
 }
@@ -151,11 +151,11 @@ pub(super) fn weighed_before_steps(
 }
 
 /// The settings with what was found in place of priors.
-pub fn settled(file: &FitFile, world: &World) -> FitFile {
+pub fn settled(file: &FitFile, geometry: &Geometry) -> FitFile {
     let mut file = file.clone();
     for (parameter, _, quantity) in file.quantities_mut() {
         if quantity.prior().is_some() {
-            *quantity = (world.get(parameter) / parameter.unit()).into();
+            *quantity = (geometry.get(parameter) / parameter.unit()).into();
         }
     }
     file.search = None;

@@ -8,8 +8,8 @@ use crate::Error;
 use crate::fit::linear::{Change, Ending, LinearProgress, LinearSolution, Voxels};
 use crate::fit::scan::{AxisLoss, AxisProblem, AxisSettings, Effort, refine_axis, scan_axis};
 use crate::fit::settings::{AxisScan as AxisScanSettings, AxisSearch, FitFile, Kind, Start};
-use crate::fit::setup::{self, CoarseView, Given, Measured, SolvedLeakage};
-use crate::fit::{Batch, Beside, Field, Motion, State, Trainer};
+use crate::fit::setup::{self, CoarseView, FitData, SolvedLeakage, WarmStart};
+use crate::fit::{Batch, Field, Motion, State, Trainer, WithStaticImage};
 use crate::representation::{Representation, Workspace};
 use core::ops::ControlFlow;
 use kerrlight_render::dynamics::Axis;
@@ -27,7 +27,7 @@ fn fine(nodes: usize) -> Effort {
 /// The loss over the whole sphere of axes, and the best one.
 fn scan(
     (file, settings): (&FitFile, &AxisScanSettings),
-    measured: &Measured,
+    measured: &FitData,
     motion: &Motion,
     progress: &mut dyn Progress,
 ) -> Result<FoundAxis, Error> {
@@ -82,16 +82,16 @@ impl Fit<'_, '_> {
             let change = setup::change(file, times)?;
             let of = (file, measured, (axis, change), (nodes, stride));
             let solution = solve_linear(of, trainer, progress)?;
-            let given = Given { solution: &solution, nodes, knots: change.knots };
-            let imprinted = setup::imprint(file, trainer.representation, &given, steps, state)?;
-            progress.found(Event::Imprinted(&imprinted))?;
+            let given = WarmStart { solution: &solution, nodes, knots: change.knots };
+            let imprinted = setup::warm_start(file, trainer.representation, &given, steps, state)?;
+            progress.found(Event::WarmStarted(&imprinted))?;
         }
         Ok(())
     }
 }
 
 /// Settings, data, axis and change, nodes and stride of a linear problem.
-type Linear<'a> = (&'a FitFile, &'a Measured, (Axis, Change), (usize, usize));
+type Linear<'a> = (&'a FitFile, &'a FitData, (Axis, Change), (usize, usize));
 
 /// The grid that fits every so many frames best; where leakage is solved for, both in turn.
 fn solve_linear(
@@ -101,7 +101,7 @@ fn solve_linear(
 ) -> Result<LinearSolution<f32>, Error> {
     let voxels = Voxels::cube(nodes.0, file.region.r_max, setup::linear(file)?.degree).field()?;
     let voxels: Box<dyn Representation<f32>> = match trainer.objective.model.quiescent() {
-        Some(image) => Box::new(Beside::new(Box::new(voxels), image)),
+        Some(image) => Box::new(WithStaticImage::new(Box::new(voxels), image)),
         None => Box::new(voxels),
     };
     let grid = match file.representation.kind {

@@ -1,9 +1,9 @@
 //! The verdict in sentences.
 
-use super::evidence::Judged;
+use super::evidence::DataVerdict;
 use crate::fit::verdict::{Errors, Expected, Fault, Outcome, Reason, Tested};
 
-impl Judged {
+impl DataVerdict {
     /// The verdict with χ² of all data that have errors, whatever the verdict rests on.
     pub fn worth(&self) -> String {
         let (headline, chi2) = (self.headline(), self.chi2());

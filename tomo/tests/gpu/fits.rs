@@ -5,7 +5,7 @@ use super::problem::{self, Kind, objective, start, training};
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::graphics::GraphicsFit;
 use kerrlight_tomo::fit::{
-    BatchSize, ChangePrice, Delegate, Outcome, State, StepDevice, Stretch, Taken, Trainer,
+    BatchSize, ChangePrice, DeviceRunner, Outcome, State, StepDevice, Stretch, Taken, Trainer,
     Training, checkpoint,
 };
 use kerrlight_tomo::optimise::{Muon, Polynomial};
@@ -29,7 +29,7 @@ impl Fit<'_> {
             Trainer::new(objective(self.kind), self.representation, self.training.clone());
         if let Some(pause) = pause {
             let fit = self.graphics()?;
-            trainer.device = Some(Delegate::new(Box::new(fit), pause, until));
+            trainer.device = Some(DeviceRunner::new(Box::new(fit), pause, until));
         }
         let mut losses = Vec::new();
         while state.now.step < until {
@@ -242,7 +242,7 @@ fn exact_after_a_lost_device_the_processor_goes_on() {
     let mut state = fit.start();
     let mut trainer = Trainer::new(objective(fit.kind), &small, fit.training.clone());
     let fragile = Fragile { fit: graphics, left: 5 };
-    trainer.device = Some(Delegate::new(Box::new(fragile), 1, 20));
+    trainer.device = Some(DeviceRunner::new(Box::new(fragile), 1, 20));
     for _ in 0..5 {
         trainer.step(&mut state).unwrap();
     }
@@ -265,7 +265,7 @@ fn exact_a_divergence_is_stepped_back_from() {
     let fit = Fit { representation: &small, training, kind: Kind::Images };
     let Some(graphics) = fit.graphics() else { return };
     let mut trainer = Trainer::new(objective(fit.kind), &small, fit.training.clone());
-    trainer.device = Some(Delegate::new(Box::new(graphics), 20, 20));
+    trainer.device = Some(DeviceRunner::new(Box::new(graphics), 20, 20));
     let mut state = fit.start();
     let error = loop {
         match trainer.step(&mut state) {

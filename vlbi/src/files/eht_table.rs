@@ -2,7 +2,7 @@
 
 use super::table;
 use crate::Error;
-use crate::observation::{Observation, Unknown};
+use crate::observation::{MissingMetadata, Observation};
 use core::fmt::Write;
 
 /// How columns are set.
@@ -33,8 +33,8 @@ pub fn to_eht_table(observation: &Observation, style: EhtTable) -> Result<String
         );
         return Err(super::FileError::whole(message).into());
     }
-    let mjd = observation.mjd.ok_or(Unknown("the date (MJD)"))?;
-    let frequency = observation.frequency_hz.ok_or(Unknown("the frequency"))? / 1e9;
+    let mjd = observation.mjd.ok_or(MissingMetadata("the date (MJD)"))?;
+    let frequency = observation.frequency_hz.ok_or(MissingMetadata("the frequency"))? / 1e9;
     let ends = |letter: char| letter.is_control() || matches!(letter, ' ' | ',');
     let source = observation.source.replace(ends, "_");
     let names = table::EHT_COLUMNS;

@@ -29,7 +29,7 @@ pub use text_image::{is_text_image, parse as parse_text_image};
 pub use uvfits::{read as read_uvfits, write as write_uvfits};
 
 use super::array::{MOST_STATIONS, Station};
-use super::observation::{Observation, Unknown};
+use super::observation::{MissingMetadata, Observation};
 use crate::Error;
 use std::collections::HashMap;
 
@@ -58,7 +58,7 @@ pub enum FileError {
     Whole(String),
     /// The data lack what the format needs.
     #[error(transparent)]
-    Unknown(#[from] Unknown),
+    MissingMetadata(#[from] MissingMetadata),
 }
 
 impl FileError {

@@ -6,7 +6,7 @@ use crate::Complex64;
 use crate::Error;
 use crate::array;
 use crate::earth::SourcePosition;
-use crate::observation::{Basis, Observation, Row, Unknown};
+use crate::observation::{Basis, MissingMetadata, Observation, Row};
 use core::fmt::Write;
 
 /// Columns of the data.
@@ -225,11 +225,12 @@ fn row(line: &str, names: &Names) -> Result<Row, String> {
 pub fn to_text(observation: &Observation) -> Result<String, Error> {
     super::one_channel(observation)?;
     super::check_numbers(observation)?;
-    let position =
-        observation.position.ok_or(Unknown("the source's right ascension and declination"))?;
-    let mjd = observation.mjd.ok_or(Unknown("the date (MJD)"))?;
-    let frequency = observation.frequency_hz.ok_or(Unknown("the frequency"))?;
-    let bandwidth = observation.bandwidth_hz.ok_or(Unknown("the bandwidth"))?;
+    let position = observation
+        .position
+        .ok_or(MissingMetadata("the source's right ascension and declination"))?;
+    let mjd = observation.mjd.ok_or(MissingMetadata("the date (MJD)"))?;
+    let frequency = observation.frequency_hz.ok_or(MissingMetadata("the frequency"))?;
+    let bandwidth = observation.bandwidth_hz.ok_or(MissingMetadata("the bandwidth"))?;
     let mut text = format!(
         "# SRC: {}\n# RA: {}\n# DEC: {}\n# MJD: {mjd}\n# RF: {} GHz\n# BW: {} GHz\n",
         observation.source.replace(char::is_control, " "),

@@ -1,7 +1,7 @@
 //! The interstellar medium towards Sgr A*.
 
 use crate::Error;
-use crate::observation::{Observation, Row, Unknown};
+use crate::observation::{MissingMetadata, Observation, Row};
 use core::f64::consts::{LN_2, PI};
 use kerrlight_common::units::{MICROARCSECOND, SPEED_OF_LIGHT};
 
@@ -165,9 +165,12 @@ pub fn unscatter(observation: &mut Observation, kernel: &ScatteringKernel) -> Re
 const LEAST: f64 = 1e-100;
 
 /// A kernel's transform on every row.
-fn factors(observation: &Observation, kernel: &ScatteringKernel) -> Result<Vec<f64>, Unknown> {
+fn factors(
+    observation: &Observation,
+    kernel: &ScatteringKernel,
+) -> Result<Vec<f64>, MissingMetadata> {
     let factor = |row: &Row| {
-        let frequency_hz = observation.frequency_of(row).ok_or(Unknown("the frequency"))?;
+        let frequency_hz = observation.frequency_of(row).ok_or(MissingMetadata("the frequency"))?;
         Ok(kernel.transform(row.uv, frequency_hz))
     };
     observation.rows.iter().map(factor).collect()

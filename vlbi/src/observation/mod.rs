@@ -163,7 +163,7 @@ pub struct Observation {
 /// A metadatum that an operation needs and the observation does not hold.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("the data lack {0}: give it")]
-pub struct Unknown(pub &'static str);
+pub struct MissingMetadata(pub &'static str);
 
 impl Observation {
     /// No data of nothing.

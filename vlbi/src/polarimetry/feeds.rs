@@ -4,7 +4,7 @@ use crate::Complex64;
 use crate::Error;
 use crate::array::{FeedRotation, Station};
 use crate::earth::{Frame, Moment, Ut1, View};
-use crate::observation::{Observation, Unknown};
+use crate::observation::{MissingMetadata, Observation};
 
 /// Stations of 2017: EHT Collaboration 2021, ApJL 910, L12, table 1.
 const FEEDS: &str = include_str!("feeds.csv");
@@ -36,8 +36,8 @@ fn known(line: &str, name: &str) -> Option<FeedRotation> {
 /// # Errors
 /// If the observation does not hold where the source and its stations are, or the day, or UT1 is not known then.
 pub fn turns(observation: &Observation) -> Result<Vec<[Complex64; 2]>, Error> {
-    let source = observation.position.ok_or(Unknown("the position of the source"))?;
-    let mjd = observation.mjd.ok_or(Unknown("the day of the observation"))?;
+    let source = observation.position.ok_or(MissingMetadata("the position of the source"))?;
+    let mjd = observation.mjd.ok_or(MissingMetadata("the day of the observation"))?;
     let positions: Vec<Option<[f64; 3]>> =
         observation.stations.iter().map(|station| station.position).collect();
     let rotations: Vec<FeedRotation> = observation.stations.iter().map(feed_rotation).collect();
@@ -55,7 +55,8 @@ pub fn turns(observation: &Observation) -> Result<Vec<[Complex64; 2]>, Error> {
         };
         last = Some((row.time_h, view));
         let turn = |k: u16| {
-            let position = positions[usize::from(k)].ok_or(Unknown("positions of stations"))?;
+            let position =
+                positions[usize::from(k)].ok_or(MissingMetadata("positions of stations"))?;
             Ok::<_, Error>(turn(&view, position, rotations[usize::from(k)]))
         };
         all.push([turn(row.stations[0])?, turn(row.stations[1])?]);

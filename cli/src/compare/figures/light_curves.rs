@@ -10,7 +10,7 @@ use serde_json::Value;
 
 impl Figures<'_> {
     /// The probability of each unknown, a curve for each case of the first seed.
-    pub(super) fn worlds(&self, asked: &FigureAsked) -> anyhow::Result<Vec<LinePlot>> {
+    pub(super) fn geometries(&self, asked: &FigureAsked) -> anyhow::Result<Vec<LinePlot>> {
         let mut runs: Vec<(String, Value)> = Vec::new();
         for (case, _) in self.chosen(asked).filter(|(case, _)| case.seed == 1) {
             let path = self.runner.run_of(case).join(fit::BAND);

@@ -104,7 +104,7 @@ impl Figures<'_> {
             FigureKind::Curve => drawn.plots.extend(self.curve(asked)),
             FigureKind::Coverage => drawn.plots.extend(self.coverage(asked)?),
             FigureKind::Velocities => drawn.plots.extend(self.velocities(asked)?),
-            FigureKind::Worlds => drawn.plots.extend(self.worlds(asked)?),
+            FigureKind::Geometries => drawn.plots.extend(self.geometries(asked)?),
             FigureKind::Loops => drawn.plots.extend(self.loops(asked)?),
         }
         Ok(())

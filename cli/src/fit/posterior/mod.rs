@@ -1,5 +1,5 @@
 //! `kerrlight posterior`: how sure a fit is. Each draw is the fit of the data with noise once more (randomise, then
-//! optimise: Bardsley et al. 2014), in a world of its own where the world is not known.
+//! optimise: Bardsley et al. 2014), in a geometry of its own where the geometry is not known.
 
 mod page;
 mod predictive;
@@ -7,21 +7,21 @@ mod sample;
 mod summary;
 
 use super::folder::Folder;
+use super::geometry_search;
 use super::held_out;
 use super::run;
-use super::world_search;
 use crate::answer::Answer;
 use crate::checksum::{is_whole, sealed};
-use crate::interrupt::{Interrupted, Keeper};
+use crate::interrupt::{Interrupted, SignalGuard};
 use crate::record::Recorder;
 use crate::{output, progress, session, volume_files};
 use anyhow::{Context, bail};
 use clap::Args;
 use indicatif::ProgressBar;
 use kerrlight_render::volume::{Volume, VolumeFile};
-use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, UnknownWorld};
-use kerrlight_tomo::fit::setup::WorldPosterior;
-use kerrlight_tomo::recovery::{Placed, Problem};
+use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, UnknownGeometry};
+use kerrlight_tomo::fit::setup::GeometryPosterior;
+use kerrlight_tomo::recovery::{Problem, ResolvedFit};
 use kerrlight_tomo::representation::Registry;
 use sample::{Drawn, Through};
 use serde_json::{Value, json};
@@ -79,13 +79,13 @@ impl Posterior {
         let (folder, text) = Folder::look(&self.run)?;
         let prepared = self.prepared(&text, registry)?;
         check(&prepared.settings)?;
-        let unknown = prepared.settings.unknown_world()?;
+        let unknown = prepared.settings.unknown_geometry()?;
         let path = folder.path().join(FOLDER);
         std::fs::create_dir_all(&path)
             .with_context(|| format!("cannot make {}", path.display()))?;
         let drawing = Drawing::new(&prepared, &folder, (unknown.as_ref(), *numbers.end()), &path)?;
         let bar = progress::samples(numbers.clone().count() as u64);
-        let keeper = Keeper::brief("stopping; the same command continues");
+        let keeper = SignalGuard::brief("stopping; the same command continues");
         for number in numbers.clone() {
             if drawing.kept_or_drawn(&path, number.into(), &keeper, &bar)?.is_none() {
                 bar.abandon();
@@ -120,7 +120,7 @@ fn numbers(text: &str) -> Result<Numbers, String> {
 struct Kept {
     /// Emission at the reference time.
     pub volume: Volume,
-    /// The world, where it is not known, and χ² of each loss.
+    /// The geometry, where it is not known, and χ² of each loss.
     pub numbers: Value,
 }
 
@@ -134,7 +134,7 @@ pub fn check(file: &FitFile) -> anyhow::Result<()> {
     }
     if file.band.is_some() {
         bail!(
-            "a fit with [band] has the posterior of its world in band.json: nothing else is drawn around it"
+            "a fit with [band] has the posterior of its geometry in band.json: nothing else is drawn around it"
         );
     }
     Ok(())
@@ -146,10 +146,10 @@ pub fn draw(prepared: &Problem, folder: &Folder, samples: u32) -> anyhow::Result
     let recorder = Recorder::of_process();
     let path = folder.path().join(FOLDER);
     std::fs::create_dir_all(&path).with_context(|| format!("cannot make {}", path.display()))?;
-    let unknown = prepared.settings.unknown_world()?;
+    let unknown = prepared.settings.unknown_geometry()?;
     let drawing = Drawing::new(prepared, folder, (unknown.as_ref(), samples), &path)?;
     let bar = progress::samples(u64::from(samples));
-    let keeper = Keeper::brief(format!("stopping; resume with: {}", again(folder, samples)));
+    let keeper = SignalGuard::brief(format!("stopping; resume with: {}", again(folder, samples)));
     let mut all = Vec::new();
     for number in 1..=u64::from(samples) {
         let Some(kept) = drawing.kept_or_drawn(&path, number, &keeper, &bar)? else {
@@ -175,10 +175,10 @@ fn add_up(
     path: &Path,
     all: &[Kept],
 ) -> anyhow::Result<Answer> {
-    let world = world_search::found(folder)?;
+    let geometry = geometry_search::found(folder)?;
     let truth = prepared.measured.truth.as_ref();
     let truth = truth.map(|t| super::results::true_volume(&prepared.settings, t)).transpose()?;
-    let found = summary::Summary::new(&prepared.settings, world.as_ref(), all, truth)?;
+    let found = summary::Summary::new(&prepared.settings, geometry.as_ref(), all, truth)?;
     page::write(&found, prepared, path)?;
     let numbers = found.numbers();
     output::Output::new(&path.join(NUMBERS), "")?.write(sealed(numbers.clone()).as_bytes())?;
@@ -192,22 +192,22 @@ fn again(folder: &Folder, samples: u32) -> String {
     format!("kerrlight posterior {} --samples {samples}", folder.path().display())
 }
 
-/// Worlds about the one that the run has found.
-fn worlds<'a>(
+/// Geometries about the one that the run has found.
+fn geometries<'a>(
     prepared: &'a Problem,
-    unknown: &'a UnknownWorld,
-    (folder, world): (&Folder, &Value),
-) -> anyhow::Result<WorldPosterior<'a>> {
+    unknown: &'a UnknownGeometry,
+    (folder, geometry): (&Folder, &Value),
+) -> anyhow::Result<GeometryPosterior<'a>> {
     let free = &unknown.free;
-    let best = world_search::world_of(&prepared.settings, free, world)?;
-    let noise = world["noise_factor"].as_f64().unwrap_or(1.0);
-    let spread = world_search::spread_of(free, best, world)?;
-    // Residuals of the best world, but no less than the errors that the search assumed.
-    let left = world["chi2_per_datum"].as_f64().unwrap_or(1.0);
+    let best = geometry_search::geometry_of(&prepared.settings, free, geometry)?;
+    let noise = geometry["noise_factor"].as_f64().unwrap_or(1.0);
+    let spread = geometry_search::spread_of(free, best, geometry)?;
+    // Residuals of the best geometry, but no less than the errors that the search assumed.
+    let left = geometry["chi2_per_datum"].as_f64().unwrap_or(1.0);
     let is_changing = prepared.settings.change.is_some();
     let factor = if is_changing { noise_of(folder)? } else { noise.max(left.sqrt()) };
     let about = (&prepared.settings, &prepared.measured);
-    Ok(WorldPosterior::new(about, unknown, (best, &spread), factor)?)
+    Ok(GeometryPosterior::new(about, unknown, (best, &spread), factor)?)
 }
 
 /// Noise of a draw over the errors of the data: these are too small where the model does not explain them.
@@ -223,8 +223,8 @@ struct Drawing<'a> {
     prepared: &'a Problem,
     /// Settings, with what the run has chosen.
     file: FitFile,
-    unknown: Option<&'a UnknownWorld>,
-    worlds: Option<WorldPosterior<'a>>,
+    unknown: Option<&'a UnknownGeometry>,
+    geometries: Option<GeometryPosterior<'a>>,
     /// Noise of a draw over the errors of the data.
     factor: f64,
 }
@@ -234,23 +234,23 @@ impl<'a> Drawing<'a> {
     fn new(
         prepared: &'a Problem,
         folder: &Folder,
-        (unknown, samples): (Option<&'a UnknownWorld>, u32),
+        (unknown, samples): (Option<&'a UnknownGeometry>, u32),
         path: &Path,
     ) -> anyhow::Result<Self> {
-        let world = world_search::found(folder)?;
+        let geometry = geometry_search::found(folder)?;
         let complete = (1..=u64::from(samples)).all(|number| names(path, number)[1].is_file());
-        let worlds = match (unknown, &world) {
-            (Some(unknown), Some(world)) if !complete => {
-                Some(worlds(prepared, unknown, (folder, world))?)
+        let geometries = match (unknown, &geometry) {
+            (Some(unknown), Some(geometry)) if !complete => {
+                Some(geometries(prepared, unknown, (folder, geometry))?)
             }
             _ => None,
         };
-        let factor = match &worlds {
-            Some(worlds) => worlds.factor(),
+        let factor = match &geometries {
+            Some(geometries) => geometries.factor(),
             None => noise_of(folder)?,
         };
         let file = held_out::settled(&prepared.settings, folder)?;
-        Ok(Self { prepared, file, unknown, worlds, factor })
+        Ok(Self { prepared, file, unknown, geometries, factor })
     }
 
     /// A draw of an earlier call, or a new one; none if it was stopped.
@@ -258,7 +258,7 @@ impl<'a> Drawing<'a> {
         &self,
         path: &Path,
         number: u64,
-        keeper: &Keeper,
+        keeper: &SignalGuard,
         bar: &ProgressBar,
     ) -> anyhow::Result<Option<Kept>> {
         if let Some(kept) = kept(path, number)? {
@@ -272,7 +272,7 @@ impl<'a> Drawing<'a> {
     fn one(
         &self,
         number: u64,
-        keeper: &Keeper,
+        keeper: &SignalGuard,
         told: &dyn Fn(&str),
     ) -> anyhow::Result<Option<(Drawn, Value)>> {
         let Problem { instrument, measured, motion, registry, .. } = self.prepared;
@@ -284,21 +284,21 @@ impl<'a> Drawing<'a> {
             *nodes = other_voxels(*nodes, number);
         }
         let noise = seed(&file, number);
-        let (Some(unknown), Some(worlds)) = (self.unknown, &self.worlds) else {
+        let (Some(unknown), Some(geometries)) = (self.unknown, &self.geometries) else {
             let data = measured.perturbed(&file.loss, self.factor, noise)?;
             let through = Through { file: &file, instrument, motion, registry, measured };
             let drawn = sample::draw(&through, &data, keeper, told)?;
             return Ok(drawn.map(|drawn| (drawn, Value::Null)));
         };
-        told("the world");
-        let data = worlds.data(noise)?;
-        let world = worlds.draw(number);
-        let Placed { file, instrument, motion, .. } =
-            Placed::in_world(self.prepared, &file, (&world, number))?;
+        told("the geometry");
+        let data = geometries.data(noise)?;
+        let geometry = geometries.draw(number);
+        let ResolvedFit { file, instrument, motion, .. } =
+            ResolvedFit::in_geometry(self.prepared, &file, (&geometry, number))?;
         let through =
             Through { file: &file, instrument: &instrument, motion: &motion, registry, measured };
         let drawn = sample::draw(&through, &data, keeper, told)?;
-        let values = world_search::values_of(&unknown.free, &world);
+        let values = geometry_search::values_of(&unknown.free, &geometry);
         Ok(drawn.map(|drawn| (drawn, values)))
     }
 }
@@ -336,13 +336,13 @@ fn keep(
     folder: &Path,
     number: u64,
     factor: f64,
-    (drawn, world): (Drawn, Value),
+    (drawn, geometry): (Drawn, Value),
 ) -> anyhow::Result<Kept> {
     let [volume, numbers] = names(folder, number);
     let file = VolumeFile { volume: drawn.volume.clone(), axis: None };
     output::Output::new(&volume, "")?.write(&file.to_npz())?;
     let of_draw = json!({
-        "world": world, "chi2_per_datum": drawn.chi2, "noise_factor": factor,
+        "geometry": geometry, "chi2_per_datum": drawn.chi2, "noise_factor": factor,
         "predicted": drawn.predicted,
     });
     // Last: with it the draw is whole.

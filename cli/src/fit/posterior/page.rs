@@ -11,7 +11,7 @@ use kerrlight_render::volume::{Shown, Volume, VolumeFile, vti};
 use kerrlight_tomo::recovery::Problem;
 use std::path::Path;
 
-/// Writes mean.npz, deviation.npz, posterior.vti, worlds.csv, triangle.svg and the page of draws.
+/// Writes mean.npz, deviation.npz, posterior.vti, geometries.csv, triangle.svg and the page of draws.
 pub fn write(found: &Summary, prepared: &Problem, folder: &Path) -> anyhow::Result<()> {
     let file = |name: &str| Output::new(&folder.join(name), "");
     let noise = found.ensemble.signal_to_noise()?;
@@ -31,7 +31,7 @@ pub fn write(found: &Summary, prepared: &Problem, folder: &Path) -> anyhow::Resu
     file("posterior.vti")?.write_with(write)?;
     let triangle = triangle(found);
     if let Some(triangle) = &triangle {
-        file("worlds.csv")?.write(table(&found.world).as_bytes())?;
+        file("geometries.csv")?.write(table(&found.geometry).as_bytes())?;
         file("triangle.svg")?.write(triangle.svg().as_bytes())?;
     }
     let hole_radius = prepared.instrument.hole.horizon();
@@ -90,26 +90,26 @@ fn triangle(found: &Summary) -> Option<Triangle> {
         values: interval.values.clone(),
         truth: interval.truth,
     };
-    let variables: Vec<Variable> = found.world.iter().map(one).collect();
+    let variables: Vec<Variable> = found.geometry.iter().map(one).collect();
     (!variables.is_empty()).then_some(Triangle { variables })
 }
 
 fn drawing(triangle: &Triangle) -> Drawing {
     Drawing {
         svg: triangle.svg(),
-        caption: "Draws of the world: each parameter's distribution on the diagonal, each pair's below it. Orange: what was \
+        caption: "Draws of the geometry: each parameter's distribution on the diagonal, each pair's below it. Orange: what was \
                   simulated, where the data are a simulation."
             .to_owned(),
         alt: "Triangle of the marginal distributions of all unknown parameters.".to_owned(),
     }
 }
 
-fn table(world: &[Interval]) -> String {
-    let names: Vec<&str> = world.iter().map(|interval| interval.parameter.name()).collect();
-    let count = world.first().map_or(0, |interval| interval.values.len());
+fn table(geometry: &[Interval]) -> String {
+    let names: Vec<&str> = geometry.iter().map(|interval| interval.parameter.name()).collect();
+    let count = geometry.first().map_or(0, |interval| interval.values.len());
     let row = |k: usize| {
         let values: Vec<String> =
-            world.iter().map(|interval| format!("{:?}", interval.values[k])).collect();
+            geometry.iter().map(|interval| format!("{:?}", interval.values[k])).collect();
         format!("{}\n", values.join(","))
     };
     format!("{}\n{}", names.join(","), (0..count).map(row).collect::<String>())

@@ -3,13 +3,13 @@
 use super::super::failed;
 use super::super::results::verdict::Evidence;
 use super::predictive::Check;
-use crate::interrupt::Keeper;
+use crate::interrupt::SignalGuard;
 use anyhow::{Context, bail};
 use kerrlight_common::frames::Frames;
 use kerrlight_render::volume::Volume;
 use kerrlight_tomo::fit::linear::LinearProgress;
 use kerrlight_tomo::fit::settings::{FitFile, Kind, Start};
-use kerrlight_tomo::fit::setup::{self, Instrument, Measured};
+use kerrlight_tomo::fit::setup::{self, FitData, Instrument};
 use kerrlight_tomo::fit::verdict::Tested;
 use kerrlight_tomo::fit::{Motion, Objective, State, Trainer};
 use kerrlight_tomo::representation::Registry;
@@ -20,16 +20,16 @@ const PRIOR: u64 = 0x7072_696f_7200_0000;
 
 /// What a fit goes through.
 pub struct Through<'a> {
-    /// Settings, with the world that the draw has.
+    /// Settings, with the geometry that the draw has.
     pub file: &'a FitFile,
-    /// Rays of that world.
+    /// Rays of that geometry.
     pub instrument: &'a Instrument,
-    /// Motion of that world.
+    /// Motion of that geometry.
     pub motion: &'a Motion,
     /// Representations of others.
     pub registry: &'a Registry,
     /// The data as they were measured.
-    pub measured: &'a Measured,
+    pub measured: &'a FitData,
 }
 
 /// What a draw found.
@@ -45,8 +45,8 @@ pub struct Drawn {
 /// Fits `measured` from the start, with draws of the representation's parameters of their own; none if it was stopped.
 pub fn draw(
     through: &Through<'_>,
-    measured: &Measured,
-    keeper: &Keeper,
+    measured: &FitData,
+    keeper: &SignalGuard,
     told: &dyn Fn(&str),
 ) -> anyhow::Result<Option<Drawn>> {
     let Through { file, instrument, motion, registry, .. } = *through;
@@ -107,7 +107,7 @@ fn begin(
     trainer: &mut Trainer<'_, f32>,
     state: &mut State<f32>,
     times: [f64; 2],
-    (keeper, told): (&Keeper, &dyn Fn(&str)),
+    (keeper, told): (&SignalGuard, &dyn Fn(&str)),
 ) -> anyhow::Result<bool> {
     let is_linear = file.representation.kind == Kind::LinearGrid;
     let change = setup::change(file, times)?;
@@ -130,8 +130,8 @@ fn begin(
     if is_linear {
         state.now.parameters = solution.parameters();
     } else {
-        let given = setup::Given { solution: &solution, nodes, knots: change.knots };
-        setup::imprint(file, trainer.representation, &given, steps, state)?;
+        let given = setup::WarmStart { solution: &solution, nodes, knots: change.knots };
+        setup::warm_start(file, trainer.representation, &given, steps, state)?;
     }
     Ok(true)
 }
@@ -140,7 +140,7 @@ fn begin(
 fn learn(
     trainer: &mut Trainer<'_, f32>,
     state: &mut State<f32>,
-    (steps, keeper): (u64, &Keeper),
+    (steps, keeper): (u64, &SignalGuard),
     told: &dyn Fn(&str),
 ) -> anyhow::Result<bool> {
     while state.now.step < steps {

@@ -1,18 +1,18 @@
-//! What follows from draws: intervals of the world, mean and spread of the volume, features, and how often a known truth
+//! What follows from draws: intervals of the geometry, mean and spread of the volume, features, and how often a known truth
 //! lies inside.
 
 use super::Kept;
 use super::predictive::{self, Check};
 use kerrlight_render::volume::ranks::{Ranks, rank};
 use kerrlight_render::volume::{Coverage, Ensemble, Feature, Volume};
+use kerrlight_tomo::fit::geometry::Parameter;
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::setup;
-use kerrlight_tomo::fit::world::Parameter;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde_json::{Map, Value, json};
 
-/// A parameter of the world over the draws, in its own unit.
+/// A parameter of the geometry over the draws, in its own unit.
 pub struct Interval {
     /// Which.
     pub parameter: Parameter,
@@ -36,8 +36,8 @@ pub struct Interval {
 pub struct Summary {
     /// Mean and standard deviation of the volume.
     pub ensemble: Ensemble,
-    /// The world, where it is not known.
-    pub world: Vec<Interval>,
+    /// The geometry, where it is not known.
+    pub geometry: Vec<Interval>,
     /// Bright features, the brightest first.
     pub features: Vec<Feature>,
     /// How often the truth lies inside: at random nodes of the region, and at those that shine.
@@ -70,21 +70,21 @@ const SHINES: f32 = 0.05;
 const BRIGHT: f32 = 0.25;
 /// What has ranks, as [`Summary::ranks`] and keys of the numbers.
 pub const RANKED: [&str; 3] = ["random_nodes", "bright_nodes", "feature_radius"];
-/// Between the name of a parameter of the world and a part, in keys that say whether the middle draws hold its truth.
+/// Between the name of a parameter of the geometry and a part, in keys that say whether the middle draws hold its truth.
 pub const WITHIN: &str = "_drawn_within_";
 
 impl Summary {
-    /// Of draws of a fit, with what its run has found of the world, and the truth where there is one.
+    /// Of draws of a fit, with what its run has found of the geometry, and the truth where there is one.
     pub fn new(
         file: &FitFile,
-        world: Option<&Value>,
+        geometry: Option<&Value>,
         draws: &[Kept],
         truth: Option<Volume>,
     ) -> anyhow::Result<Self> {
         let volumes: Vec<Volume> = draws.iter().map(|draw| draw.volume.clone()).collect();
         let ensemble = Ensemble::of(&volumes)?;
         let features = ensemble.features(&volumes);
-        let world = world.map_or(Vec::new(), |world| intervals(file, world, draws));
+        let geometry = geometry.map_or(Vec::new(), |geometry| intervals(file, geometry, draws));
         let coverage = truth.as_ref().map(|truth| covered(file, &ensemble, truth)).transpose()?;
         let ranked = |truth: &Volume| ranks(file, (&ensemble, &features), &volumes, truth);
         let ranks = truth.as_ref().map(ranked).transpose()?;
@@ -95,7 +95,7 @@ impl Summary {
         let factor = factors.fold(1.0, f64::max);
         Ok(Self {
             ensemble,
-            world,
+            geometry,
             features,
             coverage,
             ranks,
@@ -110,7 +110,7 @@ impl Summary {
 
     /// Numbers for a script.
     pub fn numbers(&self) -> Value {
-        let world: Map<String, Value> = self.world.iter().map(Interval::numbers).collect();
+        let geometry: Map<String, Value> = self.geometry.iter().map(Interval::numbers).collect();
         let degrees = |[mean, deviation]: [f64; 2]| [mean.to_degrees(), deviation.to_degrees()];
         let feature = |f: &Feature| {
             json!({
@@ -127,7 +127,7 @@ impl Summary {
             "samples": self.samples,
             "effective_samples": self.samples,
             "noise_factor": self.factor,
-            "world": world,
+            "geometry": geometry,
             "features": self.features.iter().map(feature).collect::<Vec<_>>(),
             "light_above_3_sigma": self.certain,
             "predicted": self.predicted,
@@ -135,7 +135,7 @@ impl Summary {
             "coverage_random_nodes": random,
             "coverage_bright_nodes": bright,
         });
-        for (key, within) in self.world.iter().flat_map(Interval::within) {
+        for (key, within) in self.geometry.iter().flat_map(Interval::within) {
             all[key] = json!(within);
         }
         for (name, ranks) in RANKED.iter().zip(self.ranks.iter().flatten()) {
@@ -159,7 +159,7 @@ impl Summary {
             ));
         }
         all.extend(self.predicted.iter().map(Check::sentence));
-        all.extend(self.world.iter().map(Interval::sentence));
+        all.extend(self.geometry.iter().map(Interval::sentence));
         all.extend(self.features.iter().enumerate().map(|(k, f)| {
             let ([r, dr], [phi, dphi]) = (f.radius, f.azimuth.map(f64::to_degrees));
             format!(
@@ -233,21 +233,21 @@ impl Interval {
     }
 }
 
-fn intervals(file: &FitFile, world: &Value, draws: &[Kept]) -> Vec<Interval> {
+fn intervals(file: &FitFile, geometry: &Value, draws: &[Kept]) -> Vec<Interval> {
     let mut places = Pcg64::seed_from_u64(file.seed.wrapping_add(3));
     let one = |parameter: Parameter| {
         let name = parameter.name();
-        let best = world["world"][name].as_f64()?;
+        let best = geometry["geometry"][name].as_f64()?;
         let unit = parameter.unit();
         // Angles that differ by a whole turn are the same: the short way from the best one.
         let near = |x: f64| best + parameter.difference(x * unit, best * unit) / unit;
-        let of = |draw: &Kept| draw.numbers["world"][name].as_f64().map(near);
+        let of = |draw: &Kept| draw.numbers["geometry"][name].as_f64().map(near);
         let values: Vec<f64> = draws.iter().filter_map(of).collect();
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let squares: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
-        let bound = |k: usize| world["bounds"][name][k].as_f64().unwrap_or(f64::NAN);
-        let truth = world["truth"][name].as_f64().map(near);
+        let bound = |k: usize| geometry["bounds"][name][k].as_f64().unwrap_or(f64::NAN);
+        let truth = geometry["truth"][name].as_f64().map(near);
         Some(Interval {
             rank: truth.map(|truth| rank(truth, values.iter().copied(), &mut places)),
             parameter,
@@ -255,7 +255,7 @@ fn intervals(file: &FitFile, world: &Value, draws: &[Kept]) -> Vec<Interval> {
             deviation: (squares / (n - 1.0)).sqrt(),
             values,
             bounds: [bound(0), bound(1)],
-            open: world["open"][name] == true,
+            open: geometry["open"][name] == true,
             truth,
         })
     };

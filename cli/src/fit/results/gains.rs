@@ -7,7 +7,7 @@ use crate::report::{Axis, LinePlot, Marks, Series, Table};
 use kerrlight_common::frames::Frames;
 use kerrlight_imaging::data::station_of_file;
 use kerrlight_tomo::fit::settings::LossKind;
-use kerrlight_tomo::fit::setup::Measured;
+use kerrlight_tomo::fit::setup::FitData;
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::gains::{GainDistance, GainTable, StationGain};
@@ -27,7 +27,7 @@ pub struct Gains {
 }
 
 /// The gains of the stations of one file of several, by their own names.
-fn of_file(table: &GainTable, measured: &Measured, file: usize) -> GainTable {
+fn of_file(table: &GainTable, measured: &FitData, file: usize) -> GainTable {
     if measured.files.iter().all(|file| *file == 0) {
         return table.clone();
     }
@@ -94,7 +94,7 @@ impl Gains {
         Self::written(table, measured, folder).map(Some)
     }
 
-    fn written(table: GainTable, measured: &Measured, folder: &Folder) -> anyhow::Result<Self> {
+    fn written(table: GainTable, measured: &FitData, folder: &Folder) -> anyhow::Result<Self> {
         for file in 0..=measured.files.iter().copied().max().unwrap_or(0) {
             let own = of_file(&table, measured, file);
             let name = if file == 0 { TABLE.to_owned() } else { format!("gains_{}.csv", file + 1) };

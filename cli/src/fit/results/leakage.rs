@@ -5,7 +5,7 @@ use crate::fit::folder::Folder;
 use crate::fit::leakage::TABLE;
 use crate::report::{Axis, LinePlot, Marks, Series, Table};
 use kerrlight_common::frames::Frames;
-use kerrlight_tomo::fit::setup::Measured;
+use kerrlight_tomo::fit::setup::FitData;
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::polarimetry::{LeakageDistance, LeakageTable, StationLeakage};
 use serde_json::{Value, json};
@@ -32,7 +32,7 @@ impl Leakage {
     /// Writes its table.
     pub fn written(
         table: LeakageTable,
-        measured: &Measured,
+        measured: &FitData,
         folder: &Folder,
     ) -> anyhow::Result<Self> {
         folder.file(TABLE)?.write(files::leakage_to_csv(&table).as_bytes())?;

@@ -8,7 +8,7 @@ pub fn sentences(scattering: Option<Scattering>, variability: Option<Variability
         "Diffractive scattering towards Sgr A* (Johnson et al. 2018) is part of the model: visibilities and errors were divided by its kernel, so that amplitudes below are those of the source behind the screen. Refraction is left out."
             .to_owned()
     });
-    let varies = variability.map(|law| {
+    let has_intrinsic_variability = variability.map(|law| {
         format!(
             "The source varies: {} Jy/(1 + (|u|/{:e})²)^{} was added to all errors in quadrature. χ² is that of data with these \
              errors.",
@@ -17,5 +17,5 @@ pub fn sentences(scattering: Option<Scattering>, variability: Option<Variability
             0.5 * law.power
         )
     });
-    scattered.into_iter().chain(varies).collect()
+    scattered.into_iter().chain(has_intrinsic_variability).collect()
 }

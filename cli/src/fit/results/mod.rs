@@ -25,7 +25,7 @@ use kerrlight_common::frames::Frames;
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_render::volume::{Volume, VolumeFile, vti};
 use kerrlight_tomo::fit::settings::FitFile;
-use kerrlight_tomo::fit::setup::{self, Instrument, Measured, Still, StillView};
+use kerrlight_tomo::fit::setup::{self, FitData, Instrument, PreviewImage, PreviewView};
 use kerrlight_tomo::fit::{Loss, Motion, State};
 use kerrlight_tomo::recovery::Fit;
 use kerrlight_vlbi::files::images;
@@ -34,7 +34,7 @@ use over_time::Changes;
 use quiescent::Quiescent;
 use serde_json::Value;
 use std::time::Instant;
-use verdict::{Evidence, Judged};
+use verdict::{DataVerdict, Evidence};
 
 /// All that the results are made of.
 pub struct Estimate<'a> {
@@ -47,7 +47,7 @@ pub struct Estimate<'a> {
     /// Motion.
     pub motion: &'a Motion,
     /// Data.
-    pub measured: &'a Measured,
+    pub measured: &'a FitData,
     /// Emission that was simulated.
     pub true_volume: Option<Volume>,
     /// The graphics device that took the last steps, if one did.
@@ -166,9 +166,9 @@ impl Estimate<'_> {
         Some(("field_uas", vec![sky.pixel_rad / MICROARCSECOND * n]))
     }
 
-    fn still_view(&self) -> StillView<'_> {
+    fn still_view(&self) -> PreviewView<'_> {
         let Self { file, instrument, motion, measured, .. } = *self;
-        StillView { file, instrument, motion, truth: measured.truth.as_ref() }
+        PreviewView { file, instrument, motion, truth: measured.truth.as_ref() }
     }
 
     /// When the still image is seen, M: at the reference time, or in the middle of the data if that lies outside of them.
@@ -185,13 +185,13 @@ pub struct Found<'a> {
     volume: Volume,
     /// The emission over time, where it is not the same at all times.
     changes: Option<Changes>,
-    still: Still,
+    still: PreviewImage,
     loss: Loss,
     /// What the mask of what shines leaves out, of the flux; nothing without a mask.
     mask: Option<f64>,
     /// What sums along rays are off by, over the errors of the data, where that is known.
     quadrature: Option<f64>,
-    judged: Judged,
+    judged: DataVerdict,
     /// Gains of stations, where they are solved for.
     gains: Option<Gains>,
     /// Leakage of stations, where it is solved for.

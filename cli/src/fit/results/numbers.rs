@@ -1,7 +1,7 @@
 //! What was found, in numbers.
 
 use super::{Estimate, Found, bounds, quadrature, verdict};
-use crate::fit::{band_search, closures, held_out, linear, world_results, world_search};
+use crate::fit::{band_search, closures, geometry_results, geometry_search, held_out, linear};
 use crate::report;
 use crate::session;
 use crate::usage::usage;
@@ -89,7 +89,7 @@ impl Estimate<'_> {
         if let Some(closures) = closures::json(self.measured, &self.file.loss) {
             results["closures"] = closures;
         }
-        self.add_worlds(&mut results)?;
+        self.add_geometries(&mut results)?;
         let unknown = self.file.unknowns();
         if !unknown.is_empty() {
             results["unknown"] = json!(unknown);
@@ -125,11 +125,13 @@ impl Estimate<'_> {
         Ok(())
     }
 
-    /// The worlds that were found, where they were not known.
-    fn add_worlds(&self, results: &mut Value) -> anyhow::Result<()> {
-        if let Some(world) = world_search::found(self.folder)? {
-            world_results::errors(&world).into_iter().for_each(|(key, value)| results[key] = value);
-            results["world"] = world;
+    /// The geometries that were found, where they were not known.
+    fn add_geometries(&self, results: &mut Value) -> anyhow::Result<()> {
+        if let Some(geometry) = geometry_search::found(self.folder)? {
+            geometry_results::errors(&geometry)
+                .into_iter()
+                .for_each(|(key, value)| results[key] = value);
+            results["geometry"] = geometry;
         }
         if let Some(band) = band_search::found(self.folder)? {
             band_search::numbers(&band).into_iter().for_each(|(key, value)| results[key] = value);

@@ -11,7 +11,7 @@ use super::{Estimate, Found, bounds, quadrature};
 use crate::fit::SETTINGS;
 use crate::fit::curves::{loss_plot, psnr_plot};
 use crate::fit::folder::Folder;
-use crate::fit::{band_plots, band_search, band_words, held_out, world_results};
+use crate::fit::{band_plots, band_search, band_words, geometry_results, held_out};
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
 use anyhow::Context;
@@ -20,7 +20,7 @@ use kerrlight_render::volume::Shown;
 use kerrlight_render::volume::projection::Surroundings;
 use kerrlight_render::volume::slices::Through;
 use kerrlight_tomo::fit::settings::{AxisSearch, DataFiles, FitFile};
-use kerrlight_tomo::fit::setup::Still;
+use kerrlight_tomo::fit::setup::PreviewImage;
 use serde_json::Value;
 
 /// Emission in Jy/pixel a M would mean little: 1 M of emission 1 gives `screen.jy_per_pixel`.
@@ -118,7 +118,7 @@ impl Estimate<'_> {
         if self.measured.truth.is_some() { "truth" } else { "data" }
     }
 
-    fn lensed(&self, still: &Still) -> anyhow::Result<report::Figure> {
+    fn lensed(&self, still: &PreviewImage) -> anyhow::Result<report::Figure> {
         let mut images = vec![("recovered", &still.recovered)];
         images.extend(still.truth.as_ref().map(|truth| ("truth", truth)));
         let delay = self.file.effects.slow_light;
@@ -192,8 +192,8 @@ impl Estimate<'_> {
         let file = self.file;
         let number = |key: &str| results[key].as_f64();
         let mut lines = vec![self.subject(results)];
-        if results["world"].is_object() {
-            lines.extend(world_results::sentences(&results["world"]));
+        if results["geometry"].is_object() {
+            lines.extend(geometry_results::sentences(&results["geometry"]));
         }
         if results["band"].is_object() {
             lines.extend(band_search::sentences(&results["band"]));

@@ -1,10 +1,10 @@
 //! Residuals on the sky and on baselines.
 
-use super::verdict::{Judged, parts};
+use super::verdict::{DataVerdict, parts};
 use super::{Estimate, Found};
 use crate::report::{self, Figure, LinePlot};
 use kerrlight_tomo::fit::settings::LossKind;
-use kerrlight_tomo::fit::setup::Measured;
+use kerrlight_tomo::fit::setup::FitData;
 use kerrlight_tomo::fit::verdict::Tested;
 use kerrlight_vlbi::dirty_image;
 use num_complex::Complex;
@@ -65,7 +65,7 @@ impl Estimate<'_> {
 }
 
 /// Residuals over time and over baselines.
-pub fn plots(judged: &Judged, measured: &Measured) -> Vec<LinePlot> {
+pub fn plots(judged: &DataVerdict, measured: &FitData) -> Vec<LinePlot> {
     let lengths = baselines(measured);
     let length = |[a, b]: [u16; 2]| lengths.get(&[a.min(b), a.max(b)]).copied();
     [parts::over_time(judged), parts::over_baselines(judged, length)]
@@ -75,7 +75,7 @@ pub fn plots(judged: &Judged, measured: &Measured) -> Vec<LinePlot> {
 }
 
 /// Mean lengths of baselines, 10⁹ wavelengths.
-fn baselines(measured: &Measured) -> HashMap<[u16; 2], f64> {
+fn baselines(measured: &FitData) -> HashMap<[u16; 2], f64> {
     let mut sums: HashMap<[u16; 2], [f64; 2]> = HashMap::new();
     let rows = measured.visibilities.iter().flat_map(|(observation, _)| observation.stokes_i());
     for (row, _) in rows {

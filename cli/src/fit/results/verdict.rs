@@ -6,12 +6,12 @@ mod tests;
 
 use crate::report::{Notice, Table, Tone};
 use kerrlight_tomo::fit::verdict::{Errors, Outcome, Tested, worst};
-pub use kerrlight_tomo::recovery::{Evidence, Judged};
+pub use kerrlight_tomo::recovery::{DataVerdict, Evidence};
 use kerrlight_tomo::recovery::{range_of, short};
 use serde_json::{Value, json};
 
 /// For results.json.
-pub fn json(judged: &Judged) -> Value {
+pub fn json(judged: &DataVerdict) -> Value {
     let outcome = match judged.verdict.outcome {
         Outcome::Explained => "explained",
         Outcome::Reproduced => "reproduced",
@@ -36,7 +36,7 @@ pub fn json(judged: &Judged) -> Value {
     all
 }
 
-fn term(judged: &Judged, name: &str, tested: &Tested) -> Value {
+fn term(judged: &DataVerdict, name: &str, tested: &Tested) -> Value {
     let Tested { statistics, errors, expected } = tested;
     let errors = match errors {
         Errors::Known => "noise",
@@ -79,7 +79,7 @@ fn term(judged: &Judged, name: &str, tested: &Tested) -> Value {
 }
 
 /// What stands first on the page.
-pub fn notice(judged: &Judged) -> Notice {
+pub fn notice(judged: &DataVerdict) -> Notice {
     let tone = match judged.verdict.outcome {
         Outcome::Explained => Tone::Good,
         Outcome::Reproduced => Tone::Plain,
@@ -106,7 +106,7 @@ pub fn notice(judged: &Judged) -> Notice {
 }
 
 /// Residuals of all kinds of data.
-pub fn table(judged: &Judged) -> Table {
+pub fn table(judged: &DataVerdict) -> Table {
     let head = [
         "data",
         "number",
@@ -146,7 +146,7 @@ pub fn table(judged: &Judged) -> Table {
 }
 
 /// The worst station, group of stations and frame with their χ² per data point.
-fn worst_parts(judged: &Judged, tested: &Tested) -> String {
+fn worst_parts(judged: &DataVerdict, tested: &Tested) -> String {
     let statistics = &tested.statistics;
     let station = worst(statistics.stations.iter())
         .map(|(station, _, chi2)| format!("{} {}", judged.names(&[*station]), short(chi2)));

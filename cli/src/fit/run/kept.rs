@@ -4,9 +4,9 @@ use super::folder::{self, Folder};
 use crate::devices::FitDevice;
 use crate::fit::journal::Journal;
 use crate::fit::{
-    axis_scan, band_search, closures, delegate, held_out, leakage, linear, world_search,
+    axis_scan, band_search, closures, device_runner, geometry_search, held_out, leakage, linear,
 };
-use crate::interrupt::Keeper;
+use crate::interrupt::SignalGuard;
 use crate::plain;
 use crate::progress;
 use crate::session;
@@ -15,7 +15,7 @@ use indicatif::ProgressBar;
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
 use kerrlight_tomo::fit::setup;
-use kerrlight_tomo::fit::{Delegate, Outcome, State, Trainer, checkpoint, journal};
+use kerrlight_tomo::fit::{DeviceRunner, Outcome, State, Trainer, checkpoint, journal};
 use kerrlight_tomo::recovery::{At, Choice, Event, Found, Now, Problem, Progress, Resumed, Stage};
 use std::time::Instant;
 
@@ -28,7 +28,7 @@ pub struct Kept<'a> {
     device: Option<FitDevice>,
     pub(super) begun: Instant,
     /// The work that goes on: how it is stopped, and its bar.
-    work: Option<(Keeper, Option<(&'static str, ProgressBar)>)>,
+    work: Option<(SignalGuard, Option<(&'static str, ProgressBar)>)>,
 }
 
 /// An error of the folder, as one of the fit.
@@ -39,7 +39,7 @@ fn kept(error: anyhow::Error) -> Error {
 /// What goes on.
 fn name(at: At<'_>) -> &'static str {
     match at {
-        At::World { .. } => "world",
+        At::Geometry { .. } => "geometry",
         At::Band(_) => "band",
         At::HeldOut(..) => "held out",
         At::Axis(..) => "axis",
@@ -67,30 +67,32 @@ impl<'a> Kept<'a> {
     }
 
     /// What stops work of this kind.
-    fn keeper(&self, at: At<'_>) -> Keeper {
+    fn keeper(&self, at: At<'_>) -> SignalGuard {
         match at {
             At::Step(_) => {
-                Keeper::saving("stopping after this step; a second signal quits at once")
+                SignalGuard::saving("stopping after this step; a second signal quits at once")
             }
             At::Axis(..) => {
-                Keeper::brief("stopped while axes were being scanned: nothing is kept of that")
+                SignalGuard::brief("stopped while axes were being scanned: nothing is kept of that")
             }
-            At::Linear(_) => Keeper::brief(
+            At::Linear(_) => SignalGuard::brief(
                 "stopped while the linear grid was being solved: nothing is kept of that",
             ),
-            _ => Keeper::brief(self.folder.stopped()),
+            _ => SignalGuard::brief(self.folder.stopped()),
         }
     }
 
     fn bar(&self, at: At<'_>) -> ProgressBar {
         let settings = &self.problem.settings;
         match at {
-            At::World { .. } => progress::worlds(world_search::planned(settings).unwrap_or(0)),
+            At::Geometry { .. } => {
+                progress::geometries(geometry_search::planned(settings).unwrap_or(0))
+            }
             At::Band(_) => {
                 let count = settings.band.as_ref().map_or(0, |band| {
                     band.inclinations_deg.values().len() * band.rotation_factors.len()
                 });
-                progress::worlds(count as u64)
+                progress::geometries(count as u64)
             }
             At::HeldOut(..) => {
                 let held = settings.held_out.as_ref();
@@ -105,9 +107,9 @@ impl<'a> Kept<'a> {
     fn shows(&self, at: At<'_>, bar: &ProgressBar) {
         let settings = &self.problem.settings;
         match at {
-            At::World { search, of, worlds, least } => {
-                let each = world_search::each(settings).unwrap_or(0);
-                bar.set_position((search * each + worlds) as u64);
+            At::Geometry { search, of, trials, least } => {
+                let each = geometry_search::each(settings).unwrap_or(0);
+                bar.set_position((search * each + trials) as u64);
                 bar.set_message(format!("search {} of {of}, least chi2/2 {least:.5e}", search + 1));
             }
             At::Band(done) => bar.set_position(done as u64),
@@ -166,7 +168,7 @@ impl<'a> Kept<'a> {
                 }
                 Ok(())
             }
-            Event::Imprinted(found) => folder.log(&linear::imprinted(found)),
+            Event::WarmStarted(found) => folder.log(&linear::imprinted(found)),
             Event::Round(round, found) => {
                 let moved = found.moved;
                 eprintln!("leakage, round {round}: the largest change is {moved:.2e}");
@@ -200,9 +202,9 @@ impl<'a> Kept<'a> {
     fn written(&self, found: &Found<'_>) -> anyhow::Result<Option<Choice>> {
         let folder = self.folder;
         match found {
-            Found::World(problem, unknown, found) => {
-                world_search::write(folder, problem, unknown, found)?;
-                world_search::chosen(folder, &problem.settings)
+            Found::Geometry(problem, unknown, found) => {
+                geometry_search::write(folder, problem, unknown, found)?;
+                geometry_search::chosen(folder, &problem.settings)
             }
             Found::Band(problem, scan) => {
                 band_search::write(folder, problem, scan)?;
@@ -237,14 +239,14 @@ impl Progress for Kept<'_> {
 
     fn journal(&mut self) -> Result<Box<dyn journal::Journal>, Error> {
         self.end();
-        self.work = Some((Keeper::brief(self.folder.stopped()), None));
+        self.work = Some((SignalGuard::brief(self.folder.stopped()), None));
         Ok(Box::new(Journal::open(self.folder).map_err(kept)?))
     }
 
     fn chosen(&mut self, stage: Stage) -> Result<Option<Choice>, Error> {
         let folder = self.folder;
         let found = match stage {
-            Stage::World => world_search::chosen(folder, &self.problem.settings),
+            Stage::Geometry => geometry_search::chosen(folder, &self.problem.settings),
             Stage::Band => band_search::chosen(folder),
             Stage::Weight => held_out::chosen(folder),
             _ => Ok(None),
@@ -272,9 +274,9 @@ impl Progress for Kept<'_> {
         &mut self,
         file: &FitFile,
         trainer: &Trainer<'_, f32>,
-    ) -> Result<Option<Delegate<f32>>, Error> {
+    ) -> Result<Option<DeviceRunner<f32>>, Error> {
         let device = self.device.take();
-        let delegate = |device| delegate::delegate(device, file, trainer, self.folder);
+        let delegate = |device| device_runner::delegate(device, file, trainer, self.folder);
         device.map(delegate).transpose().map_err(kept)
     }
 

@@ -13,10 +13,10 @@ use super::data;
 use super::folder::{self, Folder};
 use super::results::gains::Gains;
 use super::results::leakage::Leakage;
-use super::results::verdict::{Evidence, Judged};
+use super::results::verdict::{DataVerdict, Evidence};
 use crate::answer::Answer;
 use crate::checksum::sealed;
-use crate::interrupt::{Interrupted, Keeper};
+use crate::interrupt::{Interrupted, SignalGuard};
 use crate::progress;
 use crate::session;
 use anyhow::bail;
@@ -28,7 +28,7 @@ use kerrlight_imaging::{
 };
 use kerrlight_tomo::fit::FrameTerm;
 use kerrlight_tomo::fit::settings::{Loss, LossKind};
-use kerrlight_tomo::fit::setup::Measured;
+use kerrlight_tomo::fit::setup::FitData;
 use kerrlight_tomo::fit::verdict::{Statistics, Tested};
 use kerrlight_vlbi::files::images;
 use polarized::Polarized;
@@ -42,22 +42,22 @@ const STOPPED: &str =
 /// Settings and data.
 pub struct Prepared {
     file: StaticImageFile,
-    measured: Measured,
+    measured: FitData,
     /// All products of the feeds, where polarisation is asked for.
-    polarized: Option<Measured>,
+    polarized: Option<FitData>,
 }
 
 /// What was found.
 struct Found<'a> {
     file: &'a StaticImageFile,
-    measured: &'a Measured,
+    measured: &'a FitData,
     folder: &'a Folder,
     survey: Survey,
     /// Simple shapes that were fitted to the same data.
     shapes: Vec<ShapeFit>,
     /// The image once a frame.
     movie: Frames<f32>,
-    judged: Judged,
+    judged: DataVerdict,
     gains: Option<Gains>,
     polarized: Option<Polarized>,
     /// Kinds of data that were not fitted, with χ² per datum.
@@ -170,7 +170,7 @@ fn searched(
     let of_polarized = file.polarization.as_ref().map_or(0, |p| values(&p.strength) + 1 + draws);
     let all =
         file.image.starts.len() + Shape::ALL.len() + values(&file.strength) + draws + of_polarized;
-    let keeper = Keeper::brief(STOPPED);
+    let keeper = SignalGuard::brief(STOPPED);
     let bar = progress::held_out(all as u64);
     let done = AtomicU64::new(0);
     let watch = |stage: Stage, solved: usize| {
@@ -202,7 +202,7 @@ fn searched(
 /// Residuals of the data that were fitted.
 fn compared<'a>(
     file: &StaticImageFile,
-    measured: &Measured,
+    measured: &FitData,
     survey: &Survey,
 ) -> anyhow::Result<(Vec<&'a str>, Vec<Statistics>)> {
     let image = &survey.found().solution.image;
@@ -225,11 +225,7 @@ fn name(kind: LossKind) -> &'static str {
 }
 
 /// χ² per datum of the gain-free data that were not fitted, from baselines above three times their noise.
-fn beside(
-    file: &StaticImageFile,
-    measured: &Measured,
-    survey: &Survey,
-) -> Vec<(&'static str, f64)> {
+fn beside(file: &StaticImageFile, measured: &FitData, survey: &Survey) -> Vec<(&'static str, f64)> {
     let image = &survey.found().solution.image;
     let of = |kind: LossKind| {
         let loss = Loss { least_snr: Some(3.0), ..Loss::new(kind) };

@@ -8,7 +8,7 @@ use kerrlight_imaging::settings::{StaticImageFile, StaticPolarization};
 use kerrlight_imaging::{LinearPolarization, PolarizedSurvey};
 use kerrlight_tomo::fit::FrameTerm;
 use kerrlight_tomo::fit::settings::LossKind;
-use kerrlight_tomo::fit::setup::{Measured, best_held};
+use kerrlight_tomo::fit::setup::{FitData, best_held};
 use kerrlight_tomo::fit::verdict::{Errors, Statistics, Tested};
 use serde_json::{Value, json};
 
@@ -105,7 +105,7 @@ impl Polarized {
     /// Of what was found of these data, and its residuals to be judged.
     pub fn new(
         file: &StaticImageFile,
-        measured: &Measured,
+        measured: &FitData,
         survey: PolarizedSurvey,
         leakage: Option<Leakage>,
     ) -> anyhow::Result<Option<(Self, (String, Tested))>> {
@@ -116,7 +116,8 @@ impl Polarized {
         let frames = 0..measured.times.len();
         let residuals = frames.map(|frame| term.residuals(frame, images));
         let statistics = Statistics::of(residuals, 1);
-        let errors = if measured.varies { Errors::Shared } else { Errors::Stated };
+        let errors =
+            if measured.has_intrinsic_variability { Errors::Shared } else { Errors::Stated };
         let count = statistics.all.count;
         let tested = (name(settings.data).to_owned(), Tested::gaussian(statistics, errors));
         Ok(Some((Self { settings, survey, leakage, count }, tested)))

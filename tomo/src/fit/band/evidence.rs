@@ -10,10 +10,10 @@ use super::{Background, Band, BandPrior, CurveRows};
 use crate::Error;
 use nalgebra::{DMatrix, DVector};
 
-/// How probable data are in a world.
+/// How probable data are in a geometry.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Weighed {
-    /// ln of the mean probability over all combinations, up to what is the same for all worlds.
+    /// ln of the mean probability over all combinations, up to what is the same for all geometries.
     pub ln_evidence: f64,
     /// The same for each of the radii.
     pub by_radius: Vec<f64>,
@@ -25,7 +25,7 @@ pub struct Weighed {
     pub likely: Vec<(Band, f64)>,
 }
 
-/// Bands and worlds with a ln this far below the best one are not likely, and do not say where the emission is.
+/// Bands and geometries with a ln this far below the best one are not likely, and do not say where the emission is.
 pub const UNLIKELY: f64 = 8.0;
 
 /// How probable each of some data sets (over their standard deviations) is: of light curves that differ in their values

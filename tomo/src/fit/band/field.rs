@@ -10,7 +10,7 @@ const DARK: f64 = 0.02;
 const FAINT: f64 = 1e-6;
 
 /// A band as the data see it.
-pub(super) struct Seen {
+pub(super) struct BandCovariance {
     /// Data × data: the covariance of a field of unit variance.
     pub covariance: DMatrix<f64>,
     /// What a field of 1 gives.
@@ -25,7 +25,7 @@ pub(super) struct Seen {
     pub own_total: [f64; 2],
 }
 
-impl Seen {
+impl BandCovariance {
     /// The covariance of all data that the flare gives them, without noise.
     pub fn full(&self, band: &Band) -> DMatrix<f64> {
         let mean = &self.uniform * self.uniform.transpose() * (band.mean * band.mean);
@@ -35,7 +35,7 @@ impl Seen {
 
 impl CurveRows {
     /// Covariances of a band; none where it has no node.
-    pub(super) fn seen(&self, band: &Band) -> Option<Seen> {
+    pub(super) fn seen(&self, band: &Band) -> Option<BandCovariance> {
         let across = Profile::new(&self.grid.rings(), [band.radius, band.width], band.length)?;
         let upright = Profile::new(&self.grid.layers(), [0.0, band.height], band.length)?;
         let round = self.round(band);
@@ -44,7 +44,7 @@ impl CurveRows {
         let (total, own_total) = self.total(&parts, [&across, &upright], round[0]);
         let uniform = self.uniform([&across, &upright]);
         let covariance = parts.transpose() * &parts;
-        Some(Seen { covariance, uniform, moments, own, total, own_total })
+        Some(BandCovariance { covariance, uniform, moments, own, total, own_total })
     }
 
     /// Standard deviations of the functions of the azimuth, those that count and the first harmonic: exp(−d²/2ℓ²) of

@@ -1,10 +1,10 @@
-//! How probable a world is, given the light curve of a flare that orbits in a band: the emission is marginalised, not
+//! How probable a geometry is, given the light curve of a flare that orbits in a band: the emission is marginalised, not
 //! fitted.
 //!
 //! Emission is thought of as env(x) (μ + g(x)) a with a Gaussian random field g of unit variance, the envelope
 //! env = exp(−½ [((ρ − ρ₀)/w)² + (z/h)²]) of a circle of radius ρ₀ about the z axis, and an amplitude a. A light curve
 //! is linear in it, so that the probability of the data, with g integrated out, is a Gaussian with a known covariance:
-//! worlds in which data could be explained by many fields, but need not, are not preferred for it. Fields may be
+//! geometries in which data could be explained by many fields, but need not, are not preferred for it. Fields may be
 //! negative here; μ is a standard deviation of their mean.
 //!
 //! Fields live on rings and layers, and their correlation is exp(−d²/2ℓ²) with d² = (ρ − ρ′)² + (z − z′)² +

@@ -6,7 +6,7 @@
 
 use super::background::Whitening;
 use super::evidence::Lower;
-use super::field::{Seen, part, some};
+use super::field::{BandCovariance, part, some};
 use super::{Band, CurveRows};
 use crate::Error;
 use core::f64::consts::TAU;
@@ -76,7 +76,11 @@ struct Used {
 }
 
 impl Used {
-    fn new(seen: &Seen, (used, values): (&[usize], &DVector<f64>), whitening: &Whitening) -> Self {
+    fn new(
+        seen: &BandCovariance,
+        (used, values): (&[usize], &DVector<f64>),
+        whitening: &Whitening,
+    ) -> Self {
         let moments = part(&seen.moments, used, &[0, 1, 2, 3]);
         let mut columns: Vec<DVector<f64>> =
             moments.column_iter().map(|column| column.into_owned()).collect();

@@ -99,7 +99,7 @@ fn exact_evidence_is_the_density_of_the_data() {
 
 /// ln of twice the probability that all emission is positive given the data, with the inverse of their covariance.
 fn positive(
-    seen: &field::Seen,
+    seen: &field::BandCovariance,
     band: &Band,
     used: &[usize],
     (inverse, values): (&DMatrix<f64>, &DVector<f64>),

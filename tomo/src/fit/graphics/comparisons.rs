@@ -1,6 +1,6 @@
 //! All that data of visibilities say, as the device has it.
 
-use crate::fit::compared::Compared;
+use crate::fit::device_observable::Compared;
 use crate::fit::objective::Objective;
 use core::ops::Range;
 use kerrlight_vlbi::data_terms::{ClosureScan, Comparison};

@@ -2,9 +2,9 @@
 
 use super::active::NONE;
 use super::operator::Operator;
+use super::ray_weights::Buffers;
 use super::rows::Held;
 use super::rows::Rows;
-use super::walk::Buffers;
 use crate::representation::spline::STENCIL;
 use kerrlight_common::simd::Float;
 use std::borrow::Cow;

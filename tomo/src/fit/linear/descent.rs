@@ -37,9 +37,9 @@ pub(super) struct Stop {
 const LATELY: usize = 10;
 
 /// The last values.
-struct Lately(VecDeque<f64>);
+struct RecentValues(VecDeque<f64>);
 
-impl Lately {
+impl RecentValues {
     /// Whether the last iterations lowered the value by less than `part` of it.
     fn is_settled(&mut self, value: f64, part: f64) -> bool {
         self.0.push_back(value);
@@ -110,7 +110,7 @@ impl<'a, 'b> Descent<'a, 'b> {
     }
 
     fn steps(&mut self, stop: Stop) -> Ending {
-        let (mut pairs, mut lately) = (Pairs::default(), Lately(VecDeque::new()));
+        let (mut pairs, mut lately) = (Pairs::default(), RecentValues(VecDeque::new()));
         let enough = stop.tolerance * self.violation();
         for _ in 0..stop.iterations {
             if self.violation() <= enough {

@@ -8,7 +8,7 @@ use super::convex::Convex;
 use super::gaussian::{GaussianField, Matern};
 use super::objective::Objective;
 use super::operator::Operator;
-use super::walk::Voxels;
+use super::ray_weights::Voxels;
 use super::{Ending, LinearProblem, LinearProgress, LinearSettings, LinearSolution};
 use super::{Stationarity, Watch};
 use crate::Error;

@@ -1,6 +1,6 @@
 //! Nodes of one grid and of another.
 
-use super::walk::Voxels;
+use super::ray_weights::Voxels;
 use crate::Error;
 use crate::representation::{Representation, Workspace};
 use kerrlight_render::points::Coordinates;

@@ -2,8 +2,8 @@
 
 use super::active::{Active, NONE};
 use super::data::Data;
+use super::ray_weights::{Buffers, Voxels, Walk};
 use super::rows::{Held, Rows};
-use super::walk::{Buffers, Voxels, Walk};
 use crate::representation::spline::STENCIL;
 use core::ops::Range;
 use kerrlight_common::memory;

@@ -1,7 +1,7 @@
 //! Rows of the sparse matrix from nodes to the pixels of a frame.
 
 use super::active::{Active, NONE};
-use super::walk::Place;
+use super::ray_weights::Place;
 use crate::representation::spline::{Degree, STENCIL};
 use kerrlight_common::simd::Float;
 

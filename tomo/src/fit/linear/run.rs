@@ -4,15 +4,15 @@ use super::certificate::{Certificate, Stationarity};
 use super::data::Data;
 use super::descent::{Descended, Descent, Each, Ending, Stop};
 use super::error::LinearError;
-use super::lit::{Lit, Spots, Trials};
+use super::initial_fields::{InitialField, Spots, Trials};
 use super::nodes::{dilated, refined};
 use super::objective::{Objective, Penalised};
 use super::operator::Operator;
 use super::problem::LinearProblem;
+use super::ray_weights::Voxels;
 use super::scaled::Scaled;
 use super::settings::{Coarse, LinearSettings};
 use super::solution::{LinearProgress, LinearSolution, Watch};
-use super::walk::Voxels;
 use crate::Error;
 use kerrlight_common::simd::Float;
 
@@ -174,7 +174,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
     ) -> Result<Option<Coarsely>, Error> {
         if !objective.data.is_convex() {
             let lit = self.lit(objective, Trials { iterations: PATIENCE * iterations, ..MANY })?;
-            return Ok(lit.map(|Lit { start, x, .. }| (x, Some(start))));
+            return Ok(lit.map(|InitialField { start, x, .. }| (x, Some(start))));
         }
         let dark = self.dark(objective.operator.active.count());
         let found = self.minimise(objective, &dark, iterations);

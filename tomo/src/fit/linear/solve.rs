@@ -2,7 +2,7 @@
 
 use super::change::Change;
 use super::descent::Ending;
-use super::lit::{Lit, Trials};
+use super::initial_fields::{InitialField, Trials};
 use super::objective::Objective;
 use super::operator::Operator;
 use super::problem::LinearProblem;
@@ -98,8 +98,10 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         if start.is_none() && !data.is_convex() {
             let lit = run.lit(&mut objective, Trials { iterations, ..FEW })?;
             let dark = || Least { x: vec![0.0; self.unknowns()], value: f64::INFINITY };
-            let everywhere =
-                |Lit { x, value, .. }: Lit| Least { x: operator.active.expand(&x), value };
+            let everywhere = |InitialField { x, value, .. }: InitialField| Least {
+                x: operator.active.expand(&x),
+                value,
+            };
             return Ok(lit.map_or_else(dark, everywhere));
         }
         let dark = || self.center().unwrap_or_else(|| vec![0.0; self.unknowns()]);

@@ -3,7 +3,7 @@
 use super::Ending;
 use super::convex::Convex;
 use super::error::LinearError;
-use super::lit::{Around, Lit, Trials};
+use super::initial_fields::{Around, InitialField, Trials};
 use super::objective::Objective;
 use super::run::Run;
 use super::scaled::dot;
@@ -19,16 +19,16 @@ impl<T: Float + Default> Run<'_, '_, '_, T> {
         &mut self,
         objective: &mut Objective<'_, '_, T>,
         trials: Trials,
-    ) -> Result<Option<Lit>, Error> {
+    ) -> Result<Option<InitialField>, Error> {
         let starts = self.starts(objective, trials)?;
-        let mut best: Option<Lit> = None;
+        let mut best: Option<InitialField> = None;
         for (_, start) in starts {
             let end = self.minimise(objective, &start, trials.iterations);
             if end.ending == Ending::Cancelled {
                 return Ok(None);
             }
             if best.as_ref().is_none_or(|best| end.value < best.value) {
-                best = Some(Lit { start, x: end.x, value: end.value });
+                best = Some(InitialField { start, x: end.x, value: end.value });
             }
         }
         Ok(best.map(Some).ok_or_else(|| LinearError::NoLight(objective.data.names()))?)

@@ -1,7 +1,7 @@
 use super::active::Active;
 use super::data::{Data, Weighted};
 use super::operator::Operator;
-use super::walk::Walk;
+use super::ray_weights::Walk;
 use super::*;
 use crate::fit::{
     Batch, Field, ForwardModel, FrameTerm, ImageTerm, Motion, Region, Regulariser, Sampling,
@@ -18,8 +18,8 @@ use rand_pcg::Pcg64;
 
 mod changing;
 mod gaussian;
+pub(in crate::fit) mod initial_fields;
 mod kept;
-pub(in crate::fit) mod lit;
 mod log_normal;
 mod profile;
 mod quiescent;

@@ -1,8 +1,8 @@
 //! What does not move: an image on the screen, the same in every frame, that is recovered beside the emission.
 
-mod beside;
+mod with_static_image;
 
-pub use beside::Beside;
+pub use with_static_image::WithStaticImage;
 
 use super::regulariser::{Prior, Regulariser, Shape};
 use crate::Error;

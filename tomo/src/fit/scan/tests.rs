@@ -53,11 +53,11 @@ fn exact_losses_that_are_all_the_same_are_refused() {
 /// Amplitudes and closure phases, from lit fields about every axis.
 #[test]
 fn exact_axis_of_amplitudes_and_closure_phases() {
-    use super::super::linear::tests::lit::{Seen, array, spot};
+    use super::super::linear::tests::initial_fields::{Observable, array, spot};
     let (model, voxels) = (forward_model(), Voxels::cube(9, 5.0, Degree::Linear));
     let truth = Axis::new([0.6, -0.3, -0.7]).unwrap();
     let movie = movie_about(truth, &model, &voxels, &spot(&voxels));
-    let data = [Seen::Amplitudes, Seen::Phases].map(|seen| array(&movie, seen));
+    let data = [Observable::Amplitudes, Observable::Phases].map(|seen| array(&movie, seen));
     let terms = [0, 1].map(|k| Weighted { weight: 1.0, term: &data[k] as &dyn FrameTerm<f64> });
     let scan = scan_of(&terms, &SMALL).unwrap().unwrap();
     assert!(scan.map.iter().all(|at| at.loss.is_finite() && at.loss > 0.0));

@@ -1,4 +1,4 @@
-//! The search for a world in which a light curve is that of a flare in an orbital band.
+//! The search for a geometry in which a light curve is that of a flare in an orbital band.
 
 use crate::fit::linear::Roughness;
 use schemars::JsonSchema;
@@ -26,7 +26,7 @@ impl Steps {
     }
 }
 
-/// Worlds that are compared, and what is thought of the emission in each.
+/// Geometries that are compared, and what is thought of the emission in each.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BandSettings {

@@ -21,7 +21,7 @@ mod recovery;
 mod representation;
 mod search;
 mod simulation;
-mod unknown_world;
+mod unknown_geometry;
 mod unknowns;
 mod view;
 
@@ -41,11 +41,11 @@ pub use quantity::{PriorSettings, Quantity};
 pub use quiescent::QuiescentSettings;
 pub use recovery::{AxisScan, AxisSearch, Linear, Occupancy, Optimiser, Start, Training};
 pub use representation::{FeatureGrid, Grid, Kind, LinearGrid, Network, Own, Representation};
-pub use search::{WorldSearch, WorldSteps, WorldView};
+pub use search::{GeometrySearch, SearchSteps, SearchView};
 pub use simulation::{
     GlyphShape, Movie, Noise, Observation, Ring, Shines, Simulation, Spot, Truth, Tube,
 };
-pub use unknown_world::UnknownWorld;
+pub use unknown_geometry::UnknownGeometry;
 pub use view::{Absorption, Effects, Hole, Motion, Observer, PixelShape, Region, Screen, WidthOf};
 
 use crate::Error;
@@ -97,7 +97,7 @@ pub struct FitFile {
     pub data: Option<DataFiles>,
     /// The search for numbers that have a prior in place of a value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub search: Option<WorldSearch>,
+    pub search: Option<GeometrySearch>,
     /// Instrumental parameters that are fitted with the emission.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instrument: Option<InstrumentSettings>,

@@ -1,6 +1,6 @@
 //! Numbers of the geometry: known, or with a prior.
 
-use crate::fit::world::Prior;
+use crate::fit::geometry::Prior;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};

@@ -1,7 +1,7 @@
 //! The hole, the view of it, what happens to light, and how matter turns.
 
 use super::{FitFile, Quantity};
-use crate::fit::world::Parameter;
+use crate::fit::geometry::Parameter;
 use crate::fit::{Region as Limits, Sampling};
 use kerrlight_render::dynamics::Velocity;
 use kerrlight_vlbi::operator::Pulse;

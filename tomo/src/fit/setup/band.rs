@@ -1,9 +1,9 @@
-//! From settings to worlds that are weighed by the light curve of a flare in an orbital band.
+//! From settings to geometries that are weighed by the light curve of a flare in an orbital band.
 
 mod background;
 mod kept;
 
-use super::{Curve, Instrument, Measured, Result, axis, forward_model, hours_per_m, motion};
+use super::{Curve, FitData, Instrument, Result, axis, forward_model, hours_per_m, motion};
 use crate::fit::band::{
     Band, BandPrior, CurveRows, Interval, PolarGrid, Sampling, UNLIKELY, Weighed, evidence, places,
     together, validation, without_flare,
@@ -17,16 +17,16 @@ use kerrlight_render::polarization::StokesParameter;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// A world, and how probable it is.
+/// A geometry, and how probable it is.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BandWorld {
+pub struct BandGeometry {
     /// Angle from the spin to the observer, degrees.
     pub inclination_deg: f64,
     /// Angular velocity over that of the law.
     pub rotation_factor: f64,
     /// Of the spin, degrees east of north.
     pub position_angle_deg: f64,
-    /// ln of the probability, up to what all worlds share: the evidence, and sin i of axes in any direction.
+    /// ln of the probability, up to what all geometries share: the evidence, and sin i of axes in any direction.
     pub ln_posterior: f64,
     /// ln of the evidence of each radius.
     pub by_radius: Vec<f64>,
@@ -39,77 +39,79 @@ pub struct BandWorld {
 /// What was found.
 #[derive(Clone, Debug)]
 pub struct BandScan {
-    /// All worlds.
-    pub worlds: Vec<BandWorld>,
+    /// All geometries.
+    pub geometries: Vec<BandGeometry>,
     /// Radii of the bands, M.
     pub radii: Vec<f64>,
-    /// Which world is the most probable.
+    /// Which geometry is the most probable.
     pub best: usize,
-    /// Distance of the emission from the axis, M, in all worlds that are likely.
+    /// Distance of the emission from the axis, M, in all geometries that are likely.
     pub radius: Interval,
     /// Its azimuth at the reference time, radians.
     pub azimuth: Interval,
-    /// χ² per datum of the data that were not used, with the covariance that the best world expects of them; none without
+    /// χ² per datum of the data that were not used, with the covariance that the best geometry expects of them; none without
     /// any.
     pub validation: Option<f64>,
-    /// ln of the probability of the data with a flare, all worlds together, over that without one.
+    /// ln of the probability of the data with a flare, all geometries together, over that without one.
     pub ln_bayes_factor: f64,
-    /// Periods of the orbit in minutes, world by world and radius by radius; infinite where matter stands still.
+    /// Periods of the orbit in minutes, geometry by geometry and radius by radius; infinite where matter stands still.
     pub periods_min: Vec<Vec<f64>>,
-    /// What the background is expected to be at all data in the best world and its standard deviation, Jy; none if there is
+    /// What the background is expected to be at all data in the best geometry and its standard deviation, Jy; none if there is
     /// none.
     pub background: Option<Vec<FluxDatum>>,
 }
 
-/// Told how many worlds are done; says whether to go on.
+/// Told how many geometries are done; says whether to go on.
 pub type BandWatch<'a> = dyn Fn(usize) -> bool + Sync + 'a;
 
-/// Weighs all worlds; none if it was cancelled. Worlds that the journal knows of an earlier call are not weighed again.
+/// Weighs all geometries; none if it was cancelled. Geometries that the journal knows of an earlier call are not weighed again.
 ///
 /// # Errors
 /// If there is no light curve, or a setting is out of range.
 pub fn scan_band(
     file: &FitFile,
-    measured: &Measured,
+    measured: &FitData,
     settings: &BandSettings,
     journal: &dyn Journal,
     watch: &BandWatch<'_>,
 ) -> Result<Option<BandScan>> {
     let curve = check_band(file, measured, settings)?;
-    let worlds = worlds(settings);
+    let geometries = geometries(settings);
     let done = std::sync::atomic::AtomicUsize::new(0);
-    let one = |world: &(f64, f64)| -> Result<Option<Vec<BandWorld>>> {
+    let one = |geometry: &(f64, f64)| -> Result<Option<Vec<BandGeometry>>> {
         let count = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         if !watch(count) {
             return Ok(None);
         }
-        let key = journal::key(("band", world.0.to_bits(), world.1.to_bits()));
-        let kept = journal.recall(key).and_then(|numbers| BandWorld::of_numbers(&numbers));
+        let key = journal::key(("band", geometry.0.to_bits(), geometry.1.to_bits()));
+        let kept = journal.recall(key).and_then(|numbers| BandGeometry::of_numbers(&numbers));
         if kept.is_some() {
             return Ok(kept);
         }
-        let found = weighed(file, measured, settings, curve, *world)?;
-        journal.keep(key, &BandWorld::numbers(&found));
+        let found = weighed(file, measured, settings, curve, *geometry)?;
+        journal.keep(key, &BandGeometry::numbers(&found));
         Ok(Some(found))
     };
-    let all: Vec<Option<Vec<BandWorld>>> = worlds.par_iter().map(one).collect::<Result<_>>()?;
+    let all: Vec<Option<Vec<BandGeometry>>> =
+        geometries.par_iter().map(one).collect::<Result<_>>()?;
     let Some(all) = all.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
-    let worlds: Vec<BandWorld> = all.into_iter().flatten().collect();
-    let better = |a: &usize, b: &usize| worlds[*a].ln_posterior.total_cmp(&worlds[*b].ln_posterior);
-    let best = (0..worlds.len()).max_by(better).unwrap_or(0);
-    let [azimuth, radius] = placed(file, measured, settings, curve, (&worlds, best))?;
-    let world = &worlds[best];
-    let rows = rows(file, measured, settings, curve, world.flow())?;
-    let data = turned(curve, world.position_angle_deg);
-    let validation = validation(&rows, &data, &world.band)?;
-    let ln_bayes_factor = ln_bayes_factor(&rows, &data, &worlds, settings)?;
+    let geometries: Vec<BandGeometry> = all.into_iter().flatten().collect();
+    let better =
+        |a: &usize, b: &usize| geometries[*a].ln_posterior.total_cmp(&geometries[*b].ln_posterior);
+    let best = (0..geometries.len()).max_by(better).unwrap_or(0);
+    let [azimuth, radius] = placed(file, measured, settings, curve, (&geometries, best))?;
+    let geometry = &geometries[best];
+    let rows = rows(file, measured, settings, curve, geometry.flow())?;
+    let data = turned(curve, geometry.position_angle_deg);
+    let validation = validation(&rows, &data, &geometry.band)?;
+    let ln_bayes_factor = ln_bayes_factor(&rows, &data, &geometries, settings)?;
     let background = settings.background.is_some();
-    let background = background.then(|| expected(&rows, curve, &data, world)).transpose()?;
+    let background = background.then(|| expected(&rows, curve, &data, geometry)).transpose()?;
     let radii = settings.radii.values();
-    let period = |world: &BandWorld| periods(file, measured, world, &radii);
-    let periods_min = worlds.iter().map(period).collect::<Result<_>>()?;
+    let period = |geometry: &BandGeometry| periods(file, measured, geometry, &radii);
+    let periods_min = geometries.iter().map(period).collect::<Result<_>>()?;
     Ok(Some(BandScan {
-        worlds,
+        geometries,
         radii,
         best,
         radius,
@@ -121,59 +123,60 @@ pub fn scan_band(
     }))
 }
 
-/// Periods of orbits at some radii in a world, minutes.
+/// Periods of orbits at some radii in a geometry, minutes.
 fn periods(
     file: &FitFile,
-    measured: &Measured,
-    world: &BandWorld,
+    measured: &FitData,
+    geometry: &BandGeometry,
     radii: &[f64],
 ) -> Result<Vec<f64>> {
-    let velocity = band_motion(file, measured, world.rotation_factor)?.velocity;
+    let velocity = band_motion(file, measured, geometry.rotation_factor)?.velocity;
     let minutes = 60.0 * hours_per_m(file)?;
     let of = |radius: &f64| core::f64::consts::TAU / velocity.rate(*radius).abs() * minutes;
     Ok(radii.iter().map(of).collect())
 }
 
-/// ln of the probability of the data with a flare over that without one: the mean over the prior of the worlds.
+/// ln of the probability of the data with a flare over that without one: the mean over the prior of the geometries.
 fn ln_bayes_factor(
     rows: &CurveRows,
     data: &[f64],
-    worlds: &[BandWorld],
+    geometries: &[BandGeometry],
     settings: &BandSettings,
 ) -> Result<f64> {
-    let most = worlds.iter().map(|world| world.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
+    let most =
+        geometries.iter().map(|geometry| geometry.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
     let (mut with, mut prior) = (0.0, 0.0);
-    for world in worlds {
-        with += (world.ln_posterior - most).exp();
-        prior += direction(world.inclination_deg).exp();
+    for geometry in geometries {
+        with += (geometry.ln_posterior - most).exp();
+        prior += direction(geometry.inclination_deg).exp();
     }
     let without = without_flare(rows, &[data.to_vec()], &backgrounds(settings))?[0];
     Ok(most + (with / prior).ln() - without)
 }
 
-/// Azimuth and radius of the emission, in all worlds that are likely.
+/// Azimuth and radius of the emission, in all geometries that are likely.
 fn placed(
     file: &FitFile,
-    measured: &Measured,
+    measured: &FitData,
     settings: &BandSettings,
     curve: &Curve,
-    (worlds, best): (&[BandWorld], usize),
+    (geometries, best): (&[BandGeometry], usize),
 ) -> Result<[Interval; 2]> {
-    let most = worlds[best].ln_posterior;
-    let likely: Vec<&BandWorld> =
-        worlds.iter().filter(|world| world.ln_posterior > most - UNLIKELY).collect();
-    let one = |world: &&BandWorld| {
-        let rows = rows(file, measured, settings, curve, world.flow())?;
-        let of = |(band, ln): &(Band, f64)| (*band, ln + direction(world.inclination_deg));
-        let bands: Vec<(Band, f64)> = world.likely.iter().map(of).collect();
-        places(&rows, &turned(curve, world.position_angle_deg), &bands)
+    let most = geometries[best].ln_posterior;
+    let likely: Vec<&BandGeometry> =
+        geometries.iter().filter(|geometry| geometry.ln_posterior > most - UNLIKELY).collect();
+    let one = |geometry: &&BandGeometry| {
+        let rows = rows(file, measured, settings, curve, geometry.flow())?;
+        let of = |(band, ln): &(Band, f64)| (*band, ln + direction(geometry.inclination_deg));
+        let bands: Vec<(Band, f64)> = geometry.likely.iter().map(of).collect();
+        places(&rows, &turned(curve, geometry.position_angle_deg), &bands)
     };
     let all = likely.par_iter().map(one).collect::<Result<Vec<_>>>()?.concat();
     let none = || FitError::Conflict("band: the data do not say where any emission is".to_owned());
     Ok(together(&all).ok_or_else(none)?)
 }
 
-impl BandWorld {
+impl BandGeometry {
     /// Inclination and angular velocity.
     fn flow(&self) -> (f64, f64) {
         (self.inclination_deg, self.rotation_factor)
@@ -185,13 +188,13 @@ fn direction(inclination_deg: f64) -> f64 {
     inclination_deg.to_radians().sin().max(1e-6).ln()
 }
 
-/// The light curve, if worlds can be weighed by it with these settings.
+/// The light curve, if geometries can be weighed by it with these settings.
 ///
 /// # Errors
 /// If there is none, or a setting is out of range.
 pub fn check_band<'a>(
     file: &FitFile,
-    measured: &'a Measured,
+    measured: &'a FitData,
     settings: &BandSettings,
 ) -> Result<&'a Curve> {
     let Some(curve) = &measured.curve else {
@@ -251,26 +254,26 @@ fn prior(settings: &BandSettings) -> BandPrior {
     BandPrior { backgrounds: backgrounds(settings), ..usual }
 }
 
-fn worlds(settings: &BandSettings) -> Vec<(f64, f64)> {
+fn geometries(settings: &BandSettings) -> Vec<(f64, f64)> {
     let inclinations = settings.inclinations_deg.values();
     let of = |factor: &f64| inclinations.iter().map(|i| (*i, *factor)).collect::<Vec<_>>();
     settings.rotation_factors.iter().flat_map(of).collect()
 }
 
-/// All position angles of a world.
+/// All position angles of a geometry.
 fn weighed(
     file: &FitFile,
-    measured: &Measured,
+    measured: &FitData,
     settings: &BandSettings,
     curve: &Curve,
-    world: (f64, f64),
-) -> Result<Vec<BandWorld>> {
-    let rows = rows(file, measured, settings, curve, world)?;
+    geometry: (f64, f64),
+) -> Result<Vec<BandGeometry>> {
+    let rows = rows(file, measured, settings, curve, geometry)?;
     let data: Vec<Vec<f64>> =
         settings.position_angles_deg.iter().map(|angle| turned(curve, *angle)).collect();
     let weighed = evidence(&rows, &data, &prior(settings))?;
-    let (inclination_deg, rotation_factor) = world;
-    let one = |(angle, weighed): (&f64, Weighed)| BandWorld {
+    let (inclination_deg, rotation_factor) = geometry;
+    let one = |(angle, weighed): (&f64, Weighed)| BandGeometry {
         inclination_deg,
         rotation_factor,
         position_angle_deg: *angle,
@@ -282,18 +285,18 @@ fn weighed(
     Ok(settings.position_angles_deg.iter().zip(weighed).map(one).collect())
 }
 
-/// The settings of a world.
-pub fn in_band_world(file: &FitFile, inclination_deg: f64) -> FitFile {
+/// The settings of a geometry.
+pub fn in_band_geometry(file: &FitFile, inclination_deg: f64) -> FitFile {
     let mut file = file.clone();
     file.observer.inclination_deg = inclination_deg.into();
     file
 }
 
-/// How matter moves in a world.
+/// How matter moves in a geometry.
 ///
 /// # Errors
 /// If the motion is out of range.
-pub fn band_motion(file: &FitFile, measured: &Measured, factor: f64) -> Result<Motion> {
+pub fn band_motion(file: &FitFile, measured: &FitData, factor: f64) -> Result<Motion> {
     let plain = motion(file, measured.times.clone())?;
     let velocity = match plain.velocity {
         law if factor == 1.0 => law,
@@ -303,15 +306,15 @@ pub fn band_motion(file: &FitFile, measured: &Measured, factor: f64) -> Result<M
     Ok(Motion { velocity, ..plain })
 }
 
-/// The rows of a world, over the errors of the data.
+/// The rows of a geometry, over the errors of the data.
 fn rows(
     file: &FitFile,
-    measured: &Measured,
+    measured: &FitData,
     settings: &BandSettings,
     curve: &Curve,
     (inclination_deg, factor): (f64, f64),
 ) -> Result<CurveRows> {
-    let file = in_band_world(file, inclination_deg);
+    let file = in_band_geometry(file, inclination_deg);
     let instrument = Instrument::new(&file)?;
     let mut model = forward_model(&instrument, &band_motion(&file, measured, factor)?)?;
     let axis = axis(&file)?.0;

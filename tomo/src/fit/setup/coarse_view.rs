@@ -1,7 +1,7 @@
 //! What searches look through: fewer pixels and nodes, or other ones.
 
 use super::linear_problem::terms;
-use super::{Instrument, Measured, Result, forward_model, linear, priors, sky, spacing};
+use super::{FitData, Instrument, Result, forward_model, linear, priors, sky, spacing};
 use crate::fit::scan::AxisProblem;
 use crate::fit::settings::{FitFile, LossKind, Region, Screen, WidthOf};
 use crate::fit::{Motion, Objective, Sampling};
@@ -12,7 +12,7 @@ use kerrlight_vlbi::operator::Pulse;
 pub struct CoarseView {
     pub(super) file: FitFile,
     pub(super) instrument: Instrument,
-    pub(super) measured: Measured,
+    pub(super) measured: FitData,
 }
 
 impl CoarseView {
@@ -22,7 +22,7 @@ impl CoarseView {
     ///
     /// # Errors
     /// As [`Instrument::new`].
-    pub fn new(file: &FitFile, measured: &Measured, pixels: usize) -> Result<Self> {
+    pub fn new(file: &FitFile, measured: &FitData, pixels: usize) -> Result<Self> {
         let images = file.loss.iter().filter(|loss| loss.data == LossKind::Image).count();
         let screen = &file.screen;
         let every = screen.pixels / pixels.max(2);
@@ -39,7 +39,7 @@ impl CoarseView {
     }
 
     /// Every n-th row and column of images.
-    fn thinned(file: &FitFile, measured: &Measured, every: usize) -> Result<Self> {
+    fn thinned(file: &FitFile, measured: &FitData, every: usize) -> Result<Self> {
         let n = file.screen.pixels;
         let places: Vec<usize> = (every / 2..n).step_by(every).collect();
         let kept: Vec<usize> = places
@@ -53,7 +53,7 @@ impl CoarseView {
             movie.mapped(kept.len(), |image| kept.iter().map(|k| image[*k]).collect())
         };
         let movie = measured.movie.as_ref().map(thin).transpose()?;
-        let measured = Measured { movie, ..measured.without_truth() };
+        let measured = FitData { movie, ..measured.without_truth() };
         let screen = Screen { pixels: places.len(), ..file.screen.clone() };
         Ok(Self { file: FitFile { screen, ..file }, instrument, measured })
     }
@@ -62,7 +62,7 @@ impl CoarseView {
     ///
     /// # Errors
     /// As [`Instrument::new`].
-    pub fn sampled(file: &FitFile, measured: &Measured, pixels: usize) -> Result<Self> {
+    pub fn sampled(file: &FitFile, measured: &FitData, pixels: usize) -> Result<Self> {
         let n = file.screen.pixels as f64;
         let screen = Screen {
             pixels,
@@ -78,7 +78,7 @@ impl CoarseView {
             (Pulse::Triangle, Some(own)) => Pulse::TriangleOf(own.pixel_rad),
             (pulse, _) => pulse,
         };
-        let measured = Measured { sky: sky(&file).ok(), pulse, ..measured.without_truth() };
+        let measured = FitData { sky: sky(&file).ok(), pulse, ..measured.without_truth() };
         Ok(Self { file, instrument, measured })
     }
 

@@ -1,12 +1,12 @@
-//! Worlds that are drawn for calibration, as a forward model that no fit uses makes their images.
+//! Geometries that are drawn for calibration, as a forward model that no fit uses makes their images.
 
 use super::{Result, Truth, spacing};
+use crate::fit::geometry::{Geometry, Parameter};
 use crate::fit::settings::{AxisSearch, FitFile, Spot};
-use crate::fit::world::{Parameter, World};
 use kerrlight_common::frames::Frames;
 use kerrlight_render::dynamics::Velocity;
 
-/// What another forward model needs to know of a drawn world: matter on circular geodesics about the hole, which shines in a
+/// What another forward model needs to know of a drawn geometry: matter on circular geodesics about the hole, which shines in a
 /// region, seen from far away with the time that light takes.
 #[derive(Clone, Copy, Debug)]
 pub struct Drawn<'a> {
@@ -64,10 +64,10 @@ fn is_of_other_model(drawn: &FitFile) -> bool {
     is_circular && is_upright && is_far && is_plain
 }
 
-/// Images of a drawn world in Jy per pixel, with [`FINER`] times the pixels of the settings along each side.
+/// Images of a drawn geometry in Jy per pixel, with [`FINER`] times the pixels of the settings along each side.
 pub(super) fn fine_images(
     file: &FitFile,
-    world: &World,
+    geometry: &Geometry,
     truth: &Truth,
     times: &[f64],
     model: OtherModel<'_>,
@@ -75,9 +75,9 @@ pub(super) fn fine_images(
     let times: Vec<f64> = times.iter().map(|time| time - file.motion.reference_time).collect();
     let region = file.region.limits();
     let drawn = Drawn {
-        spin: world.get(Parameter::Spin),
-        inclination: world.get(Parameter::Inclination),
-        position_angle: world.get(Parameter::PositionAngle),
+        spin: geometry.get(Parameter::Spin),
+        inclination: geometry.get(Parameter::Inclination),
+        position_angle: geometry.get(Parameter::PositionAngle),
         redshift_power: file.effects.redshift_power.unwrap_or(0.0),
         radii: [region.r_min, region.r_max],
         height: region.z_width,

@@ -2,7 +2,7 @@
 
 use super::leakage::observing;
 use super::polarized::is_polarized;
-use super::{Measured, Result};
+use super::{FitData, Result};
 use crate::fit::settings::{InstrumentSettings, Loss, LossKind, refuse};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::data_terms::GainTerm;
@@ -47,7 +47,7 @@ pub(super) fn priors(
     Ok(Some(GainPriors { amplitude_sigma, ..some }))
 }
 
-impl Measured {
+impl FitData {
     /// The gains of every frame that explain the data best beside visibilities of a model, those of all rows that have
     /// Stokes I in their order; none if gains are not solved for.
     ///

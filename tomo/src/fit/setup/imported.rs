@@ -7,7 +7,7 @@ use super::observed::add_systematic;
 use super::polarized::is_polarized;
 use super::truth::SPOT;
 use super::visibilities::{VisibilitySettings, all_products, frames_of, prepared};
-use super::{Measured, Result, hours_per_m, sky};
+use super::{FitData, Result, hours_per_m, sky};
 use crate::fit::settings::{
     DataFiles, FitFile, InstrumentSettings, Loss, PixelShape, Scattering, Variability, Within,
     refuse,
@@ -19,7 +19,7 @@ use kerrlight_vlbi::observation::Observation;
 pub(super) const FILE: &str = "a table [data.visibilities] or [data.movie] with `path = \"FILE\"` (`kerrlight fit --init FILE` writes \
      all of it)";
 
-impl Measured {
+impl FitData {
     /// Refuses settings that name both a truth and data, or neither.
     ///
     /// # Errors
@@ -53,7 +53,7 @@ impl Measured {
             refuse!("{name} has {width} x {height} pixels, but screen.pixels says {n} x {n}");
         }
         let (movie, sky) = (Some(movie), sky(file).ok());
-        Ok(Measured { times, movie, sky, ..Measured::empty() })
+        Ok(FitData { times, movie, sky, ..FitData::empty() })
     }
 
     /// Takes measured visibilities as the data. `name` is what they are called in messages.
@@ -80,9 +80,9 @@ impl Measured {
         let mut all = Self::of_frames(observation, &file.loss, file.instrument.as_ref())?;
         let first = all.times[0];
         all.times.iter_mut().for_each(|time| *time = first_time + (*time - first) / per_m);
-        let (sky, varies) = (Some(sky(file)?), variability.is_some());
+        let (sky, has_intrinsic_variability) = (Some(sky(file)?), variability.is_some());
         let pulse = file.screen.pulse.unwrap_or(PixelShape::Delta).pulse();
-        Ok(Measured { sky, varies, pulse, ..all })
+        Ok(FitData { sky, has_intrinsic_variability, pulse, ..all })
     }
 
     /// Visibilities as they are, with the gains and the leakage that a fit solves for. Times of frames are hours of UTC.
@@ -98,7 +98,7 @@ impl Measured {
         let gains = gains::priors(instrument, losses, &observation)?;
         let leakage = leakage::unknown(instrument, &observation)?;
         let visibilities = Some((observation, of_rows));
-        Ok(Measured { times, visibilities, gains, leakage, ..Measured::empty() })
+        Ok(FitData { times, visibilities, gains, leakage, ..FitData::empty() })
     }
 }
 

@@ -1,12 +1,12 @@
 //! What a fit looks through: sight lines, traced once.
 
+use super::observable::seen;
 use super::quiescent::quiescent;
-use super::seen::seen;
 use super::{AXIS, Result, known_axis, observer, spacing};
 use crate::fit::pixel_rays::PixelRays;
 use crate::fit::settings::{Absorption, AxisSearch, FitError, FitFile, Screen, Within, refuse};
 use crate::fit::{
-    ForwardModel, Motion, PolarizedView, Quiescent, Redshift, RingRays, Sampling, Seen,
+    ForwardModel, Motion, Observable, PolarizedView, Quiescent, Redshift, RingRays, Sampling,
     SightlineRequest, Sightlines,
 };
 use kerrlight_common::memory;
@@ -27,7 +27,7 @@ pub struct Instrument {
     /// How polarised light is seen; total intensity alone, without.
     pub polarized: Option<PolarizedView>,
     /// What data see.
-    pub seen: Seen,
+    pub seen: Observable,
     /// What does not move, where it is recovered.
     pub quiescent: Option<Quiescent>,
 }
@@ -133,7 +133,7 @@ impl Instrument {
     /// # Errors
     /// If the motion is out of range.
     pub fn pictured<T: Float>(&self, motion: &Motion) -> Result<ForwardModel<T>> {
-        self.model(motion, &Seen::Images)
+        self.model(motion, &Observable::Images)
     }
 
     /// The same as fluxes in some Stokes parameters.
@@ -145,10 +145,10 @@ impl Instrument {
         motion: &Motion,
         parameters: &[StokesParameter],
     ) -> Result<ForwardModel<f64>> {
-        self.model(motion, &Seen::Fluxes(parameters.to_vec()))
+        self.model(motion, &Observable::Fluxes(parameters.to_vec()))
     }
 
-    fn model<T: Float>(&self, motion: &Motion, seen: &Seen) -> Result<ForwardModel<T>> {
+    fn model<T: Float>(&self, motion: &Motion, seen: &Observable) -> Result<ForwardModel<T>> {
         let Self { lines, hole, redshift, polarized, .. } = self;
         let model = ForwardModel::new(lines, motion, hole, *redshift)?;
         let factors = polarized.as_ref().map(|view| view.factors(lines, hole, &motion.velocity));

@@ -9,7 +9,7 @@ use crate::fit::settings::{
     FieldKind, FitError, FitFile, Kind, LossKind, Occupancy, Optimiser, Start, Within, refuse,
 };
 use crate::fit::{
-    BatchSize, Beside, ChangePrice, OccupancyPlan, OccupancySettings, Region, Training,
+    BatchSize, ChangePrice, OccupancyPlan, OccupancySettings, Region, Training, WithStaticImage,
 };
 use crate::optimise::{Adam, Muon, Polynomial};
 use crate::representation::{
@@ -31,7 +31,7 @@ pub fn representation(
 ) -> Result<Box<dyn Representation<f32>>> {
     let inner = over_time(file, registry, times)?;
     Ok(match quiescent(file, file.screen.pixels * file.screen.pixels)? {
-        Some(image) => Box::new(Beside::new(inner, &image)),
+        Some(image) => Box::new(WithStaticImage::new(inner, &image)),
         None => inner,
     })
 }
@@ -254,7 +254,7 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     if let Some(held_out) = &file.held_out {
         held_out.check(file)?;
     }
-    if file.band.is_some() && file.unknown_world()?.is_some() {
+    if file.band.is_some() && file.unknown_geometry()?.is_some() {
         refuse!("band and numbers with a prior exclude each other");
     }
     let images_only = file.loss.iter().all(|loss| loss.data == LossKind::Image);
@@ -264,7 +264,7 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     if file.representation.kind == Kind::LinearGrid || file.training.start != Start::Drawn {
         linear(file)?;
     }
-    if file.unknown_world()?.is_some() {
+    if file.unknown_geometry()?.is_some() {
         linear(file).within("search")?;
     }
     check_prior(file)?;
@@ -315,7 +315,7 @@ fn enough_nodes_and_iterations(file: &FitFile) -> Result<()> {
         }
         grids.push(("training.start.linear.nodes", nodes));
     }
-    if let Some(unknown) = file.unknown_world()? {
+    if let Some(unknown) = file.unknown_geometry()? {
         grids.push(("search.coarse.nodes", unknown.search.coarse.nodes));
         grids.push(("search.fine.nodes", unknown.search.fine.nodes));
         let finest = unknown.search.finest.map(|view| ("search.finest.nodes", view.nodes));

@@ -1,27 +1,27 @@
 //! Light curves as the data of a fit: simulated, or measured.
 
 use super::curve::Curve;
-use super::seen::seen;
-use super::{Instrument, Measured, Result, Truth, hours_per_m, motion};
+use super::observable::seen;
+use super::{FitData, Instrument, Result, Truth, hours_per_m, motion};
 use crate::fit::band::Background;
 use crate::fit::settings::{
     DataFiles, FitError, FitFile, MeasuredCurve, Noise, PerStokes, SimulatedBackground,
     SimulatedCurve, Within, refuse,
 };
-use crate::fit::{FluxDatum, Seen};
+use crate::fit::{FluxDatum, Observable};
 use kerrlight_render::polarization::StokesParameter;
 use kerrlight_vlbi::light_curve::LightCurve;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 
-impl Measured {
+impl FitData {
     /// Takes a measured light curve as the data. `name` is what it is called in messages.
     ///
     /// # Errors
     /// If nothing is left of it, a parameter or an error is missing, or mass or settings are.
     pub fn of_light_curve(file: &FitFile, curve: LightCurve, name: &str) -> Result<Self> {
-        let (Some(DataFiles::LightCurve(settings)), Seen::Fluxes(parameters)) =
+        let (Some(DataFiles::LightCurve(settings)), Observable::Fluxes(parameters)) =
             (&file.data, seen(file)?)
         else {
             refuse!("{name} holds a light curve, and there is no [data.light-curve]")
@@ -136,8 +136,10 @@ pub(super) fn simulate(
     fit: &FitFile,
     instrument: &Instrument,
     settings: &SimulatedCurve,
-) -> Result<Measured> {
-    let Seen::Fluxes(parameters) = seen(fit)? else { refuse!("there is no loss of a light curve") };
+) -> Result<FitData> {
+    let Observable::Fluxes(parameters) = seen(fit)? else {
+        refuse!("there is no loss of a light curve")
+    };
     let hours = hours(settings)?;
     let times = times(file, &hours, settings.first_time)?;
     let mut truth = Truth::new(file)?;
@@ -161,7 +163,7 @@ pub(super) fn simulate(
     let movie = Some(truth.movie(file, instrument, &times)?);
     let fitted = fitted(&hours, settings.validate_after_min)?;
     let curve = Some(Curve { parameters, hours, data, fitted, background: None });
-    Ok(Measured { times, movie, curve, truth: Some(truth), ..Measured::empty() })
+    Ok(FitData { times, movie, curve, truth: Some(truth), ..FitData::empty() })
 }
 
 /// Adds a draw of a background to Q and U.

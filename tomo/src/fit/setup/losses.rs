@@ -2,7 +2,7 @@
 
 use super::imported::FILE;
 use super::polarized::images;
-use super::{Instrument, Measured, Result};
+use super::{FitData, Instrument, Result};
 use crate::fit::settings::{FitError, Loss, LossKind, Within, refuse};
 use crate::fit::{
     Data, ForwardModel, FrameTerm, ImageTerm, IntensityTerm, LightCurveTerm, Motion, Scan,
@@ -18,7 +18,7 @@ use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::operator::{Float, ImageGrid, Method, Transform};
 use kerrlight_vlbi::products::{ClosureCount, ClosureKind};
 
-impl Measured {
+impl FitData {
     /// The terms of the loss, of images of so many pixels.
     ///
     /// # Errors
@@ -167,7 +167,7 @@ impl Measured {
     }
 }
 
-impl Measured {
+impl FitData {
     /// From an image of the sky to the visibilities of a frame's rows that have Stokes I.
     pub(super) fn transform<T: Float>(
         &self,

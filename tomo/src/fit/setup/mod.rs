@@ -5,60 +5,63 @@ mod change;
 mod coarse_view;
 mod curve;
 mod drawn;
+mod fit_data;
 mod gains;
+mod geometry;
 mod glyph;
 mod held_out;
 mod imported;
-mod imprint;
 mod instrument;
 mod leakage;
 mod learning;
-mod least_memory;
 mod light_curve;
 mod linear_problem;
 mod losses;
-mod measured;
 mod medium;
+mod memory_budget;
+mod observable;
 mod observed;
 mod polarized;
 mod polarized_terms;
+mod preview_image;
 mod quadrature;
 mod quiescent;
 mod random_field;
-mod redrawn;
+mod resampled_noise;
 mod ring;
-mod seen;
 mod simulated;
 mod solved_leakage;
-mod still;
 mod truth;
 mod visibilities;
-mod world;
+mod warm_start;
 
-pub use band::{BandScan, BandWatch, BandWorld, band_motion, check_band, in_band_world, scan_band};
+pub use band::{
+    BandGeometry, BandScan, BandWatch, band_motion, check_band, in_band_geometry, scan_band,
+};
 pub use change::{change, emission_times};
 pub use coarse_view::CoarseView;
 pub use curve::Curve;
 pub use drawn::{Drawn, OtherModel};
+pub use fit_data::FitData;
+pub use geometry::{
+    FoundGeometry, GeometryPosterior, SearchWatch, Trial, find_geometry, in_geometry,
+    known_geometry, true_geometry,
+};
 pub use held_out::{Held, HeldWatch, best as best_held, check_folds, hold_out};
 pub use imported::Reduction;
-pub use imprint::{Given, Imprinted, imprint};
 pub use instrument::Instrument;
 pub use leakage::LeakageUnknown;
 pub use learning::{caution, check, representation, training};
-pub use least_memory::afford_all;
 pub use linear_problem::{draw_linear, solve_linear};
 pub use losses::forward_model;
-pub use measured::Measured;
+pub use memory_budget::check_memory_budget;
+pub use preview_image::{PreviewImage, PreviewView};
 pub use quadrature::Imaged;
 pub use random_field::deviation_of_prior;
 pub use solved_leakage::SolvedLeakage;
-pub use still::{Still, StillView};
 pub use truth::Truth;
 pub use visibilities::{VisibilitySettings, frames_of, prepared};
-pub use world::{
-    FoundWorld, SearchWatch, Trial, WorldPosterior, find_world, in_world, known_world, true_world,
-};
+pub use warm_start::{WarmStart, WarmStarted, warm_start};
 
 use super::linear::Prior;
 use super::settings::{
@@ -162,7 +165,7 @@ pub fn hours_per_m(file: &FitFile) -> Result<f64> {
 pub fn linear(file: &FitFile) -> Result<&Linear> {
     let missing = || {
         let why = format!(
-            "linear-grid, a linear start, and searches for axes and worlds need it; {LINEAR}"
+            "linear-grid, a linear start, and searches for axes and geometries need it; {LINEAR}"
         );
         FitError::missing("linear", why)
     };

@@ -3,7 +3,9 @@
 use super::Result;
 use super::leakage::observing;
 use super::polarized::is_polarized;
-use crate::fit::settings::{FitError, FitFile, Loss, Noise, Observation as Seen, Within, refuse};
+use crate::fit::settings::{
+    FitError, FitFile, Loss, Noise, Observation as Observable, Within, refuse,
+};
 use kerrlight_vlbi::array::Array;
 use kerrlight_vlbi::earth::{Frame, Ut1};
 use kerrlight_vlbi::gains::GainTable;
@@ -14,7 +16,10 @@ use kerrlight_vlbi::schedule::{self, Clock, Schedule, Setup};
 use kerrlight_vlbi::source::Source;
 
 /// Rows of the observation without values, and hours of UTC of its scans.
-pub(super) fn schedule_of(seen: &Seen, array: Option<&Array>) -> Result<(Observation, Vec<f64>)> {
+pub(super) fn schedule_of(
+    seen: &Observable,
+    array: Option<&Array>,
+) -> Result<(Observation, Vec<f64>)> {
     let source: Source = seen
         .source
         .parse()
@@ -39,7 +44,7 @@ pub(super) fn schedule_of(seen: &Seen, array: Option<&Array>) -> Result<(Observa
 }
 
 /// The clock of the observation and its hours.
-fn clock(seen: &Seen) -> Result<(Clock, [f64; 2])> {
+fn clock(seen: &Observable) -> Result<(Clock, [f64; 2])> {
     match (seen.utc, seen.gmst) {
         (Some(hours), None) => Ok((Clock::Utc, hours)),
         (None, Some(hours)) => Ok((Clock::Gmst, hours)),
@@ -64,7 +69,7 @@ pub(super) struct Spoiled {
 /// Leakage, errors of gains, thermal noise and systematic errors, in the order of light's way.
 pub(super) fn spoil(
     (file, fit): (&FitFile, &FitFile),
-    seen: &Seen,
+    seen: &Observable,
     observation: &mut Observation,
 ) -> Result<Spoiled> {
     let gains = seen.gains.as_ref();

@@ -24,7 +24,7 @@ pub(super) fn images(losses: &[Loss]) -> usize {
 /// # Errors
 /// Says what.
 pub(super) fn check(file: &FitFile) -> Result<()> {
-    if is_polarized(&file.loss) && file.unknown_world()?.is_some() {
+    if is_polarized(&file.loss) && file.unknown_geometry()?.is_some() {
         refuse!(
             "numbers with a prior are not searched with polarized-visibilities or polarimetric-ratios"
         );

@@ -1,6 +1,6 @@
 //! Polarised visibilities as the terms of a loss.
 
-use super::{Measured, Result};
+use super::{FitData, Result};
 use crate::fit::Scan;
 use crate::fit::settings::{Loss, LossKind};
 use kerrlight_vlbi::data_terms::{DataTerm, PolarizedTerm, RatioTerm};
@@ -11,7 +11,7 @@ use num_complex::Complex;
 /// Exponentials of a frame up to this many bytes are kept.
 const MEMORY: usize = 8 << 20;
 
-impl Measured {
+impl FitData {
     /// The products of a frame with what takes its images to their visibilities; none where nothing was measured.
     ///
     /// # Errors
@@ -64,21 +64,21 @@ impl Measured {
     ///
     /// # Errors
     /// If data make no term.
-    pub(super) fn beside(&self, movie: &[f32]) -> Result<Vec<Beside>> {
+    pub(super) fn beside(&self, movie: &[f32]) -> Result<Vec<FrameProducts>> {
         let pixels = movie.len() / self.times.len();
         let mut all = Vec::new();
         for (frame, images) in movie.chunks_exact(pixels).enumerate() {
             let Some((transform, term)) = self.products::<f32>(frame)? else { continue };
             let mut model = vec![Complex::new(0.0, 0.0); transform.data()];
             transform.forward(images, &mut model);
-            all.push(Beside { frame, term, model });
+            all.push(FrameProducts { frame, term, model });
         }
         Ok(all)
     }
 }
 
 /// The products of a frame, and visibilities of a model: I of all rows, then Q, then U.
-pub(super) struct Beside {
+pub(super) struct FrameProducts {
     pub frame: usize,
     pub term: PolarizedTerm,
     pub model: Vec<Complex<f32>>,

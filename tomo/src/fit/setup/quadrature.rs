@@ -1,9 +1,9 @@
 //! The images of a fit with twice the nodes on rays: what its sums along rays are off by.
 
-use super::seen::seen;
+use super::observable::seen;
 use super::{Instrument, Result};
 use crate::fit::settings::{FitFile, Region};
-use crate::fit::{Batch, Field, Motion, Sampling, Seen};
+use crate::fit::{Batch, Field, Motion, Observable, Sampling};
 use crate::representation::Workspace;
 
 /// Pixels whose rays are held at a time.
@@ -27,7 +27,7 @@ impl Imaged<'_> {
     pub fn finer(&self, field: Field<'_, f32>, frames: &[usize]) -> Result<Option<Vec<f32>>> {
         let Sampling::Gauss { order, split } = self.file.region.nodes else { return Ok(None) };
         let is_plain = self.file.polarization.is_none() && self.file.quiescent.is_none();
-        if !is_plain || seen(self.file)? != Seen::Images {
+        if !is_plain || seen(self.file)? != Observable::Images {
             return Ok(None);
         }
         let nodes = Sampling::Gauss { order, split: 2 * split };

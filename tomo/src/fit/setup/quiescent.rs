@@ -1,10 +1,10 @@
 //! What does not move, as settings say.
 
-use super::seen::seen;
+use super::observable::seen;
 use super::{Result, spacing};
 use crate::fit::linear::Prior;
 use crate::fit::settings::{FitError, FitFile, Kind, QuiescentSettings, refuse};
-use crate::fit::{BatchSize, Quiescent, Regulariser, Seen};
+use crate::fit::{BatchSize, Observable, Quiescent, Regulariser};
 use kerrlight_render::polarization::StokesParameter;
 
 /// The image beside the emission of so many pixels, where settings have one.
@@ -30,7 +30,7 @@ pub(super) fn quiescent(file: &FitFile, pixels: usize) -> Result<Option<Quiescen
     image.checked().map(Some)
 }
 
-fn priors(settings: &QuiescentSettings, seen: &Seen) -> Result<Vec<Prior>> {
+fn priors(settings: &QuiescentSettings, seen: &Observable) -> Result<Vec<Prior>> {
     let QuiescentSettings { smoothness, sparsity, .. } = *settings;
     let all = [
         ("quiescent.smoothness", Regulariser::Smoothness, smoothness),
@@ -64,7 +64,7 @@ pub(super) fn check(file: &FitFile) -> Result<()> {
     if file.band.is_some() {
         refuse!("quiescent and band exclude each other: a band's light curve has no constant part");
     }
-    if file.unknown_world()?.is_some() {
+    if file.unknown_geometry()?.is_some() {
         refuse!(
             "quiescent and numbers with a prior exclude each other: geometries are compared without what does not move"
         );

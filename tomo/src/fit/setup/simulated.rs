@@ -7,16 +7,16 @@ use super::leakage;
 use super::light_curve;
 use super::observed::{Spoiled, schedule_of, spoil};
 use super::polarized::{self, is_polarized};
-use super::{Instrument, Measured, Result, Truth, hours_per_m, known_world, motion, sky};
+use super::{FitData, Instrument, Result, Truth, hours_per_m, known_geometry, motion, sky};
+use crate::fit::geometry::Geometry;
 use crate::fit::settings::{FitError, FitFile, PixelShape, Within, refuse};
-use crate::fit::world::World;
 use kerrlight_common::frames::Frames;
 use kerrlight_vlbi::array::Array;
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::operator::{ImageGrid, Method, Pulse};
 use kerrlight_vlbi::simulate::{self, Movie, StokesMovie};
 
-impl Measured {
+impl FitData {
     /// Simulates the data of settings that have a truth, seen by `array` where they have an observation.
     ///
     /// # Errors
@@ -35,7 +35,7 @@ impl Measured {
         simulate(&simulated, file, &instrument, (array, None))
     }
 
-    /// The same, where a world that is drawn is one of matter on circular geodesics by another forward model than that of the
+    /// The same, where a geometry that is drawn is one of matter on circular geodesics by another forward model than that of the
     /// fit: images as means over many rays, visibilities as sums over as many fine pixels.
     ///
     /// # Errors
@@ -50,8 +50,8 @@ impl Measured {
             return Self::simulated(file, instrument, array);
         }
         let drawn = file.simulated()?;
-        let world = known_world(&drawn);
-        simulate(&drawn, file, instrument, (array, Some((other, world))))
+        let geometry = known_geometry(&drawn);
+        simulate(&drawn, file, instrument, (array, Some((other, geometry))))
     }
 }
 
@@ -59,8 +59,8 @@ fn simulate(
     file: &FitFile,
     fit: &FitFile,
     instrument: &Instrument,
-    (array, other): (Option<&Array>, Option<(OtherModel<'_>, World)>),
-) -> Result<Measured> {
+    (array, other): (Option<&Array>, Option<(OtherModel<'_>, Geometry)>),
+) -> Result<FitData> {
     if let Some(settings) = file.simulated_curve() {
         return light_curve::simulate(file, fit, instrument, settings);
     }
@@ -69,14 +69,14 @@ fn simulate(
         let times = times_of_images(file)?;
         let movie = match other {
             None => truth.movie(file, instrument, &times)?,
-            Some((model, world)) => {
-                let images = fine_images(file, &world, &truth, &times, model)?;
+            Some((model, geometry)) => {
+                let images = fine_images(file, &geometry, &truth, &times, model)?;
                 binned(&images, file.screen.pixels)
             }
         };
         let movie = Some(lit(&truth, movie)?);
         let sky = sky(file).ok();
-        return Ok(Measured { times, movie, sky, truth: Some(truth), ..Measured::empty() });
+        return Ok(FitData { times, movie, sky, truth: Some(truth), ..FitData::empty() });
     };
     let sky = sky(file)?;
     let (mut observation, hours) = schedule_of(seen, array)?;
@@ -87,8 +87,8 @@ fn simulate(
             let from = (file, fit, instrument);
             (fill(&mut observation, from, &truth, (&hours, &times), sky)?, pulse(fit))
         }
-        Some((model, world)) => {
-            let images = fine_images(file, &world, &truth, &times, model)?;
+        Some((model, geometry)) => {
+            let images = fine_images(file, &geometry, &truth, &times, model)?;
             let pixels = FINER * file.screen.pixels;
             let pixel_rad = sky.pixel_rad / FINER as f64;
             let grid = ImageGrid { width: pixels, height: pixels, pixel_rad };
@@ -106,7 +106,7 @@ fn simulate(
     let of_rows = observation.rows.iter().map(|row| frame(row.time_h)).collect();
     let visibilities = Some((observation, of_rows));
     let (movie, sky, truth) = (Some(movie), Some(sky), Some(truth));
-    Ok(Measured {
+    Ok(FitData {
         times,
         movie,
         visibilities,
@@ -117,7 +117,7 @@ fn simulate(
         true_gains,
         leakage,
         true_leakage,
-        ..Measured::empty()
+        ..FitData::empty()
     })
 }
 

@@ -1,7 +1,7 @@
 //! Leakage that a fit solves for in turn with the emission.
 
 use super::leakage::{LeakageUnknown, observing};
-use super::{Measured, Result};
+use super::{FitData, Result};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::polarimetry::{Leakage, LeakageProblem, LeakageTable, SharedLeakage};
 
@@ -21,7 +21,7 @@ const SETTLED: f64 = 1e-3;
 /// Changes of d below this are none.
 const STILL: f64 = 1e-9;
 
-impl Measured {
+impl FitData {
     /// Solves for the leakage beside images of I, Q and U of all frames, with gains where these are free; terms of the loss
     /// see it from now on. None if leakage is not solved for.
     ///

@@ -1,7 +1,7 @@
 //! A polarised flare seen through leaking feeds.
 
 use crate::fit::settings::FitFile;
-use crate::fit::setup::{self, Instrument, Measured};
+use crate::fit::setup::{self, FitData, Instrument};
 use kerrlight_render::scene::apply_override;
 use kerrlight_vlbi::array::built_in;
 
@@ -24,10 +24,10 @@ fn file(set: &[&str]) -> FitFile {
     FitFile::parse(&text).unwrap()
 }
 
-fn simulated(file: &FitFile) -> (Instrument, Measured) {
+fn simulated(file: &FitFile) -> (Instrument, FitData) {
     let instrument = Instrument::new(file).unwrap();
     let array = built_in(&file.observation().unwrap().array).unwrap();
-    let measured = Measured::simulated(file, &instrument, Some(&array)).unwrap();
+    let measured = FitData::simulated(file, &instrument, Some(&array)).unwrap();
     (instrument, measured)
 }
 

@@ -1,9 +1,9 @@
-//! Light curves as data, simulated and measured, and worlds weighed by them.
+//! Light curves as data, simulated and measured, and geometries weighed by them.
 
-use crate::fit::Seen;
+use crate::fit::Observable;
 use crate::fit::journal::Forgetful;
 use crate::fit::settings::{DataFiles, FitFile, Steps};
-use crate::fit::setup::{self, Instrument, Measured};
+use crate::fit::setup::{self, FitData, Instrument};
 use kerrlight_render::polarization::StokesParameter;
 use kerrlight_render::scene::apply_override;
 use kerrlight_vlbi::files::{light_curve_to_csv, parse_light_curve};
@@ -19,9 +19,9 @@ fn file(text: &str, set: &[&str]) -> FitFile {
     FitFile::parse(&text).unwrap()
 }
 
-fn simulated(file: &FitFile) -> (Instrument, Measured) {
+fn simulated(file: &FitFile) -> (Instrument, FitData) {
     let instrument = Instrument::new(file).unwrap();
-    let measured = Measured::simulated(file, &instrument, None).unwrap();
+    let measured = FitData::simulated(file, &instrument, None).unwrap();
     (instrument, measured)
 }
 
@@ -35,7 +35,9 @@ fn exact_simulated_light_curves() {
             "simulation.light_curve.noise=\"none\"",
         ];
         let (instrument, measured) = simulated(&file(text, &set));
-        assert!(matches!(&instrument.seen, Seen::Fluxes(parameters) if parameters.len() == 3));
+        assert!(
+            matches!(&instrument.seen, Observable::Fluxes(parameters) if parameters.len() == 3)
+        );
         let curve = measured.curve.unwrap();
         assert_eq!((curve.hours.len(), curve.data.len()), (98, 294));
         let first = curve.hours.iter().filter(|h| (*h - curve.hours[0]) * 60.0 <= 100.0).count();
@@ -57,7 +59,7 @@ fn exact_simulated_light_curves() {
 
 /// The inclination, the sense of rotation, the radius and the azimuth of the tube are found.
 #[test]
-fn exact_worlds_of_the_published_test() {
+fn exact_geometries_of_the_published_test() {
     let set = ["screen.pixels=48", "band.nodes=41", "band.widths=[1.0]", "band.lengths=[4.0]"];
     let mut file = file(PUBLISHED, &set);
     let band = file.band.as_mut().unwrap();
@@ -67,12 +69,12 @@ fn exact_worlds_of_the_published_test() {
     let settings = file.band.clone().unwrap();
     let found =
         setup::scan_band(&file, &measured, &settings, &Forgetful, &|_| true).unwrap().unwrap();
-    assert_eq!(found.worlds.len(), 4);
-    let best = &found.worlds[found.best];
+    assert_eq!(found.geometries.len(), 4);
+    let best = &found.geometries[found.best];
     assert_eq!((best.inclination_deg, best.rotation_factor), (12.0, 1.0));
-    for world in &found.worlds {
-        let worse = best.ln_posterior - world.ln_posterior;
-        assert!(world == best || worse > 8.0, "{world:?}: {worse}");
+    for geometry in &found.geometries {
+        let worse = best.ln_posterior - geometry.ln_posterior;
+        assert!(geometry == best || worse > 8.0, "{geometry:?}: {worse}");
     }
     assert!((found.radius.median - 10.0).abs() < 0.3, "{:?}", found.radius);
     let azimuth = found.azimuth.median.to_degrees().rem_euclid(360.0);
@@ -107,7 +109,7 @@ fn exact_position_angles_of_the_spin() {
     let settings = file.band.clone().unwrap();
     let found =
         setup::scan_band(&file, &measured, &settings, &Forgetful, &|_| true).unwrap().unwrap();
-    assert_eq!(found.worlds[found.best].position_angle_deg, 40.0, "{:?}", found.worlds);
+    assert_eq!(found.geometries[found.best].position_angle_deg, 40.0, "{:?}", found.geometries);
 }
 
 fn measured_file(more: &str) -> FitFile {
@@ -135,7 +137,7 @@ fn exact_measured_light_curves() {
     let file = measured_file(more);
     let text = light_curve_to_csv(&curve(60));
     let found =
-        Measured::of_light_curve(&file, parse_light_curve(&text).unwrap(), "curve.csv").unwrap();
+        FitData::of_light_curve(&file, parse_light_curve(&text).unwrap(), "curve.csv").unwrap();
     let curve = found.curve.unwrap();
     assert_eq!(
         (curve.parameters.as_slice(), curve.hours.len()),
@@ -154,7 +156,7 @@ fn exact_measured_light_curves() {
 #[test]
 fn regress_light_curves_that_mean_nothing_are_refused() {
     let says = |more: &str, curve: LightCurve| {
-        Measured::of_light_curve(&measured_file(more), curve, "c.csv").err().unwrap().to_string()
+        FitData::of_light_curve(&measured_file(more), curve, "c.csv").err().unwrap().to_string()
     };
     let text = says("utc_h = [1.0, 2.0]", curve(9));
     assert!(text.contains("c.csv") && text.contains("no samples are left"), "{text}");
@@ -177,7 +179,7 @@ fn regress_light_curves_that_mean_nothing_are_refused() {
     assert!(text.contains("polarization is missing: Q and U need the field"), "{text}");
 }
 
-/// A tube before a background that is drawn: the world is found, and data without a flare to speak of ask for none.
+/// A tube before a background that is drawn: the geometry is found, and data without a flare to speak of ask for none.
 #[test]
 fn exact_a_flare_before_a_background() {
     let set = [
@@ -202,7 +204,7 @@ fn exact_a_flare_before_a_background() {
         (measured, found)
     };
     let (measured, found) = scan(0.3);
-    let best = &found.worlds[found.best];
+    let best = &found.geometries[found.best];
     assert_eq!((best.inclination_deg, best.rotation_factor), (12.0, 1.0));
     assert!(found.ln_bayes_factor > 20.0, "{}", found.ln_bayes_factor);
     assert!((found.radius.low..found.radius.high).contains(&10.0), "{:?}", found.radius);
@@ -233,7 +235,7 @@ fn regress_backgrounds_that_mean_nothing_are_refused() {
             Err(error) => return error.to_string(),
         };
         let instrument = Instrument::new(&file).unwrap();
-        let measured = match Measured::simulated(&file, &instrument, None) {
+        let measured = match FitData::simulated(&file, &instrument, None) {
             Ok(measured) => measured,
             Err(error) => return error.to_string(),
         };

@@ -17,8 +17,8 @@ fn image() -> Quiescent {
     }
 }
 
-fn beside() -> Beside<f64> {
-    Beside::new(Box::new(grid()), &image())
+fn beside() -> WithStaticImage<f64> {
+    WithStaticImage::new(Box::new(grid()), &image())
 }
 
 fn trainer(representation: &dyn Representation<f64>) -> Trainer<'_, f64> {
@@ -94,7 +94,7 @@ fn exact_the_image_is_added_to_every_frame() {
 fn exact_steps_stay_inside_the_box() {
     let inner = Box::new(training::network());
     let image = || Quiescent { priors: Vec::new(), ..image() };
-    let representation = Beside::<f32>::new(inner, &image());
+    let representation = WithStaticImage::<f32>::new(inner, &image());
     let training = Training { batch: BatchSize::Frames(2), occupancy: None, ..settings() };
     let axis = Axis::new([0.1, 0.5, 0.8]).unwrap();
     let mut state = State::new(&representation, axis, &training);

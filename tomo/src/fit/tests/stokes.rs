@@ -166,7 +166,7 @@ fn exact_polarised_spot_of_the_renderer() {
         .unwrap();
     let all = vec![StokesParameter::I, StokesParameter::Q, StokesParameter::U];
     let model = ForwardModel::<f64>::new(&lines, &motion, &hole, None).unwrap();
-    let model = model.seen(Some(&factors), &Seen::StokesImages(all)).unwrap();
+    let model = model.seen(Some(&factors), &Observable::StokesImages(all)).unwrap();
     // Where the renderer has its spot at the time of the frame.
     let phase = 40f64.to_radians() + 40.0 / (7f64.powf(1.5) + 0.9);
     let center = [7.0 * phase.cos(), 7.0 * phase.sin(), 0.0];
@@ -250,7 +250,7 @@ fn code_lowered_rule_of_circular_orbits() {
     }
 }
 
-fn of_factors(seen: &Seen) -> (ForwardModel<f64>, ForwardModel<f64>) {
+fn of_factors(seen: &Observable) -> (ForwardModel<f64>, ForwardModel<f64>) {
     let (hole, lines, screen) = traced(0.6, 40.0);
     let velocity = AngularVelocity::Keplerian { drag: 0.6 };
     let factors = view(law(FieldFrame::Ideal, [0.6, 0.2, 0.5]), &screen, 40.0)
@@ -258,7 +258,8 @@ fn of_factors(seen: &Seen) -> (ForwardModel<f64>, ForwardModel<f64>) {
         .unwrap();
     let motion = Motion { velocity, reference: 0.0, injection: None, times: vec![0.0, 20.0, 45.0] };
     let model = || ForwardModel::<f64>::new(&lines, &motion, &hole, None).unwrap();
-    let all = Seen::StokesImages(vec![StokesParameter::I, StokesParameter::Q, StokesParameter::U]);
+    let all =
+        Observable::StokesImages(vec![StokesParameter::I, StokesParameter::Q, StokesParameter::U]);
     let seen = model().seen(Some(&factors), seen).unwrap();
     (seen, model().seen(Some(&factors), &all).unwrap())
 }
@@ -267,7 +268,7 @@ fn of_factors(seen: &Seen) -> (ForwardModel<f64>, ForwardModel<f64>) {
 #[test]
 fn exact_fluxes_are_sums_of_images() {
     let wanted = vec![StokesParameter::U, StokesParameter::I, StokesParameter::Q];
-    let (flux, images) = of_factors(&Seen::Fluxes(wanted));
+    let (flux, images) = of_factors(&Observable::Fluxes(wanted));
     assert_eq!((flux.pixels(), images.pixels()), (3, 36));
     let axis = Axis::new([0.0, 0.0, 1.0]).unwrap();
     let spot = |x: [f64; 3]| (-0.1 * distance(x, [6.0, 2.0, 0.5]).powi(2)).exp();
@@ -315,7 +316,7 @@ fn exact_fluxes_are_sums_of_images() {
 /// Gradients of a loss of Q and U against central differences.
 #[test]
 fn exact_gradients_of_polarised_fluxes() {
-    let (model, _) = of_factors(&Seen::Fluxes(vec![StokesParameter::Q, StokesParameter::U]));
+    let (model, _) = of_factors(&Observable::Fluxes(vec![StokesParameter::Q, StokesParameter::U]));
     let axis = Axis::new([0.0, 0.0, 1.0]).unwrap();
     let term = ImageTerm::new(vec![3.0, -2.0, 1.0, 0.5, -1.0, 4.0], 2, 0.5).unwrap();
     let others: Vec<crate::fit::Weighted<dyn FrameTerm<f64>>> =

@@ -5,7 +5,7 @@ use super::super::{FileError, check_numbers};
 use super::{antenna_table, frequencies, w_coordinate};
 use crate::Error;
 use crate::earth::SourcePosition;
-use crate::observation::{Basis, Channel, Observation, Row, Unknown};
+use crate::observation::{Basis, Channel, MissingMetadata, Observation, Row};
 use std::borrow::Cow;
 
 const PARAMETERS: [&str; 9] =
@@ -31,21 +31,21 @@ struct Facts {
 /// there are no rows, more than 255 stations, rows of a channel that is not listed, or visibilities
 /// beyond single precision.
 pub fn write(observation: &Observation) -> Result<Vec<u8>, Error> {
-    let frequency_hz = observation.frequency_hz.ok_or(Unknown("the frequency"))?;
-    let bandwidth_hz = observation.bandwidth_hz.ok_or(Unknown("the bandwidth"))?;
+    let frequency_hz = observation.frequency_hz.ok_or(MissingMetadata("the frequency"))?;
+    let bandwidth_hz = observation.bandwidth_hz.ok_or(MissingMetadata("the bandwidth"))?;
     let only = vec![Channel { frequency_hz, bandwidth_hz }];
     let several = !observation.channels.is_empty();
     let mut facts = Facts {
         position: observation
             .position
-            .ok_or(Unknown("the source's right ascension and declination"))?,
-        mjd: observation.mjd.ok_or(Unknown("the date (MJD)"))?,
+            .ok_or(MissingMetadata("the source's right ascension and declination"))?,
+        mjd: observation.mjd.ok_or(MissingMetadata("the date (MJD)"))?,
         frequency_hz,
         channels: if several { observation.channels.clone() } else { only },
         uv_scale: 1.0,
     };
     if observation.stations.iter().any(|station| station.position.is_none()) {
-        return Err(Unknown("the stations' positions (an array)").into());
+        return Err(MissingMetadata("the stations' positions (an array)").into());
     }
     if observation.stations.len() > 255 {
         let count = observation.stations.len();

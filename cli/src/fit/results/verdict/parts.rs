@@ -1,6 +1,6 @@
 //! Residuals by frame, by baseline and by station.
 
-use super::Judged;
+use super::DataVerdict;
 use crate::report::{Axis, LinePlot, Marks, Series, Table};
 use kerrlight_tomo::fit::verdict::{Errors, Part, Tested};
 use kerrlight_tomo::recovery::short;
@@ -55,13 +55,13 @@ fn plot(
 }
 
 /// Where χ² of the first data with errors is expected.
-fn expected(judged: &Judged) -> Option<f64> {
+fn expected(judged: &DataVerdict) -> Option<f64> {
     let noisy = |tested: &&Tested| tested.errors != Errors::Weight;
     judged.terms.iter().map(|(_, tested)| tested).find(noisy).map(|tested| tested.expected.chi2)
 }
 
 /// Residuals of each frame; nothing of a single one.
-pub fn over_time(judged: &Judged) -> Option<LinePlot> {
+pub fn over_time(judged: &DataVerdict) -> Option<LinePlot> {
     let of = |(name, tested): &(String, Tested)| {
         series(name, judged.times.iter().copied().zip(&tested.statistics.frames))
     };
@@ -74,7 +74,7 @@ pub fn over_time(judged: &Judged) -> Option<LinePlot> {
 
 /// Residuals of each baseline, triangle and quadrangle against its longest baseline, whose length the caller knows.
 pub fn over_baselines(
-    judged: &Judged,
+    judged: &DataVerdict,
     length: impl Fn([u16; 2]) -> Option<f64>,
 ) -> Option<LinePlot> {
     let longest = |stations: &[u16]| {
@@ -94,7 +94,7 @@ pub fn over_baselines(
 }
 
 /// Residuals of all data that a station is part of; nothing without stations.
-pub fn by_station(judged: &Judged) -> Option<Table> {
+pub fn by_station(judged: &DataVerdict) -> Option<Table> {
     let measured: Vec<_> =
         judged.terms.iter().filter(|(_, t)| !t.statistics.stations.is_empty()).collect();
     let stations: BTreeSet<u16> =
@@ -122,7 +122,7 @@ pub fn by_station(judged: &Judged) -> Option<Table> {
 
 /// For results.json: χ² per data point by station.
 pub(super) fn station_values(
-    judged: &Judged,
+    judged: &DataVerdict,
     tested: &Tested,
 ) -> serde_json::Map<String, serde_json::Value> {
     let of = |(station, part): (&u16, &Part)| {

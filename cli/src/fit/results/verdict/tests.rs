@@ -7,7 +7,7 @@ use kerrlight_tomo::fit::setup::{self, Instrument};
 use std::path::Path;
 
 /// The verdict of the simulated movie times `scale`, of the built-in experiment with changes.
-fn of_truth(changes: &[&str], scale: f32) -> Judged {
+fn of_truth(changes: &[&str], scale: f32) -> DataVerdict {
     let small = ["screen.pixels=20", "simulation.observation.scans=24"];
     let text = small
         .iter()

@@ -1,7 +1,7 @@
 //! The hot spots.
 
+mod intersections;
 mod light;
-mod meeting;
 mod sighting;
 mod trees;
 
@@ -13,10 +13,10 @@ use crate::scene::Scene;
 use crate::transport::optics::Optics;
 use crate::transport::result::Accumulator;
 use crate::transport::tree::WalkScratch;
+use intersections::{Intersections, join};
 use kerrlight_geodesic::vector::{cross, dot};
 use kerrlight_geodesic::{Kerr, Ray};
 use light::SpotLight;
-use meeting::{Met, join};
 use std::sync::{Arc, Mutex, PoisonError};
 use trees::SpotSpans;
 
@@ -43,7 +43,7 @@ const DEEPEST: u32 = 24;
 #[derive(Debug, Default)]
 pub(in crate::transport) struct SpotScratch {
     walk: WalkScratch,
-    met: Vec<Met>,
+    met: Vec<Intersections>,
     pieces: Vec<[f64; 2]>,
     intervals: Vec<[f64; 2]>,
 }

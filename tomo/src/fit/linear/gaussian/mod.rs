@@ -13,7 +13,7 @@ mod tests;
 
 pub use matern::{Matern, Roughness};
 
-use super::walk::Voxels;
+use super::ray_weights::Voxels;
 use crate::Error;
 use crate::fit::regulariser::Shape;
 use modes::Modes;

@@ -3,7 +3,7 @@
 use super::super::change::Change;
 use super::*;
 use crate::fit::Region;
-use crate::fit::linear::Patience;
+use crate::fit::linear::StopRule;
 use crate::representation::Degree;
 use crate::representation::{Allowed, Carrier, Changing};
 use kerrlight_render::dynamics::{AngularVelocity, Velocity};
@@ -134,7 +134,7 @@ fn solve(model: &ForwardModel<f64>, pixels: Vec<f64>, change: Change) -> LinearS
 #[test]
 fn exact_between_a_field_that_is_carried_and_one_that_is_free() {
     let (model, voxels) = (model(false), Voxels::cube(9, 5.0, Degree::Linear));
-    let spot = lit::spot(&voxels);
+    let spot = initial_fields::spot(&voxels);
     for allowed in ALLOWED {
         let knots = knots(allowed);
         let shares: &[f64] = match allowed {
@@ -171,7 +171,7 @@ fn exact_between_a_field_that_is_carried_and_one_that_is_free() {
 #[test]
 fn exact_sharpened_births_keep_their_light() {
     let (model, voxels) = (model(false), Voxels::cube(9, 5.0, Degree::Linear));
-    let spot = lit::spot(&voxels);
+    let spot = initial_fields::spot(&voxels);
     let truth: Vec<f64> =
         [0.0, 0.0, 1.0, 0.0].iter().flat_map(|s| spot.iter().map(move |e| s * e)).collect();
     let pixels = images(&model, &changing(&voxels, knots(Allowed::Births)), &truth);
@@ -180,7 +180,7 @@ fn exact_sharpened_births_keep_their_light() {
     let found = |sharpen| {
         let change = Change { weight: 100.0, sharpen, ..births() };
         let problem = LinearProblem { change, upper: 2.0, ..of_images(&model, &terms, voxels) };
-        let least = problem.settled(None, Patience::looking(150)).unwrap();
+        let least = problem.settled(None, StopRule::looking(150)).unwrap();
         // What is there from the beginning has no price.
         let light: f64 = least.x[voxels.count()..].iter().sum();
         (light / truth.iter().sum::<f64>(), problem.misfit(&least.x).unwrap())
@@ -196,7 +196,7 @@ fn exact_births_are_within_their_region() {
     let (model, voxels) = (model(false), Voxels::cube(9, 5.0, Degree::Linear));
     let truth: Vec<f64> = [0.2, 0.0, 1.0, 0.0]
         .iter()
-        .flat_map(|s| lit::spot(&voxels).into_iter().map(move |e| s * e))
+        .flat_map(|s| initial_fields::spot(&voxels).into_iter().map(move |e| s * e))
         .collect();
     let pixels = images(&model, &changing(&voxels, knots(Allowed::Births)), &truth);
     let region = Region { r_min: 3.0, r_max: 4.5, z_width: 1.0 };

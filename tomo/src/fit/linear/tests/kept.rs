@@ -2,7 +2,7 @@
 
 use super::super::rows::Held;
 use super::*;
-use crate::fit::Seen;
+use crate::fit::Observable;
 use crate::representation::Allowed;
 use kerrlight_render::polarization::StokesParameter;
 
@@ -69,7 +69,7 @@ fn exact_rows_that_are_made_again_are_those_that_are_kept() {
         let knots = Knots { first: 0.05, spacing: 0.2, count: 4, allowed };
         assert_room_changes_no_bit(&forward_model(), knots, Degree::Linear);
     }
-    let flux = forward_model().seen(None, &Seen::Fluxes(vec![StokesParameter::I])).unwrap();
+    let flux = forward_model().seen(None, &Observable::Fluxes(vec![StokesParameter::I])).unwrap();
     assert_room_changes_no_bit(&flux, Knots::STEADY, Degree::Linear);
 }
 

@@ -2,9 +2,9 @@
 
 use super::super::convex::Convex;
 use super::super::objective::{Objective, Penalised};
-use super::lit::{Seen as Array, array, spot};
+use super::initial_fields::{Observable as Array, array, spot};
 use super::*;
-use crate::fit::{Beside, Quiescent, Seen};
+use crate::fit::{Observable, Quiescent, WithStaticImage};
 use kerrlight_render::polarization::{Stokes, StokesParameter};
 
 const UPPER: f64 = 2.0;
@@ -33,7 +33,7 @@ fn beside(weights: [f64; 2], polarized: bool) -> ForwardModel<f64> {
     let of = |k: usize| Stokes { i: 1.0, q: number[k] - 0.5, u: number[k + 1] - 0.5, v: 0.0 };
     let factors: Vec<Stokes> = (0..model.points()).map(|k| of(3 * k)).collect();
     let seen = vec![StokesParameter::I, StokesParameter::Q, StokesParameter::U];
-    let model = model.seen(Some(&factors), &Seen::StokesImages(seen)).unwrap();
+    let model = model.seen(Some(&factors), &Observable::StokesImages(seen)).unwrap();
     model.beside(image(&[false, true, true], weights)).unwrap()
 }
 
@@ -49,7 +49,7 @@ fn problem<'a>(
 /// Images of values at all nodes, and of the image behind them, by way of the representation.
 fn images(model: &ForwardModel<f64>, x: &[f64]) -> Vec<f64> {
     let grid = Box::new(Voxels::cube(6, 5.0, Degree::Linear).field().unwrap());
-    let representation = Beside::new(grid, model.quiescent().unwrap());
+    let representation = WithStaticImage::new(grid, model.quiescent().unwrap());
     let representation = &representation;
     let field = Field { representation, parameters: x, axis: axis(), occupancy: None };
     let mut movie = vec![0.0; FRAMES.len() * model.pixels()];

@@ -1,7 +1,7 @@
 //! The best field of one of many similar problems.
 
 use super::*;
-use crate::fit::linear::Patience;
+use crate::fit::linear::StopRule;
 
 /// Bright nodes in a dark field: few iterations over all of them and many over those that shine come as near the minimum as many
 /// over all.
@@ -20,7 +20,7 @@ fn exact_few_nodes_that_shine_are_as_good_as_all() {
     let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
     let problem = of_images(&model, &terms, voxels);
     let least = problem.least(4000).unwrap();
-    let how = Patience { looking: 20, rounds: 4, settling: 1000 };
+    let how = StopRule { looking: 20, rounds: 4, settling: 1000 };
     let settled = problem.settled(None, how).unwrap();
     let few = problem.least(20).unwrap();
     // Among 405 pixels, ten iterations that lower χ² by less than a hundredth of what noise does end a round.
@@ -31,6 +31,6 @@ fn exact_few_nodes_that_shine_are_as_good_as_all() {
     moved.rotate_right(1);
     let again = problem.settled(Some(&moved), how).unwrap();
     assert!(again.value < 1.01 * least.value, "{} {}", again.value, least.value);
-    let plain = problem.settled(None, Patience::looking(20)).unwrap();
+    let plain = problem.settled(None, StopRule::looking(20)).unwrap();
     assert_eq!(plain.value, few.value);
 }

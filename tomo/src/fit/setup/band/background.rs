@@ -1,6 +1,6 @@
 //! What the source emits beside a flare in a band: settings, and what is expected of it.
 
-use super::{BandWorld, turn};
+use super::{BandGeometry, turn};
 use crate::fit::FluxDatum;
 use crate::fit::band::{Background, CurveRows, expected_background};
 use crate::fit::settings::{BackgroundSettings, BandSettings, refuse};
@@ -45,17 +45,17 @@ pub(super) fn backgrounds(settings: &BandSettings) -> Vec<Background> {
     all
 }
 
-/// What the background is expected to be in a world and its standard deviation, Jy, as the data have it.
+/// What the background is expected to be in a geometry and its standard deviation, Jy, as the data have it.
 pub(super) fn expected(
     rows: &CurveRows,
     curve: &Curve,
     data: &[f64],
-    world: &BandWorld,
+    geometry: &BandGeometry,
 ) -> Result<Vec<FluxDatum>> {
-    let all = expected_background(rows, data, &world.band)?;
+    let all = expected_background(rows, data, &geometry.band)?;
     let sigma = |datum: &Option<FluxDatum>| datum.map_or(0.0, |[_, sigma]| sigma);
     let scaled = |part: usize| all.iter().zip(&curve.data).map(move |(x, d)| x[part] * sigma(d));
     let mut values: Vec<f64> = scaled(0).collect();
-    turn(&mut values, -world.position_angle_deg);
+    turn(&mut values, -geometry.position_angle_deg);
     Ok(values.into_iter().zip(scaled(1)).map(|(value, deviation)| [value, deviation]).collect())
 }

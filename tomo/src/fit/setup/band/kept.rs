@@ -1,20 +1,24 @@
-//! A world that was weighed, as the numbers that a journal keeps.
+//! A geometry that was weighed, as the numbers that a journal keeps.
 
-use super::BandWorld;
+use super::BandGeometry;
 use crate::fit::band::{Background, Band};
 use crate::fit::linear::Roughness;
 
-impl BandWorld {
+impl BandGeometry {
     /// All that it is made of.
-    pub(super) fn numbers(worlds: &[Self]) -> Vec<f64> {
-        let mut all = vec![worlds.len() as f64];
-        for world in worlds {
-            all.extend([world.inclination_deg, world.rotation_factor, world.position_angle_deg]);
-            all.extend([world.ln_posterior, world.by_radius.len() as f64]);
-            all.extend_from_slice(&world.by_radius);
-            all.extend(of_band(&world.band));
-            all.push(world.likely.len() as f64);
-            for (band, ln) in &world.likely {
+    pub(super) fn numbers(geometries: &[Self]) -> Vec<f64> {
+        let mut all = vec![geometries.len() as f64];
+        for geometry in geometries {
+            all.extend([
+                geometry.inclination_deg,
+                geometry.rotation_factor,
+                geometry.position_angle_deg,
+            ]);
+            all.extend([geometry.ln_posterior, geometry.by_radius.len() as f64]);
+            all.extend_from_slice(&geometry.by_radius);
+            all.extend(of_band(&geometry.band));
+            all.push(geometry.likely.len() as f64);
+            for (band, ln) in &geometry.likely {
                 all.extend(of_band(band));
                 all.push(*ln);
             }
@@ -26,12 +30,12 @@ impl BandWorld {
     pub(super) fn of_numbers(numbers: &[f64]) -> Option<Vec<Self>> {
         let mut next = numbers.iter().copied();
         let count = next.next()?;
-        let worlds = (0..count as usize).map(|_| world(&mut next)).collect::<Option<_>>()?;
-        next.next().is_none().then_some(worlds)
+        let geometries = (0..count as usize).map(|_| geometry(&mut next)).collect::<Option<_>>()?;
+        next.next().is_none().then_some(geometries)
     }
 }
 
-fn world(next: &mut impl Iterator<Item = f64>) -> Option<BandWorld> {
+fn geometry(next: &mut impl Iterator<Item = f64>) -> Option<BandGeometry> {
     let [inclination_deg, rotation_factor, position_angle_deg, ln_posterior] =
         [next.next()?, next.next()?, next.next()?, next.next()?];
     let radii = next.next()? as usize;
@@ -40,7 +44,7 @@ fn world(next: &mut impl Iterator<Item = f64>) -> Option<BandWorld> {
     let likely = next.next()? as usize;
     let likely =
         (0..likely).map(|_| Some((self::band(next)?, next.next()?))).collect::<Option<_>>()?;
-    Some(BandWorld {
+    Some(BandGeometry {
         inclination_deg,
         rotation_factor,
         position_angle_deg,
@@ -75,7 +79,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn exact_worlds_come_back() {
+    fn exact_geometries_come_back() {
         let background = Background {
             constant: 0.1,
             variation: 0.2,
@@ -83,7 +87,7 @@ mod tests {
             roughness: Roughness::FiveHalves,
         };
         let band = Band { radius: 9.5, power: 1e-3, background, ..Band::DARK };
-        let world = BandWorld {
+        let geometry = BandGeometry {
             inclination_deg: 12.0,
             rotation_factor: -0.8,
             position_angle_deg: 30.0,
@@ -92,10 +96,10 @@ mod tests {
             band,
             likely: vec![(Band::DARK, -3.0), (band, -0.5)],
         };
-        let worlds = vec![world.clone(), BandWorld { likely: Vec::new(), ..world }];
-        let numbers = BandWorld::numbers(&worlds);
-        assert_eq!(BandWorld::of_numbers(&numbers), Some(worlds));
-        assert_eq!(BandWorld::of_numbers(&numbers[..numbers.len() - 1]), None);
-        assert_eq!(BandWorld::of_numbers(&[]), None);
+        let geometries = vec![geometry.clone(), BandGeometry { likely: Vec::new(), ..geometry }];
+        let numbers = BandGeometry::numbers(&geometries);
+        assert_eq!(BandGeometry::of_numbers(&numbers), Some(geometries));
+        assert_eq!(BandGeometry::of_numbers(&numbers[..numbers.len() - 1]), None);
+        assert_eq!(BandGeometry::of_numbers(&[]), None);
     }
 }

@@ -1,0 +1,83 @@
+//! Stretches of steps that a device takes, and what is done with what they lead to.
+
+use super::device::{DeviceRunner, Drawn, Stretch, Taken};
+use super::state::{Outcome, State, step_back};
+use super::trainer::Trainer;
+use super::training::BatchSize;
+use crate::Error;
+use kerrlight_common::simd::Float;
+use std::time::Instant;
+
+/// Time after which a stretch should be over, so that signals are heard.
+const SECONDS: f64 = 0.5;
+
+impl<T: Float> Trainer<'_, T> {
+    /// Steps up to the next one at which anything is done beside them.
+    pub(super) fn delegated(
+        &mut self,
+        delegate: &mut DeviceRunner<T>,
+        state: &mut State<T>,
+    ) -> Result<Outcome, Error> {
+        self.refresh(&mut state.now);
+        self.objective.model.weigh(state.now.axis);
+        let count = self.stretch(delegate, state.now.step);
+        let draws = (0..count).map(|k| self.drawn(state.now.step + k)).collect();
+        let rates = (0..count).map(|k| self.rate(&state.now, k)).collect();
+        let (objective, occupancy) = (&self.objective, self.mask(&state.now));
+        let (adam, axis) = (self.training.adam, state.now.axis);
+        let stretch = Stretch { objective, adam, axis, occupancy, draws, rates };
+        let begun = Instant::now();
+        let taken = delegate.device.take(&stretch, &state.now)?;
+        let each = begun.elapsed().as_secs_f64() / count as f64;
+        delegate.pace = (SECONDS / each.max(1e-9)) as u64;
+        self.moved(taken, state)
+    }
+
+    /// How many steps to take at once.
+    fn stretch(&self, delegate: &DeviceRunner<T>, step: u64) -> u64 {
+        let to_multiple = |of: u64| of - step % of;
+        let mut count =
+            to_multiple(delegate.pause).min(to_multiple(self.training.keep_every.max(1)));
+        if let Some(plan) = self.training.occupancy {
+            let every = plan.every.max(1);
+            let next = match step.checked_sub(plan.warm_up) {
+                Some(since) => every - since % every,
+                None => plan.warm_up - step,
+            };
+            count = count.min(next);
+        }
+        let most = delegate.pace.min(delegate.device.most() as u64);
+        count.min(delegate.end.saturating_sub(step)).min(most).max(1)
+    }
+
+    fn drawn(&mut self, step: u64) -> Drawn {
+        self.choose(step);
+        match self.training.batch {
+            BatchSize::Pixels(_) => Drawn::Pixels(self.pairs.clone()),
+            BatchSize::Frames(_) | BatchSize::All => Drawn::Frames(self.frames.clone()),
+        }
+    }
+
+    /// Judges the losses as single steps do, and moves on.
+    fn moved(&self, taken: Taken<T>, state: &mut State<T>) -> Result<Outcome, Error> {
+        let Taken { parameters, moments: [first, second], losses, of_axis } = taken;
+        let begin = state.now.step;
+        let finite = of_axis.iter().all(|slope| slope.is_finite());
+        for (loss, step) in losses.iter().zip(begin..) {
+            let calm = state.good.as_ref().map_or(f64::INFINITY, |good| good.loss);
+            if !loss.total.is_finite() || !finite || loss.total > self.training.divergence * calm {
+                return Ok(step_back(state, loss.total, step)?);
+            }
+            state.now.loss = loss.total;
+            if step == begin && step.is_multiple_of(self.training.keep_every.max(1)) {
+                state.good = Some(Box::new(state.now.clone()));
+            }
+        }
+        let now = &mut state.now;
+        self.turn(now, of_axis);
+        now.step += losses.len() as u64;
+        now.adam.steps += losses.len() as u64;
+        (now.parameters, now.adam.first, now.adam.second) = (parameters, first, second);
+        Ok(Outcome::Done(losses.into_iter().last().unwrap_or_default()))
+    }
+}

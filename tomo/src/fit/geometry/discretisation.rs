@@ -1,0 +1,209 @@
+//! What finer models would move a geometry by, one Gauss–Newton step of each from the best geometry, and what the χ² that they
+//! leave may.
+
+use super::covariance::covariance;
+use super::gauss_newton::{Bowl, Polish};
+use super::problem::{Estimate, GeometryProblem};
+use super::quadratic_form::in_own_units;
+use super::{Free, Geometry};
+use crate::Error;
+use kerrlight_common::simd::Float;
+use nalgebra::{DMatrix, DVector};
+
+/// The best volume of a geometry, and the bowl there.
+pub struct Standing {
+    best: Estimate,
+    bowl: Bowl,
+    /// χ²/2 above that of a right model.
+    excess: f64,
+}
+
+/// A kind of refinement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refinement {
+    /// What becomes finer.
+    pub source: &'static str,
+    /// What endless refinement moves the geometry by, over what this one does.
+    pub onwards: f64,
+}
+
+/// What a refinement does.
+pub struct Refined {
+    kind: Refinement,
+    /// By what it moves the geometry, in units of scales.
+    step: DVector<f64>,
+    /// By what it lowers χ²/2.
+    gain: f64,
+}
+
+/// An error that the model has of itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelError {
+    /// What of the model makes it.
+    pub source: &'static str,
+    /// Its covariance row by row, in the free parameters' own units.
+    pub covariance: Vec<f64>,
+}
+
+impl ModelError {
+    /// Source of what no refinement explains of χ².
+    pub const UNEXPLAINED: &'static str = "unexplained χ²";
+}
+
+/// All of them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ModelErrors {
+    /// Those that are known.
+    pub known: Vec<ModelError>,
+    /// The kind of data for which finer models cannot be compared, so that errors leave out what they would say.
+    pub left_out: Option<&'static str>,
+}
+
+/// Standard deviations of χ², √(2 N) for N data, that count as chance.
+const BY_CHANCE: f64 = 2.0;
+
+impl<T: Float + Default> GeometryProblem<'_, T> {
+    /// The best volume of a geometry.
+    ///
+    /// # Errors
+    /// As those of [`polish`](Self::polish).
+    pub fn standing(&self, geometry: Geometry) -> Result<Standing, Error> {
+        let best = self.solve(geometry)?;
+        let bowl = self.bowl(&best, Polish::default().following)?;
+        let excess = self.excess(self.scale * self.left(&best)?);
+        Ok(Standing { best, bowl, excess })
+    }
+
+    /// By what χ²/2 lies above that of a right model and above its scatter by chance, where it is this over the number of
+    /// data.
+    pub fn excess(&self, reduced_chi2: f64) -> f64 {
+        let data = self.data();
+        (0.5 * (data * (reduced_chi2 - 1.0) - BY_CHANCE * (2.0 * data).sqrt())).max(0.0)
+    }
+}
+
+impl Standing {
+    /// What a finer model of the same data does; none if its bowl is not finite.
+    ///
+    /// # Errors
+    /// As those of [`polish`](GeometryProblem::polish).
+    pub fn refined<T: Float + Default>(
+        &self,
+        kind: Refinement,
+        finer: &GeometryProblem<'_, T>,
+    ) -> Result<Option<Refined>, Error> {
+        let there = finer.solve(self.best.geometry)?;
+        let bowl = finer.bowl(&there, Polish::default().following)?;
+        let covariance = covariance(finer.free, &self.best.geometry, &bowl.bends, 1.0);
+        let Some(covariance) = covariance else { return Ok(None) };
+        // Slopes of the model itself are ripples beside the middle of its bowl.
+        let step = -covariance * (bowl.slopes - &self.bowl.slopes);
+        Ok(Some(Refined { kind, step, gain: self.best.value - there.value }))
+    }
+
+    /// Errors that refinements make likely, each as much as the data do not contradict, and what the excess that they leave
+    /// can make.
+    ///
+    /// Of that excess E no parameter explains anything. A discrepancy of the model with as much χ²/2 along the derivative of
+    /// a parameter moves it by √(2 E) times the standard deviation that the data leave it, and by no more in any other
+    /// direction (Cauchy and Schwarz): 2 E times their covariance.
+    pub fn errors(&self, free: &[Free], refined: &[Refined]) -> Vec<ModelError> {
+        let own = |source, covariance: &DMatrix<f64>| ModelError {
+            source,
+            covariance: in_own_units(free, covariance),
+        };
+        let of_refined = |Refined { kind, step, gain }: &Refined| {
+            let step = step * (kind.onwards * (0.5 * gain.min(0.0)).exp());
+            own(kind.source, &(&step * step.transpose()))
+        };
+        // Several may explain the same.
+        let explained = refined.iter().fold(0.0f64, |most, refined| most.max(refined.gain));
+        let left = 2.0 * (self.excess - explained).max(0.0);
+        let unexplained = covariance(free, &self.best.geometry, &self.bowl.bends, left)
+            .filter(|_| left > 0.0)
+            .map(|covariance| own(ModelError::UNEXPLAINED, &covariance));
+        refined.iter().map(of_refined).chain(unexplained).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::geometry::{Parameter, Prior};
+
+    /// Of a bowl in which the data leave the spin a standard deviation of 0.001.
+    fn standing(excess: f64) -> Standing {
+        let best =
+            Estimate { geometry: Geometry::new(0.3, 1.0), x: Vec::new(), chi2: 0.0, value: 0.0 };
+        let bends = DMatrix::from_element(1, 1, (Parameter::Spin.scale() / 0.001).powi(2));
+        let slopes = DVector::zeros(1);
+        Standing { best, bowl: Bowl { slopes, bends, responses: Vec::new() }, excess }
+    }
+
+    /// Standard deviations by a step of 0.01 of a refinement with this gain, and by what it leaves.
+    fn errors(excess: f64, gain: f64) -> Vec<f64> {
+        let prior = Prior::Uniform { low: -0.9, high: 0.9 };
+        let free = [Free { parameter: Parameter::Spin, prior }];
+        let kind = Refinement { source: "voxels", onwards: 1.5 };
+        let step = DVector::from_element(1, 0.01 / Parameter::Spin.scale());
+        let errors = standing(excess).errors(&free, &[Refined { kind, step, gain }]);
+        errors.iter().map(|error| error.covariance[0].sqrt()).collect()
+    }
+
+    fn assert_close(found: &[f64], expected: &[f64]) {
+        assert_eq!(found.len(), expected.len(), "{found:?}");
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+        }
+    }
+
+    #[test]
+    fn exact_what_refinements_leave_of_an_excess_is_an_error() {
+        // All is explained, or there is nothing to explain.
+        assert_close(&errors(100.0, 120.0), &[0.015]);
+        assert_close(&errors(0.0, 5.0), &[0.015]);
+        // Data speak against the refinement, by four standard deviations.
+        assert_close(&errors(0.0, -8.0), &[0.015 * (-4.0f64).exp()]);
+        // What is left can move the spin by √200 of its standard deviations.
+        assert_close(&errors(150.0, 50.0), &[0.015, 0.001 * 200f64.sqrt()]);
+        // More than its prior is not an error.
+        let wide = errors(1e9, 0.0)[1];
+        assert!(wide < 1.8 / 12f64.sqrt() && wide > 0.99 * 1.8 / 12f64.sqrt(), "{wide}");
+    }
+
+    /// A model of images that lacks something: whatever that is, it moves no parameter by more than the errors say that
+    /// come of its χ².
+    #[test]
+    fn exact_no_discrepancy_moves_a_parameter_farther_than_its_chi2_allows() {
+        use rand::{RngExt, SeedableRng};
+        let mut random = rand_pcg::Pcg64::seed_from_u64(5);
+        let free = [Parameter::Spin, Parameter::Xi].map(|parameter| Free {
+            parameter,
+            prior: Prior::Uniform { low: -500.0, high: 500.0 },
+        });
+        let mut worst = 0.0f64;
+        for round in 0..400 {
+            let mut drawn = || random.random::<f64>() - 0.5;
+            let tangents = DMatrix::from_fn(40, 2, |_, _| 1e3 * drawn());
+            let bends = tangents.transpose() * &tangents;
+            let inverse = bends.clone().try_inverse().unwrap();
+            // Half of them along the derivative of the first parameter, the worst that there is.
+            let along = &tangents * inverse.column(0);
+            let missing = match round % 2 {
+                0 => DVector::from_fn(40, |_, _| drawn()),
+                _ => along,
+            };
+            let moved = &inverse * tangents.transpose() * &missing;
+            let standing = Standing {
+                bowl: Bowl { slopes: DVector::zeros(2), bends, responses: Vec::new() },
+                ..standing(0.5 * missing.norm_squared())
+            };
+            let [error] = &standing.errors(&free, &[])[..] else { panic!("one error") };
+            for k in 0..2 {
+                let sigma = error.covariance[3 * k].sqrt() / free[k].parameter.scale();
+                worst = worst.max(moved[k].abs() / sigma);
+            }
+        }
+        assert!((worst - 1.0).abs() < 1e-6, "{worst}");
+    }
+}

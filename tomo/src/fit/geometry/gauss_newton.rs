@@ -1,0 +1,212 @@
+//! Gauss–Newton steps to the best geometry, with the volume solved for in each (variable projection, Golub & Pereyra
+//! 1973).
+//!
+//! Images are differentiated by differences as wide as the ripples that rays next to the critical curve make: exact
+//! derivatives are those of single ripples.
+
+use super::Geometry;
+use super::covariance::covariance;
+use super::problem::{Estimate, GeometryProblem};
+use crate::Error;
+use crate::fit::linear::{Profile, Voxels};
+use crate::fit::{Batch, Field, ForwardModel};
+use crate::representation::Workspace;
+use kerrlight_common::simd::Float;
+use nalgebra::{DMatrix, DVector};
+
+/// Where Gauss–Newton steps ended.
+#[derive(Clone, Debug)]
+pub struct Polished {
+    /// The best geometry and its volume.
+    pub best: Estimate,
+    /// Covariance of the free parameters row by row, in their own units: the inverse of half the second derivatives of
+    /// χ² with the volume solved for, and of those of the priors; the spread of the priors where the data do not decide.
+    pub covariance: Vec<f64>,
+    /// By how much the best volume moves with each free parameter, per its scale.
+    pub responses: Vec<Vec<f64>>,
+    /// Where a further step leads; none where there is no bowl.
+    pub further: Option<Geometry>,
+}
+
+/// How steps are taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Polish {
+    /// Steps, at most.
+    pub steps: usize,
+    /// Conjugate gradients by which the volume follows the geometry, at most.
+    pub following: usize,
+}
+
+impl Default for Polish {
+    fn default() -> Self {
+        Self { steps: 12, following: 300 }
+    }
+}
+
+/// Half the distance of a difference, in units of [`Parameter::scale`](super::Parameter::scale).
+const WIDTH: f64 = 0.1;
+/// Parts of a step that are tried.
+const PARTS: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
+/// Steps that promise to lower the value by less than this are not taken: a tenth of a standard deviation.
+const ENOUGH: f64 = 0.005;
+
+/// Slope and second derivatives of the value with respect to the free parameters in units of their scales.
+pub(super) struct Bowl {
+    pub slopes: DVector<f64>,
+    pub bends: DMatrix<f64>,
+    /// Of the best volume.
+    pub responses: Vec<Vec<f64>>,
+}
+
+impl Bowl {
+    /// The Newton step, and what it promises to lower the value by; none where it is no bowl.
+    fn step(&self) -> Option<(DVector<f64>, f64)> {
+        let step = -self.bends.clone().cholesky()?.solve(&self.slopes);
+        let promise = -0.5 * step.dot(&self.slopes);
+        Some((step, promise))
+    }
+}
+
+impl<T: Float + Default> GeometryProblem<'_, T> {
+    /// From a geometry and its volume to the best one near it.
+    ///
+    /// # Errors
+    /// If a number is out of its range, or χ² is not finite.
+    pub fn polish(&self, start: &Estimate, how: &Polish) -> Result<Polished, Error> {
+        let mut best = self.solve_from(start.geometry, &start.x)?;
+        let mut bowl = self.bowl(&best, how.following)?;
+        for _ in 0..how.steps {
+            let Some(lower) = self.descend(&best, &bowl)? else { break };
+            best = lower;
+            bowl = self.bowl(&best, how.following)?;
+        }
+        let covariance = self.covariance(&best.geometry, &bowl);
+        let further = bowl.step().map(|(step, _)| self.moved(&best.geometry, step.as_slice()));
+        Ok(Polished { best, covariance, responses: bowl.responses, further })
+    }
+
+    /// The best volume of a geometry, from that of another one.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn solve_from(&self, geometry: Geometry, x: &[f64]) -> Result<Estimate, Error> {
+        let forward: ForwardModel<T> = self.model.forward(&geometry)?;
+        let least = self.linear(&forward).settled(Some(x), self.effort.patience)?;
+        Ok(self.estimate(geometry, least))
+    }
+
+    /// The first part of a Newton step that lowers the value; none if none does.
+    fn descend(&self, from: &Estimate, bowl: &Bowl) -> Result<Option<Estimate>, Error> {
+        let Some((step, _)) = bowl.step().filter(|(_, promise)| *promise >= ENOUGH) else {
+            return Ok(None);
+        };
+        for part in PARTS {
+            let step: Vec<f64> = step.iter().map(|step| part * step).collect();
+            let geometry = self.moved(&from.geometry, &step);
+            let x = self.along(from, &bowl.responses, &step);
+            let there = self.solve_from(geometry, &x)?;
+            if there.value < from.value {
+                return Ok(Some(there));
+            }
+        }
+        Ok(None)
+    }
+
+    /// About the best volume at a distance from another geometry, in units of scales; bounds hold it.
+    pub(super) fn along(&self, from: &Estimate, responses: &[Vec<f64>], step: &[f64]) -> Vec<f64> {
+        let mut x = from.x.clone();
+        for (response, step) in responses.iter().zip(step) {
+            x.iter_mut().zip(response).for_each(|(x, moves)| *x += step * moves);
+        }
+        x.iter_mut().for_each(|x| *x = x.clamp(0.0, self.upper));
+        x
+    }
+
+    /// A geometry at a distance, in units of the parameters' scales; bounds hold it.
+    pub(super) fn moved(&self, from: &Geometry, step: &[f64]) -> Geometry {
+        self.free.iter().zip(step).fold(*from, |geometry, (free, step)| {
+            let value = from.get(free.parameter) + step * free.parameter.scale();
+            geometry.with(free.parameter, free.inside(value))
+        })
+    }
+
+    /// The largest part of a step, at most all of it, that no bound has to hold.
+    pub(super) fn part_within(&self, from: &Geometry, step: &[f64]) -> f64 {
+        let part = |(free, step): (&super::Free, &f64)| {
+            let ([low, high], here) = (free.bounds(), from.get(free.parameter));
+            let step = step * free.parameter.scale();
+            let room = if step > 0.0 { high - here } else { here - low };
+            if free.is_circle() || step == 0.0 { 1.0 } else { room.max(0.0) / step.abs() }
+        };
+        self.free.iter().zip(step).map(part).fold(1.0, f64::min)
+    }
+
+    fn covariance(&self, geometry: &Geometry, bowl: &Bowl) -> Vec<f64> {
+        let n = self.free.len();
+        let inverse = covariance(self.free, geometry, &bowl.bends, 1.0)
+            .unwrap_or_else(|| DMatrix::from_diagonal_element(n, n, f64::INFINITY));
+        let scale = |k: usize| self.free[k].parameter.scale();
+        (0..n * n).map(|k| inverse[(k / n, k % n)] * scale(k / n) * scale(k % n)).collect()
+    }
+
+    /// Slope and second derivatives at a geometry with its best volume.
+    pub(super) fn bowl(&self, at: &Estimate, following: usize) -> Result<Bowl, Error> {
+        let forward: ForwardModel<T> = self.model.forward(&at.geometry)?;
+        let moved = self.image_differences(at)?;
+        let Profile { slopes, bends, responses } =
+            self.linear(&forward).profile(&at.x, &moved, following)?;
+        let n = self.free.len();
+        let half = 0.5 * self.scale * self.unit();
+        let mut bowl = Bowl {
+            slopes: DVector::from_vec(slopes) * half,
+            bends: DMatrix::from_row_slice(n, n, &bends) * half,
+            responses,
+        };
+        for (k, free) in self.free.iter().enumerate() {
+            let scale = free.parameter.scale();
+            let [slope, bend] = free.curve(at.geometry.get(free.parameter), WIDTH * scale);
+            bowl.slopes[k] += slope * scale;
+            bowl.bends[(k, k)] += bend * scale * scale;
+        }
+        Ok(bowl)
+    }
+
+    /// What images of a held volume change by per scale of each free parameter.
+    fn image_differences(&self, at: &Estimate) -> Result<Vec<Vec<T>>, Error> {
+        let one = |free: &super::Free| -> Result<Vec<T>, Error> {
+            let ([low, high], here) = (free.bounds(), at.geometry.get(free.parameter));
+            let width = WIDTH * free.parameter.scale();
+            let ends = [(here - width).max(low), (here + width).min(high)];
+            let [before, after] = ends.map(|value| at.geometry.with(free.parameter, value));
+            let image = |geometry: Geometry| self.images(geometry, (&self.voxels(), &at.x));
+            let (before, after) = (image(before)?, image(after)?);
+            let factor = T::of(free.parameter.scale() / (ends[1] - ends[0]));
+            Ok(after.iter().zip(&before).map(|(a, b)| (*a - *b) * factor).collect())
+        };
+        self.free.iter().map(one).collect()
+    }
+
+    /// Images of a volume in a geometry, frame after frame.
+    ///
+    /// # Errors
+    /// If a number is out of its range.
+    pub fn images(
+        &self,
+        geometry: Geometry,
+        (voxels, x): (&Voxels, &[f64]),
+    ) -> Result<Vec<T>, Error> {
+        let forward: ForwardModel<T> = self.model.forward(&geometry)?;
+        let representation = voxels.field()?;
+        let parameters: Vec<T> = x.iter().map(|x| T::of(*x)).collect();
+        let field = Field {
+            representation: &representation,
+            parameters: &parameters,
+            axis: self.model.axis,
+            occupancy: None,
+        };
+        let mut movie = vec![T::zero(); self.frames.len() * forward.pixels()];
+        let (mut batch, mut workspace) = (Batch::default(), Workspace::new());
+        forward.movie(field, self.frames, &mut batch, &mut workspace, &mut movie);
+        Ok(movie)
+    }
+}

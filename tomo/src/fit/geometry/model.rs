@@ -1,0 +1,197 @@
+//! From a geometry to the forward model of a fit.
+
+use super::{Geometry, Parameter};
+use crate::Error;
+use crate::fit::pixel_rays::{PixelRays, near_the_ring};
+use crate::fit::{
+    ForwardModel, Motion, Observable, PolarizedView, Redshift, Region, RingRays, Sampling,
+    SightlineRequest, Sightlines,
+};
+use kerrlight_common::simd::Float;
+use kerrlight_geodesic::infall::Mixture;
+use kerrlight_geodesic::{Inclination, Kerr, Observer};
+use kerrlight_render::dynamics::infall::{self, Falling};
+use kerrlight_render::dynamics::{AngularVelocity, Axis};
+use kerrlight_render::polarization::PolarizationLaw;
+use std::sync::Arc;
+
+/// How matter moves.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Law {
+    /// 1/(r^{3/2} + a): circular geodesics about whatever spin the hole has.
+    CircularOrbits,
+    /// The same for all geometries.
+    Fixed(AngularVelocity),
+    /// The family between circular orbits and free fall that [`Parameter::Xi`], [`Parameter::BetaR`] and
+    /// [`Parameter::BetaPhi`] say, about a spin (M) of the flow's own or, without one, that of each geometry along the axis.
+    Infall(Option<f64>),
+}
+
+impl Law {
+    /// As it is in a geometry, about an axis.
+    fn velocity(&self, geometry: &Geometry, axis: Axis) -> Result<AngularVelocity, Error> {
+        match self {
+            Law::Infall(drag) => infall(*drag, geometry, axis),
+            _ => Ok(self.circular(geometry.get(Parameter::Spin) * axis.vector()[2])),
+        }
+    }
+
+    fn circular(&self, spin: f64) -> AngularVelocity {
+        match self {
+            Law::Fixed(law) => law.clone(),
+            _ => AngularVelocity::Keplerian { drag: spin },
+        }
+    }
+}
+
+/// The family's flow in a geometry.
+fn infall(drag: Option<f64>, geometry: &Geometry, axis: Axis) -> Result<AngularVelocity, Error> {
+    let [xi, beta_r, beta_phi] = Parameter::FLOW.map(|parameter| geometry.get(parameter));
+    let spin = drag.unwrap_or(geometry.get(Parameter::Spin) * axis.vector()[2]);
+    let law = infall::Law::Family { spin, mixture: Mixture { xi, beta_r, beta_phi } };
+    Ok(AngularVelocity::Falling(Arc::new(Falling::new(law)?)))
+}
+
+/// What all geometries share: the screen, where emission is looked for, the law of motion and the frames.
+#[derive(Clone, Debug)]
+pub struct GeometryModel {
+    /// Where the pixels are, M to the right of the middle of the screen.
+    pub x: Vec<f64>,
+    /// The same, upwards.
+    pub y: Vec<f64>,
+    /// More rays for pixels near the critical curve, where they are wanted.
+    pub ring: Option<RingRays>,
+    /// Width of pixels, M, where each is the mean over its quarters; none where it is what its middle shows.
+    pub quartered: Option<f64>,
+    /// Distance of the observer, M; infinity without one.
+    pub observer_radius: Option<f64>,
+    /// Where emission may be.
+    pub region: Region,
+    /// Nodes of a Gauss–Legendre panel, at most 16.
+    pub order: usize,
+    /// Into how many panels each of the coarsest is cut.
+    pub split: u32,
+    /// Whether light takes its time.
+    pub slow_light: bool,
+    /// The power of g that emission goes like; none without redshift.
+    pub redshift: Option<Redshift>,
+    /// How fast matter turns.
+    pub law: Law,
+    /// What it turns about.
+    pub axis: Axis,
+    /// Times of the frames, M, and when emission is what a representation says; its velocity
+    /// is not used.
+    pub motion: Motion,
+    /// Jy in a pixel of a ray with 1 M of emission 1.
+    pub jy: f64,
+    /// The law of polarised light, which has a power of g of its own; unpolarised, without one.
+    pub polarization: Option<PolarizationLaw>,
+    /// What data see.
+    pub seen: Observable,
+}
+
+impl GeometryModel {
+    /// Nodes on the rays of a geometry.
+    ///
+    /// # Errors
+    /// If a parameter is out of its range.
+    pub fn sightlines(&self, geometry: &Geometry) -> Result<Sightlines, Error> {
+        let (hole, observer) = self.observed(geometry)?;
+        let request = SightlineRequest {
+            region: self.region,
+            sampling: Sampling::Gauss { order: self.order, split: self.split },
+            delay: self.slow_light,
+            momentum: self.redshift.is_some() || self.polarization.is_some(),
+        };
+        let (rays, turn) = (self.rays(geometry, (&hole, &observer)), turn(geometry));
+        let mut lines = Sightlines::of_pixels((&hole, &observer), &rays, turn, &request)?;
+        lines.weight.iter_mut().for_each(|weight| *weight *= self.jy);
+        Ok(lines)
+    }
+
+    /// The forward model of a geometry, with the weights of its gas.
+    ///
+    /// # Errors
+    /// If a parameter is out of its range.
+    pub fn forward<T: Float>(&self, geometry: &Geometry) -> Result<ForwardModel<T>, Error> {
+        let lines = self.sightlines(geometry)?;
+        let (hole, _) = self.observed(geometry)?;
+        let motion = self.motion_of(geometry)?;
+        let model = ForwardModel::new(&lines, &motion, &hole, self.redshift)?;
+        let view = self.polarized(geometry);
+        let factors = view.map(|view| view.factors(&lines, &hole, &motion.velocity)).transpose()?;
+        let mut model = model.seen(factors.as_deref(), &self.seen)?;
+        model.weigh(self.axis);
+        Ok(model)
+    }
+
+    /// How polarised light is seen in a geometry.
+    pub fn polarized(&self, geometry: &Geometry) -> Option<PolarizedView> {
+        let law = self.polarization?;
+        let turn = turn(geometry);
+        let places = self.x.iter().zip(&self.y).map(|(x, y)| turn([*x, *y]).into());
+        let (alpha, beta): (Vec<f64>, Vec<f64>) = places.unzip();
+        Some(PolarizedView {
+            law,
+            axis: self.axis,
+            sin_inclination: geometry.get(Parameter::Inclination).sin(),
+            screen: [alpha, beta],
+            position_angle: geometry.get(Parameter::PositionAngle),
+        })
+    }
+
+    fn observed(&self, geometry: &Geometry) -> Result<(Kerr, Observer), Error> {
+        let geometry = geometry.checked()?;
+        let hole = Kerr::new(geometry.get(Parameter::Spin))?;
+        let inclination = Inclination::from_radians(geometry.get(Parameter::Inclination))?;
+        let observer = match self.observer_radius {
+            None => Observer::at_infinity(inclination),
+            Some(radius) => Observer::at_radius(inclination, radius)?,
+        };
+        Ok((hole, observer))
+    }
+
+    /// The same with other rays for the pixels near the critical curve; those of number 0 are the usual ones.
+    pub fn seen_along(&self, number: u64) -> Self {
+        let shifted = |ring| RingRays { shift: RingRays::shift(number), ..ring };
+        Self { ring: self.ring.map(shifted), ..self.clone() }
+    }
+
+    /// How matter moves in a geometry.
+    ///
+    /// # Errors
+    /// If a parameter of the flow is out of its range.
+    pub fn motion_of(&self, geometry: &Geometry) -> Result<Motion, Error> {
+        Ok(Motion { velocity: self.law.velocity(geometry, self.axis)?, ..self.motion.clone() })
+    }
+
+    /// Which pixels are nearer to the critical curve of a geometry than a limit, M.
+    ///
+    /// # Errors
+    /// If a parameter is out of its range.
+    pub fn ring_pixels(&self, geometry: &Geometry, limit: f64) -> Result<Vec<bool>, Error> {
+        let (hole, observer) = self.observed(geometry)?;
+        let turn = turn(geometry);
+        let pairs = self.x.iter().zip(&self.y);
+        let places: Vec<[f64; 2]> = pairs.map(|(x, y)| turn([*x, *y])).collect();
+        Ok(near_the_ring((&hole, &observer), &places, limit))
+    }
+
+    /// The rays of all pixels of a geometry.
+    fn rays(&self, geometry: &Geometry, seen: (&Kerr, &Observer)) -> PixelRays {
+        let rays = match self.ring {
+            Some(ring) => PixelRays::new(ring, seen, [&self.x, &self.y], turn(geometry)),
+            None => PixelRays::single(&self.x, &self.y),
+        };
+        match self.quartered {
+            Some(spacing) => rays.quartered(spacing),
+            None => rays,
+        }
+    }
+}
+
+/// From a place on the screen (M to the right and upwards) to α and β, M: α across the spin's projection, β along it.
+pub(super) fn turn(geometry: &Geometry) -> impl Fn([f64; 2]) -> [f64; 2] + Copy {
+    let (sin, cos) = geometry.get(Parameter::PositionAngle).sin_cos();
+    move |[x, y]| [x * cos + y * sin, y * cos - x * sin]
+}

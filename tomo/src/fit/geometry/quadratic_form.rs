@@ -1,0 +1,250 @@
+//! The bowl beneath the ripples of a value over geometries: a Laplace approximation at the scale of the errors.
+//!
+//! Pixels and voxels are coarse: the value over geometries has ripples of a degree and of a few units, with a minimum in each. The
+//! second derivatives in one of them are those of the ripple. What the data say of the geometry is the bowl beneath: a
+//! quadratic form through values so far away that they have risen by more than the ripples are high, seen along several
+//! lattices of rays and, where pixels are samples only, through other pixels. Its middle is the geometry, and how far ripples,
+//! lattices and pixels move that is part of the error.
+
+use super::covariance::covariance;
+use super::problem::{Estimate, GeometryProblem};
+use super::{Free, Geometry};
+use crate::Error;
+use kerrlight_common::simd::Float;
+use nalgebra::{DMatrix, DVector};
+
+/// A quadratic form over geometries.
+#[derive(Clone, Debug)]
+pub struct Envelope {
+    /// Its middle, the mean over the lattices.
+    pub geometry: Geometry,
+    /// Covariance of the free parameters row by row, in their own units: the inverse of the form's second derivatives,
+    /// and what ripples and lattices move the middle by.
+    pub covariance: Vec<f64>,
+    /// Standard deviation of the ripples, in units of the value.
+    pub ripple: f64,
+    /// Geometries that were looked at.
+    pub trials: usize,
+}
+
+/// A part of a step that is not worth taking.
+const NEXT_TO_NOTHING: f64 = 0.1;
+
+/// Values at places ξ, along one lattice of rays.
+#[derive(Default)]
+pub(super) struct Evaluations {
+    pub places: Vec<DVector<f64>>,
+    pub values: Vec<f64>,
+}
+
+/// What is fitted to the values of all lattices: a constant and a slope of each, and second derivatives of all.
+pub(super) struct Form {
+    pub slopes: Vec<DVector<f64>>,
+    pub bends: DMatrix<f64>,
+    /// Covariance of a slope.
+    pub uncertain: DMatrix<f64>,
+    /// Standard deviation of what it leaves.
+    pub ripple: f64,
+}
+
+impl<T: Float + Default> GeometryProblem<'_, T> {
+    /// The best volume of a geometry at a distance, or at that part of the distance which bounds leave; none if they leave
+    /// next to nothing.
+    pub(super) fn beside(
+        &self,
+        from: &Estimate,
+        responses: &[Vec<f64>],
+        step: &DVector<f64>,
+    ) -> Result<Option<(Estimate, f64)>, Error> {
+        let part = self.part_within(&from.geometry, step.as_slice());
+        if part < NEXT_TO_NOTHING {
+            return Ok(None);
+        }
+        let step = step * part;
+        let x = self.along(from, responses, step.as_slice());
+        let there = self.solve_from(self.moved(&from.geometry, step.as_slice()), &x)?;
+        Ok(Some((there, part)))
+    }
+
+    /// Looks at the geometries of some places.
+    pub(super) fn look_at(
+        &self,
+        from: &Estimate,
+        responses: &[Vec<f64>],
+        (columns, places): (&DMatrix<f64>, Vec<DVector<f64>>),
+        seen: &mut Evaluations,
+    ) -> Result<(), Error> {
+        for place in places {
+            let there = self.beside(from, responses, &(columns * &place))?;
+            if let Some((there, part)) = there {
+                seen.places.push(place * part);
+                seen.values.push(there.value);
+            }
+        }
+        Ok(())
+    }
+
+    /// The middle of a form, and its covariance in the parameters' own units.
+    pub(super) fn middle(
+        &self,
+        about: Geometry,
+        (form, columns): (&Form, &DMatrix<f64>),
+        inflation: f64,
+        is_wide: bool,
+    ) -> Option<(Geometry, Vec<f64>)> {
+        let (inverse, outward) =
+            (form.bends.clone().try_inverse()?, columns.clone().try_inverse()?);
+        let lowest: Vec<DVector<f64>> = form.slopes.iter().map(|g| -(&inverse * g)).collect();
+        let middles: Vec<DVector<f64>> = lowest.iter().cloned().map(near).collect();
+        let count = middles.len() as f64;
+        let mean_of = |all: &[DVector<f64>]| {
+            all.iter().fold(DVector::zeros(columns.ncols()), |sum, m| sum + m) / count
+        };
+        let (mean, lowest) = (mean_of(&middles), mean_of(&lowest));
+        let mut moved = &inverse * &form.uncertain * &inverse;
+        if middles.len() > 1 {
+            for middle in &middles {
+                let away = middle - &mean;
+                moved += &away * away.transpose() * (few(count) / (count * (count - 1.0)));
+            }
+        }
+        if is_wide || lowest.norm() > 1.0 {
+            // Far from the middle a form is not quadratic: the lowest geometry is as good a guess. Where the middle lies beyond all
+            // geometries that were looked at, none of them is a minimum.
+            moved += &lowest * lowest.transpose();
+        }
+        let step = columns * &mean;
+        let geometry = self.moved(&about, step.as_slice());
+        let bends = outward.transpose() * &form.bends * &outward;
+        let whole = covariance(self.free, &geometry, &bends, inflation)?
+            + columns * moved * columns.transpose();
+        Some((geometry, in_own_units(self.free, &whole)))
+    }
+}
+
+/// What the scatter of so few is too small by: the variance of Student's t with n − 1 degrees of freedom, where it has one.
+fn few(count: f64) -> f64 {
+    if count > 3.0 { (count - 1.0) / (count - 3.0) } else { 3.0 }
+}
+
+/// Covariances in the parameters' own units, row by row.
+pub(super) fn in_own_units(free: &[Free], whole: &DMatrix<f64>) -> Vec<f64> {
+    let (n, scale) = (free.len(), |k: usize| free[k].parameter.scale());
+    (0..n * n).map(|k| whole[(k / n, k % n)] * scale(k / n) * scale(k % n)).collect()
+}
+
+/// A place not farther away than values were taken.
+fn near(place: DVector<f64>) -> DVector<f64> {
+    let length = place.norm();
+    if length > 1.0 { place / length } else { place }
+}
+
+/// A place along an axis.
+pub(super) fn along(n: usize, k: usize, x: f64) -> DVector<f64> {
+    let mut place = DVector::zeros(n);
+    place[k] = x;
+    place
+}
+
+/// Both ends of each axis.
+pub(super) fn ends(n: usize) -> Vec<DVector<f64>> {
+    (0..n).flat_map(|k| [-1.0, 1.0].map(|x| along(n, k, x))).collect()
+}
+
+/// The diagonals between two axes: each pair has two of its four, one of each direction.
+pub(super) fn diagonals(n: usize) -> Vec<DVector<f64>> {
+    let pairs = (0..n).flat_map(|a| (0..a).map(move |b| (a, b)));
+    let root = 0.5f64.sqrt();
+    let of = |(a, b)| [root, -root].map(|x| along(n, a, x) + along(n, b, root));
+    pairs.flat_map(of).collect()
+}
+
+/// The least squares form; none if there are too few values, or it is no bowl.
+pub(super) fn fitted(seen: &[Evaluations], n: usize) -> Option<Form> {
+    let pairs: Vec<(usize, usize)> = (0..n).flat_map(|a| (0..=a).map(move |b| (a, b))).collect();
+    let lattices = seen.len();
+    let (first_bend, unknowns) = (lattices * (1 + n), lattices * (1 + n) + pairs.len());
+    let count: usize = seen.iter().map(|seen| seen.values.len()).sum();
+    if count < unknowns + 2 {
+        return None;
+    }
+    let (mut rows, mut values) = (DMatrix::zeros(count, unknowns), DVector::zeros(count));
+    let all = seen.iter().enumerate();
+    let all = all.flat_map(|(l, seen)| seen.places.iter().zip(&seen.values).map(move |at| (l, at)));
+    for (row, (l, (place, value))) in all.enumerate() {
+        values[row] = *value;
+        rows[(row, l * (1 + n))] = 1.0;
+        (0..n).for_each(|k| rows[(row, l * (1 + n) + 1 + k)] = place[k]);
+        for (j, (a, b)) in pairs.iter().enumerate() {
+            let share = if a == b { 0.5 } else { 1.0 };
+            rows[(row, first_bend + j)] = share * place[*a] * place[*b];
+        }
+    }
+    let inverse = (rows.transpose() * &rows).try_inverse()?;
+    let found = &inverse * (rows.transpose() * &values);
+    let left = (&values - &rows * &found).norm_squared() / (count - unknowns) as f64;
+    let mut bends = DMatrix::zeros(n, n);
+    for (j, (a, b)) in pairs.iter().enumerate() {
+        (bends[(*a, *b)], bends[(*b, *a)]) = (found[first_bend + j], found[first_bend + j]);
+    }
+    bends.clone().cholesky()?;
+    let slopes = (0..lattices).map(|l| found.rows(l * (1 + n) + 1, n).into_owned()).collect();
+    let uncertain = inverse.view((1, 1), (n, n)) * left;
+    Some(Form { slopes, bends, uncertain, ripple: left.sqrt() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn places(n: usize) -> Vec<DVector<f64>> {
+        let middles = (0..n).flat_map(|k| [-0.5, 0.5].map(|x| along(n, k, x)));
+        ends(n).into_iter().chain(middles).chain(diagonals(n)).collect()
+    }
+
+    /// A bowl with ripples in one lattice, and another lattice that is deeper and moved.
+    #[test]
+    fn exact_the_bowl_beneath_is_found() {
+        let bends = DMatrix::from_row_slice(2, 2, &[8.0, 1.5, 1.5, 6.0]);
+        let middles = [[0.2, -0.1], [0.3, 0.1]].map(|m| DVector::from_row_slice(&m));
+        let value = |l: usize, place: &DVector<f64>| {
+            let away = place - &middles[l];
+            700.0 - 5.0 * l as f64 + 0.5 * (away.transpose() * &bends * &away)[(0, 0)]
+        };
+        let seen: Vec<Evaluations> = (0..2)
+            .map(|l| Evaluations {
+                places: places(2),
+                values: places(2).iter().map(|p| value(l, p)).collect(),
+            })
+            .collect();
+        let form = fitted(&seen, 2).unwrap();
+        assert!((&form.bends - &bends).norm() < 1e-9 && form.ripple < 1e-6);
+        for (slope, middle) in form.slopes.iter().zip(&middles) {
+            assert!((&bends * middle + slope).norm() < 1e-9);
+        }
+        let upside_down = |seen: &Evaluations| Evaluations {
+            places: seen.places.clone(),
+            values: seen.values.iter().map(|x| -x).collect(),
+        };
+        assert!(fitted(&[upside_down(&seen[0]), upside_down(&seen[1])], 2).is_none());
+    }
+
+    /// Ripples of a known deviation that are independent of each other move the middle as often as stated.
+    #[test]
+    fn exact_ripples_move_the_middle_by_what_is_stated() {
+        use rand::{RngExt, SeedableRng};
+        let mut random = rand_pcg::Pcg64::seed_from_u64(3);
+        let (mut pulls, rounds) = (0.0, 4000);
+        for _ in 0..rounds {
+            let mut noise = || 1.7320508 * (2.0 * random.random::<f64>() - 1.0);
+            let values = |p: &DVector<f64>| 4.0 * p.norm_squared() + 0.3 * noise();
+            let places = places(2);
+            let values = places.iter().map(values).collect();
+            let form = fitted(&[Evaluations { places, values }], 2).unwrap();
+            pulls += form.slopes[0][0].powi(2) / form.uncertain[(0, 0)];
+        }
+        // F with 1 and 4 degrees of freedom has the mean 2.
+        let mean = pulls / f64::from(rounds);
+        assert!((mean - 2.0).abs() < 0.35, "{mean}");
+    }
+}

@@ -1,0 +1,27 @@
+//! The geometry that looks most like another one.
+
+use super::*;
+
+/// Seen from the other side of the orbit; what is known stays.
+#[test]
+fn exact_the_twin_of_a_geometry_is_seen_from_below() {
+    let model = screen(6, 2);
+    let prior = |low: f64, high: f64| Prior::Uniform { low, high };
+    let free = [
+        Free { parameter: Parameter::Spin, prior: prior(-0.95, 0.95) },
+        Free { parameter: Parameter::Inclination, prior: prior(0.0, PI) },
+        Free { parameter: Parameter::PositionAngle, prior: prior(-PI, PI) },
+    ];
+    let geometry = Geometry::new(0.6, 1.05).with(Parameter::PositionAngle, 0.7);
+    let twin = of_hot_spot(&model, &free, &[]).twin(&geometry).unwrap();
+    for (parameter, value) in [
+        (Parameter::Spin, -0.6),
+        (Parameter::Inclination, PI - 1.05),
+        (Parameter::PositionAngle, 0.7 - PI),
+    ] {
+        assert!((twin.get(parameter) - value).abs() < 1e-12, "{parameter:?}");
+    }
+    let of_known = of_hot_spot(&model, &free[1..], &[]).twin(&geometry).unwrap();
+    assert_eq!(of_known.get(Parameter::Spin), 0.6);
+    assert!(of_hot_spot(&model, &free[..1], &[]).twin(&geometry).is_none());
+}

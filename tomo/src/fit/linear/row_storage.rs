@@ -1,0 +1,132 @@
+//! How the frames of the matrix are passed through: by rows that are kept, by rows that are made each time, or node by
+//! node.
+
+use super::active::{Active, NONE};
+use super::operator::Operator;
+use super::ray_weights::{Buffers, Walk};
+use super::rows::{Held, Rows};
+use kerrlight_common::memory;
+use kerrlight_common::simd::Float;
+use rayon::prelude::*;
+
+/// What part of the memory rows may take.
+const ROWS: f64 = 1.0 / 4.0;
+/// Frames between which the budget is looked at: where rows end and walks begin depends on it, and on no memory.
+const AT_A_TIME: usize = 8;
+/// Rows that grow take so many times their bytes.
+const GROWTH: usize = 2;
+
+impl<'a, T: Float + Default> Operator<'a, T> {
+    /// Restricted to these nodes, with at most about `budget` bytes of rows (those of 8 frames more).
+    pub fn new(walk: Walk<'a, T>, active: Active, frames: &'a [usize], budget: usize) -> Self {
+        Self::within(walk, active, frames, [budget, memory::part(ROWS) as usize])
+    }
+
+    /// The same with `room` bytes for what is kept. Nothing but the time depends on it.
+    pub fn within(
+        walk: Walk<'a, T>,
+        active: Active,
+        frames: &'a [usize],
+        [budget, room]: [usize; 2],
+    ) -> Self {
+        let (corners, pixels) = (walk.voxels.corners(), walk.model.pixels());
+        let mut all = Self { walk, active, corners, frames, pixels, rows: Vec::new() };
+        let (mut made, mut largest) = (0, None);
+        for some in frames.chunks(AT_A_TIME) {
+            if made > budget {
+                all.rows.extend(some.iter().map(|_| Held::Walked));
+            } else {
+                let largest = largest.get_or_insert_with(|| all.largest(some, room));
+                made += all.hold(some, largest, room);
+            }
+        }
+        all
+    }
+
+    /// Bytes that the rows of a frame take, about: a bound where that fits for all of these, otherwise those of the first.
+    fn largest(&self, frames: &[usize], room: usize) -> usize {
+        let points = self.walk.model.points() * self.corners.len();
+        let bound = points.saturating_mul(size_of::<T>() + 4);
+        if bound.saturating_mul(GROWTH * frames.len()) <= room {
+            return bound;
+        }
+        self.bytes_of(frames[0])
+    }
+
+    /// Rows of some frames, kept as long as there is room; the bytes of all of them.
+    fn hold(&mut self, frames: &[usize], largest: &mut usize, room: usize) -> usize {
+        let (mut bytes, mut kept) = (0, self.bytes());
+        let mut rest = frames;
+        while !rest.is_empty() {
+            let growing = GROWTH * (*largest).max(1);
+            let together = (room.saturating_sub(kept) / growing).min(rest.len());
+            if together == 0 {
+                bytes += rest.par_iter().map(|frame| self.bytes_of(*frame)).sum::<usize>();
+                self.rows.extend(rest.iter().map(|_| Held::Made));
+                break;
+            }
+            let (some, later) = rest.split_at(together);
+            let rows: Vec<_> = some.par_iter().map(|frame| self.rows_of(*frame)).collect();
+            let more = rows.iter().map(Rows::bytes).sum::<usize>();
+            *largest = rows.iter().map(Rows::bytes).fold(*largest, usize::max);
+            self.rows.extend(rows.into_iter().map(Held::Kept));
+            (bytes, kept, rest) = (bytes + more, kept + more, later);
+        }
+        bytes
+    }
+
+    /// All rows of a frame.
+    pub fn rows_of(&self, frame: usize) -> Rows<T> {
+        if self.walk.model.is_flux {
+            return self.fluxes_of(frame);
+        }
+        let mut rows = Rows::default();
+        let mut place = vec![NONE; self.active.count()];
+        let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
+        self.walk.frame(frame, wanted, &mut Buffers::default(), |pixel, places| {
+            rows.push(pixel, places, &self.active, (&self.corners, degree), &mut place);
+        });
+        rows.columns.shrink_to_fit();
+        rows.entries.shrink_to_fit();
+        rows
+    }
+
+    /// Hands over the rows of a frame in the same order, one at a time where rays have their own.
+    pub fn each_row(&self, frame: usize, buffers: &mut Buffers<T>, mut take: impl FnMut(&Rows<T>)) {
+        if self.walk.model.is_flux {
+            return take(&self.fluxes_of(frame));
+        }
+        let mut row = Rows::default();
+        let mut place = vec![NONE; self.active.count()];
+        let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
+        self.walk.frame(frame, wanted, buffers, |pixel, places| {
+            row.clear();
+            row.push(pixel, places, &self.active, (&self.corners, degree), &mut place);
+            take(&row);
+        });
+    }
+
+    /// Bytes of the rows of a frame.
+    fn bytes_of(&self, frame: usize) -> usize {
+        let mut bytes = 0;
+        self.each_row(frame, &mut Buffers::default(), |row| bytes += row.bytes());
+        bytes
+    }
+
+    /// Bytes of the rows that are kept.
+    pub fn bytes(&self) -> usize {
+        self.kept().map(Rows::bytes).sum()
+    }
+
+    /// Entries of the rows that are kept.
+    pub fn entries(&self) -> usize {
+        self.kept().map(|rows| rows.entries.len()).sum()
+    }
+
+    fn kept(&self) -> impl Iterator<Item = &Rows<T>> {
+        self.rows.iter().filter_map(|held| match held {
+            Held::Kept(rows) => Some(rows),
+            Held::Made | Held::Walked => None,
+        })
+    }
+}

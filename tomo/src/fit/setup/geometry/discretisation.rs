@@ -1,0 +1,108 @@
+//! Errors of a geometry that the model of the fit makes: its voxels, its pixels, and its sums along rays.
+
+use super::search_data::{BESIDE_THE_RING, SearchData};
+use crate::fit::geometry::{
+    Effort, GeometryModel, GeometryProblem, ModelErrors, Refined, Refinement, Spread, Standing,
+};
+use crate::fit::settings::{SearchView, UnknownGeometry};
+use crate::fit::setup::drawn::is_drawn_elsewhere;
+use crate::fit::setup::{CoarseView, Result};
+use kerrlight_vlbi::operator::Pulse;
+
+/// Voxels and pixels of a finer model over those of a search, along each side.
+const FINER: f64 = 1.5;
+/// Voxels along each axis, at most.
+const MOST: usize = 128;
+
+fn finer(count: usize) -> usize {
+    (FINER * count as f64).round() as usize
+}
+
+/// Errors that the model has of itself in a geometry that a search has found with χ²/N of `reduced`, through pixels of this
+/// width, M; none where data are simulated by the same sums.
+pub(super) fn errors(
+    (seen, view): (&SearchData, &SearchView),
+    (unknown, width): (&UnknownGeometry, f64),
+    problem: &GeometryProblem<'_, f32>,
+    (spread, reduced): (&Spread, f64),
+) -> Result<ModelErrors> {
+    let file = &seen.view.file;
+    if file.data.is_none() && !is_drawn_elsewhere(file)? {
+        return Ok(ModelErrors::default());
+    }
+    if let Some(why) = left_out(seen, problem) {
+        let known = spread.unexplained(problem.excess(reduced), reduced).into_iter().collect();
+        return Ok(ModelErrors { known, left_out: Some(why) });
+    }
+    let geometry = spread.geometry;
+    seen.smoothly(problem, (geometry, BESIDE_THE_RING[1]), |problem| {
+        let standing = problem.standing(geometry)?;
+        let voxels = voxels(&standing, problem)?;
+        let sums = sums(&standing, problem)?;
+        let pixels = pixels((seen, view), (unknown, width), &standing, problem)?;
+        let refined: Vec<Refined> = [voxels, sums, pixels].into_iter().flatten().collect();
+        Ok(ModelErrors { known: standing.errors(problem.free, &refined), left_out: None })
+    })
+}
+
+/// Data of which no bowl is known, through which finer models could be compared.
+fn left_out(seen: &SearchData, problem: &GeometryProblem<'_, f32>) -> Option<&'static str> {
+    let has_gains = seen.view.measured.gains.is_some();
+    match (problem.change.is_any(), problem.is_convex(), has_gains) {
+        (true, _, _) => Some("emission that changes"),
+        (false, true, _) => None,
+        (false, false, true) => Some("visibilities with unknown gains"),
+        (false, false, false) => Some("amplitudes and closure quantities"),
+    }
+}
+
+/// None with a [prior](crate::fit::linear::GaussianField) of the voxels, which says what lies between them.
+fn voxels(standing: &Standing, problem: &GeometryProblem<'_, f32>) -> Result<Option<Refined>> {
+    let few = problem.effort.nodes;
+    let nodes = finer(few).min(MOST);
+    if problem.gaussian.is_some() || nodes <= few {
+        return Ok(None);
+    }
+    let effort = Effort { nodes, ..problem.effort };
+    let onwards = onwards(effort.degree.taps() as f64, nodes as f64 / few as f64);
+    let kind = Refinement { source: "voxels", onwards };
+    standing.refined(kind, &GeometryProblem { effort, ..*problem })
+}
+
+/// Gauss–Legendre panels converge faster than any power of their length.
+fn sums(standing: &Standing, problem: &GeometryProblem<'_, f32>) -> Result<Option<Refined>> {
+    let model = GeometryModel { split: 2 * problem.model.split, ..problem.model.clone() };
+    let kind = Refinement { source: "sums along rays", onwards: 1.0 };
+    standing.refined(kind, &GeometryProblem { model: &model, ..*problem })
+}
+
+/// Images may be samples or means over pixels. Visibilities are those of a smooth image, whose sums converge faster than any
+/// power of the pixel, unless the data are known to have pixels. Polarised light is seen along single rays.
+fn pixels(
+    (seen, view): (&SearchData, &SearchView),
+    (unknown, width): (&UnknownGeometry, f64),
+    standing: &Standing,
+    problem: &GeometryProblem<'_, f32>,
+) -> Result<Option<Refined>> {
+    let kind = Refinement { source: "pixels", onwards: 1.0 };
+    if problem.model.polarization.is_some() {
+        return Ok(None);
+    }
+    if seen.is_images() {
+        let kind = Refinement { onwards: onwards(2.0, 2.0), ..kind };
+        let model = GeometryModel { quartered: Some(width), ..problem.model.clone() };
+        return standing.refined(kind, &GeometryProblem { model: &model, ..*problem });
+    }
+    let CoarseView { file, measured, .. } = &seen.view;
+    if measured.pulse != Pulse::Delta {
+        return Ok(None);
+    }
+    let other = seen.sampled(finer(file.screen.pixels))?;
+    let how = (problem.scale, problem.memory);
+    other.with(unknown, view, how, |problem| standing.refined(kind, problem))
+}
+
+/// What endless refinement does over what a `finer`-fold one does, where errors go with this power of the size of parts.
+fn onwards(power: f64, finer: f64) -> f64 {
+    1.0 / (1.0 - finer.powf(-power))
+}

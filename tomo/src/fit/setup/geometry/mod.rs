@@ -1,0 +1,176 @@
+//! From settings to a geometry that is not known: its model, its parameters, the search for them and their errors.
+
+mod discretisation;
+mod fine;
+mod posterior;
+mod search;
+mod search_data;
+mod tangent;
+
+pub use posterior::GeometryPosterior;
+pub use search::{FoundGeometry, SearchWatch, Trial, find_geometry};
+
+use super::instrument::ring;
+use super::{FitData, Instrument, Result, axis, motion};
+use crate::fit::geometry::{Geometry, GeometryModel, Law, Parameter};
+use crate::fit::settings::{AxisSearch, FitError, FitFile};
+use crate::fit::{Motion, Sampling};
+use kerrlight_geodesic::Kerr;
+use kerrlight_render::dynamics::Velocity;
+
+/// The geometry that the settings say, with the medians of priors in place of what is not known.
+pub fn known_geometry(file: &FitFile) -> Geometry {
+    let inclination = file.observer.inclination_deg.value().to_radians();
+    let geometry = Geometry::new(file.hole.spin.value(), inclination)
+        .with(Parameter::PositionAngle, file.observer.position_angle_deg.value().to_radians());
+    let Velocity::Infall { xi, beta_r, beta_phi, .. } = file.motion.law() else { return geometry };
+    let flow = Parameter::FLOW.into_iter().zip([xi, beta_r, beta_phi]);
+    flow.fold(geometry, |geometry, (parameter, value)| geometry.with(parameter, value))
+}
+
+/// The geometry that data are simulated in.
+///
+/// # Errors
+/// If a setting is missing or out of range.
+pub fn true_geometry(file: &FitFile) -> Result<Geometry> {
+    Ok(known_geometry(&file.simulated()?))
+}
+
+/// What a fit looks through in a geometry, along the rays near the critical curve of this number, and how matter moves there.
+/// Rays of number 0 are the usual ones.
+///
+/// # Errors
+/// If a setting is missing or out of range.
+pub fn in_geometry(
+    file: &FitFile,
+    instrument: &Instrument,
+    measured: &FitData,
+    geometry: &Geometry,
+    rays: u64,
+) -> Result<(Instrument, Motion)> {
+    let plain = motion(file, measured.times.clone())?;
+    let model = model(file, instrument, &plain)?.seen_along(rays);
+    let hole = Kerr::new(geometry.get(Parameter::Spin))?;
+    let found = Instrument {
+        pixels: instrument.pixels.clone(),
+        hole,
+        lines: model.sightlines(geometry)?,
+        redshift: instrument.redshift,
+        polarized: model.polarized(geometry),
+        seen: instrument.seen.clone(),
+        quiescent: instrument.quiescent.clone(),
+    };
+    Ok((found, model.motion_of(geometry)?))
+}
+
+/// What all geometries share.
+fn model(file: &FitFile, instrument: &Instrument, motion: &Motion) -> Result<GeometryModel> {
+    let Sampling::Gauss { order, split } = file.region.nodes else {
+        let why = "a number with a prior needs region.nodes = { gauss = { order, split } }: nodes equidistant in Mino time \
+                   have no derivatives";
+        return Err(FitError::Conflict(why.to_owned()).into());
+    };
+    if file.effects.absorption.is_some() {
+        let why = "a number with a prior and effects.absorption exclude each other".to_owned();
+        return Err(FitError::Conflict(why).into());
+    }
+    if !matches!(file.axis, AxisSearch::Known {}) {
+        let why = "a number with a prior needs [axis.known]: matter turns about motion.axis, in the frame of the hole";
+        return Err(FitError::Conflict(why.to_owned()).into());
+    }
+    let law = match file.motion.velocity {
+        Velocity::Keplerian { drag: None } => Law::CircularOrbits,
+        Velocity::Infall { drag, .. } => Law::Infall(drag),
+        _ => Law::Fixed(motion.velocity.clone()),
+    };
+    let [x, y] = instrument.pixels.clone();
+    Ok(GeometryModel {
+        x,
+        y,
+        ring: ring(file)?,
+        quartered: None,
+        observer_radius: file.observer.radius,
+        region: file.region.limits(),
+        order,
+        split,
+        slow_light: file.effects.slow_light,
+        redshift: instrument.redshift,
+        law,
+        axis: axis(file)?.0,
+        motion: motion.clone(),
+        jy: file.screen.jy_per_pixel,
+        polarization: file.polarization,
+        seen: instrument.seen.clone(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::settings::{PriorSettings, Quantity};
+    use core::f64::consts::PI;
+    use kerrlight_common::toml_file;
+    use kerrlight_vlbi::array::built_in;
+
+    const SIDE: usize = 12;
+
+    /// The built-in flare, seen from directions that are drawn.
+    fn settings(inclination: Quantity, position_angle: Quantity) -> FitFile {
+        let text = include_str!("../../../../../cli/src/fit/built_in.toml");
+        let mut file: FitFile = toml_file::read(text).unwrap();
+        file.observer.inclination_deg = inclination;
+        file.observer.position_angle_deg = position_angle;
+        file.simulation.as_mut().unwrap().drawn = true;
+        file.screen.pixels = SIDE;
+        file
+    }
+
+    fn simulated(position_angle: Quantity) -> (Geometry, Vec<f64>) {
+        let file = settings(60.0.into(), position_angle);
+        let instrument = Instrument::new(&file).unwrap();
+        let array = built_in("ngEHT");
+        let measured = FitData::simulated(&file, &instrument, array.as_ref()).unwrap();
+        let movie = measured.movie.unwrap();
+        let mut all = Vec::new();
+        for frame in 0..3 {
+            all.extend_from_slice(&movie.image(frame).unwrap());
+        }
+        (true_geometry(&file).unwrap(), all)
+    }
+
+    /// A position angle of 90 degrees turns images from north to east, anticlockwise.
+    #[test]
+    fn exact_drawn_views_turn_what_is_simulated() {
+        let (upright, images) = simulated(0.0.into());
+        let (turned, other) = simulated(PriorSettings::Uniform([90.0, 90.000000001]).into());
+        let (known, same) = simulated(90.0.into());
+        assert!((known.get(Parameter::PositionAngle) - PI / 2.0).abs() < 1e-15);
+        let angle = |geometry: &Geometry| geometry.get(Parameter::PositionAngle).to_degrees();
+        assert!(angle(&upright).abs() < 1e-8 && (angle(&turned) - 90.0).abs() < 1e-8);
+        let brightest = images.iter().fold(0.0f64, |most, x| most.max(*x));
+        assert!(brightest > 0.0);
+        for (k, x) in other.iter().enumerate() {
+            let (frame, row, column) = (k / SIDE / SIDE, k / SIDE % SIDE, k % SIDE);
+            // What is in the last column comes to the first row.
+            let from = images[(frame * SIDE + column) * SIDE + SIDE - 1 - row];
+            assert!((x - from).abs() < 1e-6 * brightest, "{frame} {row} {column}: {x} {from}");
+            assert!((same[k] - from).abs() < 1e-6 * brightest, "{frame} {row} {column}");
+        }
+    }
+
+    #[test]
+    fn exact_other_seeds_draw_other_geometries() {
+        let mut file = settings(
+            PriorSettings::Uniform([20.0, 70.0]).into(),
+            PriorSettings::Uniform([-180.0, 180.0]).into(),
+        );
+        let first = true_geometry(&file).unwrap();
+        file.seed += 1;
+        let second = true_geometry(&file).unwrap();
+        for parameter in [Parameter::Inclination, Parameter::PositionAngle] {
+            assert_ne!(first.get(parameter), second.get(parameter));
+        }
+        let inclination = first.get(Parameter::Inclination).to_degrees();
+        assert!((20.0..=70.0).contains(&inclination) && inclination != 60.0);
+    }
+}

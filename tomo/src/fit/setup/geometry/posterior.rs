@@ -1,0 +1,187 @@
+//! How sure a geometry is: the bowl beneath the ripples, along other rays and with other voxels; and draws of geometries.
+
+use super::search_data::SearchData;
+use crate::fit::geometry::{
+    Effort, Envelope, Estimate, Free, Geometry, GeometryProblem, ModelErrors, Polish, Polished,
+    Spread,
+};
+use crate::fit::settings::{FitFile, UnknownGeometry};
+use crate::fit::setup::{FitData, Result};
+use nalgebra::{DMatrix, DVector};
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
+
+/// Other rays that the best geometry is looked for through.
+const LATTICES: u64 = 3;
+/// Of the random numbers of draws.
+const DRAWS: u64 = 0x6f70_656e_0000_0000;
+/// The number of a draw that has as many voxels as the fit.
+const SAME: u64 = 0;
+
+/// The best geometry near another one, and its χ²/N.
+pub(super) fn polished(
+    problem: &GeometryProblem<'_, f32>,
+    start: &Estimate,
+) -> Result<(Polished, f64)> {
+    let polished = problem.polish(start, &Polish::default())?;
+    let reduced = problem.scale * problem.reduced(polished.best.chi2);
+    Ok((polished, reduced))
+}
+
+/// Voxels of a look over those of the search, along each side, by its number.
+const VOXELS: [f64; 4] = [1.0, 1.3, 1.15, 0.87];
+
+/// More voxels or fewer.
+fn other_voxels(effort: Effort, number: u64) -> Effort {
+    let nodes = (effort.nodes as f64 * VOXELS[number as usize % VOXELS.len()]).round() as usize;
+    Effort { nodes: nodes.max(effort.degree.taps()), ..effort }
+}
+
+/// How sure a geometry is: the bowl beneath the ripples of the values around, seen along several lattices of rays, with several
+/// numbers of voxels and through other pixels; without one, the second derivatives at the best geometry alone. Errors grow
+/// with χ²/N where that is above 1.
+pub(super) fn surely(
+    problem: &GeometryProblem<'_, f32>,
+    resampled: Resampled<'_>,
+    polished: &Polished,
+    reduced: f64,
+) -> Result<Option<Spread>> {
+    let n = problem.free.len();
+    if polished.covariance.iter().any(|x| !x.is_finite()) {
+        return Ok(None);
+    }
+    let inflation = reduced.max(1.0);
+    let envelope = enveloped(problem, resampled, polished, inflation)?;
+    let envelope = envelope.unwrap_or_else(|| Envelope {
+        geometry: polished.best.geometry,
+        covariance: polished.covariance.iter().map(|x| x * inflation).collect(),
+        ripple: 0.0,
+        trials: 1,
+    });
+    let Envelope { geometry, covariance, ripple, trials } = envelope;
+    let whole: Vec<f64> = (0..n).map(|k| covariance[k * n + k].sqrt()).collect();
+    let correlation = (0..n * n).map(|k| covariance[k] / (whole[k / n] * whole[k % n]));
+    let correlation = correlation.collect();
+    // Nobody knows less than before the data.
+    let sigma = problem.free.iter().zip(whole).map(|(free, x)| x.min(free.prior.deviation()));
+    let sigma: Vec<f64> = sigma.collect();
+    let open = problem.free.iter().zip(&sigma).map(|(free, sigma)| free.is_open(*sigma)).collect();
+    Ok(Some(Spread {
+        geometry,
+        sigma,
+        open,
+        correlation,
+        ripple,
+        trials,
+        own: ModelErrors::default(),
+    }))
+}
+
+/// Data through other pixels, and what of the geometry is not known; none where pixels are those of the data.
+pub(super) type Resampled<'a> = Option<(&'a SearchData, &'a UnknownGeometry)>;
+
+/// The bowl beneath the ripples, along other lattices of rays, each with other voxels, where the data alone decide, and with
+/// other pixels, where those are samples only.
+fn enveloped(
+    problem: &GeometryProblem<'_, f32>,
+    resampled: Resampled<'_>,
+    polished: &Polished,
+    inflation: f64,
+) -> Result<Option<Envelope>> {
+    let Some(mut surroundings) = problem.around(polished)? else { return Ok(None) };
+    let other_voxels = |effort: Effort, number: u64| {
+        other_voxels(effort, problem.gaussian.map_or(number, |_| SAME))
+    };
+    for number in 1..=LATTICES {
+        let mut look = |problem: &GeometryProblem<'_, f32>| {
+            let model = &problem.model.seen_along(number);
+            let effort = other_voxels(problem.effort, number);
+            surroundings.look(&GeometryProblem { model, effort, ..*problem })
+        };
+        let other = resampled
+            .and_then(|(seen, unknown)| Some((seen.resampled.get(number as usize - 1)?, unknown)));
+        match other {
+            None => look(problem)?,
+            Some((seen, unknown)) => {
+                let how = (problem.scale, problem.memory);
+                seen.with(unknown, &unknown.search.fine, how, look)?;
+            }
+        }
+    }
+    Ok(surroundings.envelope(problem, inflation))
+}
+
+/// Geometries that the data leave possible: the volume of each is the best one of data with noise once more, in that geometry
+/// (its marginal distribution, then what is left of the volume: Rue & Held 2005, section 2.3).
+pub struct GeometryPosterior<'a> {
+    file: &'a FitFile,
+    measured: &'a FitData,
+    free: Vec<Free>,
+    geometry: Geometry,
+    /// A root of the covariance, in the parameters' own units.
+    root: DMatrix<f64>,
+    open: Vec<bool>,
+    /// Noise of a draw over the data's errors.
+    factor: f64,
+}
+
+impl<'a> GeometryPosterior<'a> {
+    /// About a geometry whose errors a search has found, in data whose noise is `factor` times their errors.
+    ///
+    /// # Errors
+    /// If a prior is out of its range.
+    pub fn new(
+        (file, measured): (&'a FitFile, &'a FitData),
+        unknown: &UnknownGeometry,
+        (geometry, spread): (Geometry, &Spread),
+        factor: f64,
+    ) -> Result<Self> {
+        let Spread { open, sigma, correlation, .. } = spread;
+        let n = sigma.len();
+        let covariance =
+            DMatrix::from_fn(n, n, |a, b| correlation[a * n + b] * sigma[a] * sigma[b]);
+        let apart = || DMatrix::from_diagonal(&DVector::from_column_slice(sigma));
+        let root = covariance.cholesky().map_or_else(apart, |factors| factors.l());
+        Ok(Self {
+            file,
+            measured,
+            free: unknown.free.clone(),
+            geometry,
+            root,
+            open: open.clone(),
+            factor,
+        })
+    }
+
+    /// Noise of a draw over the data's errors.
+    pub fn factor(&self) -> f64 {
+        self.factor
+    }
+
+    /// A draw: the same for the same number. What the data say nothing about is drawn from its prior, the rest from a
+    /// normal distribution with the covariance of the geometry; bounds are mirrors.
+    pub fn draw(&self, number: u64) -> Geometry {
+        let mut random = Pcg64::seed_from_u64(self.file.seed ^ DRAWS.wrapping_add(number));
+        let normal = |_, _| random.sample::<f64, _>(StandardNormal);
+        let normal = DVector::from_fn(self.free.len(), normal);
+        let step = &self.root * normal;
+        let shares: Vec<f64> = self.free.iter().map(|_| random.random()).collect();
+        let each = self.free.iter().zip(&shares).enumerate();
+        each.fold(self.geometry, |geometry, (k, (free, share))| {
+            let value = match self.open[k] {
+                true => free.prior.quantile(*share),
+                false => free.mirrored(geometry.get(free.parameter) + step[k]),
+            };
+            geometry.with(free.parameter, value)
+        })
+    }
+
+    /// Data with noise once more.
+    ///
+    /// # Errors
+    /// If there is no room for them.
+    pub fn data(&self, number: u64) -> Result<FitData> {
+        self.measured.perturbed(&self.file.loss, self.factor, number)
+    }
+}
