@@ -30,7 +30,7 @@
 //! # let movie = simulate::Movie { grid, pixels };
 //! # simulate::fill(&mut seen, &movie, operator::Pulse::Triangle, &hours, operator::Method::Direct)?;
 //! # noise::add_thermal_noise(&mut seen, 1);
-//! # let bytes = kerrlight_vlbi::files::to_csv(&seen)?.into_bytes();
+//! # let bytes = kerrlight_vlbi::files::to_csv(&seen, true)?.into_bytes();
 //! use kerrlight_imaging::image;
 //! use kerrlight_imaging::settings::{ImageSettings, RingSettings, StartImage, StaticImageFile};
 //! use kerrlight_tomo::fit::settings::{Loss, LossKind};

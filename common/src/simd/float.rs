@@ -24,20 +24,24 @@ pub trait Float:
 }
 
 impl Float for f32 {
+    #[inline]
     fn of(x: f64) -> Self {
         x as f32
     }
 
+    #[inline]
     fn double(self) -> f64 {
         self.into()
     }
 }
 
 impl Float for f64 {
+    #[inline]
     fn of(x: f64) -> Self {
         x
     }
 
+    #[inline]
     fn double(self) -> f64 {
         self
     }
