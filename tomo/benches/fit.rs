@@ -4,7 +4,7 @@
 //! Processor time a thread, as in the bench `representation`; threads are as many as `RAYON_NUM_THREADS` says.
 
 #[allow(dead_code)]
-#[path = "../examples/paper/mod.rs"]
+#[path = "paper/mod.rs"]
 mod paper;
 #[allow(dead_code)]
 #[path = "support/mod.rs"]
