@@ -8,6 +8,7 @@
 
 // Other examples use more of it.
 #[allow(dead_code)]
+#[path = "../benches/paper/mod.rs"]
 mod paper;
 
 use kerrlight_geodesic::gpu::{Adapter, Compute, GpuError, KernelTime, Needs, adapter};
