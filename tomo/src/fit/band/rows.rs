@@ -2,7 +2,7 @@
 
 use super::Sampling;
 use crate::fit::ForwardModel;
-use crate::fit::batch::Batch;
+use crate::fit::forward::batch::Batch;
 use core::f64::consts::TAU;
 use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::Axis;

@@ -2,7 +2,7 @@
 
 use super::{Geometry, Parameter};
 use crate::Error;
-use crate::fit::pixel_rays::{PixelRays, near_the_ring};
+use crate::fit::forward::pixel_rays::{PixelRays, near_the_ring};
 use crate::fit::{
     ForwardModel, Motion, Observable, PolarizedView, Redshift, Region, RingRays, Sampling,
     SightlineRequest, Sightlines,

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::fit::RingRays;
+use crate::fit::forward::pixel_rays::PixelRays;
 use crate::fit::linear::{Change, StopRule, Weighted};
-use crate::fit::pixel_rays::PixelRays;
 use crate::fit::tests::Blobs;
 use crate::fit::{
     Batch, Field, ForwardModel, FrameTerm, ImageTerm, Motion, Observable, Redshift, Region,

@@ -1,6 +1,6 @@
 //! The fall of matter as the device reads it.
 
-use crate::fit::fall::Fall;
+use crate::fit::forward::fall::Fall;
 use kerrlight_render::dynamics::infall::{Origin, Table};
 
 /// Floats of a cell of the table.

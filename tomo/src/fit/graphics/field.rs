@@ -6,7 +6,7 @@ use super::network::Network;
 use super::pixels::Points;
 use super::shape::{Front, Shape};
 use crate::Error;
-use crate::fit::device::DeviceError;
+use crate::fit::learning::device::DeviceError;
 use crate::representation::{
     Activation, BuiltIn, FeatureGrid, FeatureGridSettings, GridSettings, NetworkSettings,
     Representation,
@@ -135,7 +135,7 @@ fn levels(settings: &FeatureGridSettings) -> Levels {
     let made = |k: usize| {
         let nodes = [(settings.coarsest << k) + 1; 3];
         let made =
-            Level { offset, ..level(nodes, (settings.low, settings.high), FeatureGrid::FEATURES) };
+            Level { offset, ..level(nodes, settings.low, settings.high, FeatureGrid::FEATURES) };
         offset += FeatureGrid::FEATURES * nodes[0].pow(3);
         made
     };

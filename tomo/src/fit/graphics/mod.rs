@@ -30,10 +30,10 @@ mod shape;
 mod terms;
 mod visibilities;
 
-use super::device::{DeviceError, StepDevice, Stretch, Taken};
-use super::objective::{Loss, Objective};
-use super::state::Progress;
-use super::training::Training;
+use super::learning::device::{DeviceError, StepDevice, Stretch, Taken};
+use super::learning::state::Progress;
+use super::learning::training::Training;
+use super::loss::objective::{Loss, Objective};
 use crate::Error;
 use crate::representation::Representation;
 use adam::{Learning, Rule};

@@ -2,7 +2,7 @@
 
 use super::fall;
 use super::pixels::Node;
-use crate::fit::forward_model::ForwardModel;
+use crate::fit::forward::forward_model::ForwardModel;
 
 /// All nodes; whether a field is `carried` by matter, that may fall.
 pub fn nodes(model: &ForwardModel<f32>, is_carried: bool) -> impl Iterator<Item = Node> {

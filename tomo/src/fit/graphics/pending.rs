@@ -1,6 +1,6 @@
 //! Losses of steps that the device has not done yet.
 
-use crate::fit::objective::{Loss, Objective};
+use crate::fit::loss::objective::{Loss, Objective};
 
 /// The loss of a step, as far as it is known before the device is done.
 pub enum Pending {
@@ -28,7 +28,7 @@ pub struct Share {
 impl Share {
     /// Of all terms but that of images, in a step of so many frames.
     pub fn all(objective: &Objective<f32>, frames: usize) -> Vec<Self> {
-        let of = |other: &crate::fit::objective::Weighted<_>| Self {
+        let of = |other: &crate::fit::loss::objective::Weighted<_>| Self {
             scale: 1.0 / objective.data_of(&*other.term, frames),
             weight: other.weight,
         };

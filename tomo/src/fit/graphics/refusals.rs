@@ -1,9 +1,9 @@
 //! What is not computed on graphics devices.
 
 use crate::Error;
-use crate::fit::device::DeviceError;
-use crate::fit::objective::Objective;
-use crate::fit::training::Training;
+use crate::fit::learning::device::DeviceError;
+use crate::fit::learning::training::Training;
+use crate::fit::loss::objective::Objective;
 use crate::representation::Representation;
 
 /// Refuses what is not done on a device, with the key that asks for it.

@@ -4,9 +4,9 @@ use super::GraphicsFit;
 use super::pending::{Pending, Share, Squares};
 use super::pixels::{Gathering, Pair};
 use super::rooms::{Ends, pieces};
-use crate::fit::device::{Drawn, Stretch};
-use crate::fit::objective::Loss;
-use crate::fit::terms::ImageTerm;
+use crate::fit::learning::device::{Drawn, Stretch};
+use crate::fit::loss::objective::Loss;
+use crate::fit::loss::terms::ImageTerm;
 use kerrlight_geodesic::gpu::{Commands, GpuError};
 
 impl GraphicsFit {

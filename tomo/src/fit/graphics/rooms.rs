@@ -1,8 +1,8 @@
 //! How much of a step the device takes at a time.
 
 use super::pixels::Room;
-use crate::fit::objective::Objective;
-use crate::fit::training::BatchSize;
+use crate::fit::learning::training::BatchSize;
+use crate::fit::loss::objective::Objective;
 
 /// The most points at a time, if a frame has no more.
 const POINTS: usize = 1 << 21;

@@ -1,7 +1,7 @@
 //! What data say of light that comes back from the device.
 
-use crate::fit::objective::{Loss, Objective};
-use crate::fit::terms::FrameTerm;
+use crate::fit::loss::objective::{Loss, Objective};
+use crate::fit::loss::terms::FrameTerm;
 use rayon::prelude::*;
 
 impl Objective<f32> {

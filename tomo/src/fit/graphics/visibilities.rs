@@ -4,7 +4,7 @@ use super::bytes::{floats, words};
 use super::comparisons::Comparisons;
 use super::kernels::compiled;
 use super::pixels::Pixels;
-use crate::fit::objective::Objective;
+use crate::fit::loss::objective::Objective;
 use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError};
 use kerrlight_geodesic::wgsl;
 

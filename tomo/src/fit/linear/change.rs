@@ -6,7 +6,7 @@
 
 use crate::Error;
 use crate::fit::Region;
-use crate::fit::regulariser::Shape;
+use crate::fit::loss::regulariser::Shape;
 use crate::representation::{Allowed, Knots};
 
 /// How emission may change.

@@ -36,7 +36,7 @@ mod start;
 #[cfg(test)]
 pub(in crate::fit) mod tests;
 
-pub use crate::fit::regulariser::Prior;
+pub use crate::fit::loss::regulariser::Prior;
 pub use certificate::{Certificate, Stationarity};
 pub use change::Change;
 pub use data::Weighted;

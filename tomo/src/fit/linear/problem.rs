@@ -8,7 +8,7 @@ use super::objective::Penalised;
 use super::ray_weights::{Voxels, Walk};
 use super::settings::{Coarse, LinearSettings};
 use crate::Error;
-use crate::fit::regulariser::Prior;
+use crate::fit::loss::regulariser::Prior;
 use crate::fit::{ForwardModel, Quiescent};
 use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::Axis;

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::fit::ForwardModel;
-use crate::fit::regulariser::Shape;
+use crate::fit::loss::regulariser::Shape;
 use crate::representation::spline::{Degree, STENCIL, Spline};
 use crate::representation::{Allowed, Knots};
 use kerrlight_common::simd::Float;

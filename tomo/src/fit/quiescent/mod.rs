@@ -4,7 +4,7 @@ mod with_static_image;
 
 pub use with_static_image::WithStaticImage;
 
-use super::regulariser::{Prior, Regulariser, Shape};
+use super::loss::regulariser::{Prior, Regulariser, Shape};
 use crate::Error;
 use kerrlight_common::simd::Float;
 

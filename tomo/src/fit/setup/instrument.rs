@@ -3,7 +3,7 @@
 use super::observable::seen;
 use super::quiescent::quiescent;
 use super::{AXIS, Result, known_axis, observer, spacing};
-use crate::fit::pixel_rays::PixelRays;
+use crate::fit::forward::pixel_rays::PixelRays;
 use crate::fit::settings::{Absorption, AxisSearch, FitError, FitFile, Screen, Within, refuse};
 use crate::fit::{
     ForwardModel, Motion, Observable, PolarizedView, Quiescent, Redshift, RingRays, Sampling,

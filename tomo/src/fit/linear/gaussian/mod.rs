@@ -15,7 +15,7 @@ pub use matern::{Matern, Roughness};
 
 use super::ray_weights::Voxels;
 use crate::Error;
-use crate::fit::regulariser::Shape;
+use crate::fit::loss::regulariser::Shape;
 use modes::Modes;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;

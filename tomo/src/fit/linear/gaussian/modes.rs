@@ -1,6 +1,6 @@
 //! Standing waves of a grid whose edges are mirrors: the eigenvectors of second differences on it.
 
-use crate::fit::regulariser::Shape;
+use crate::fit::loss::regulariser::Shape;
 use crate::representation::Degree;
 use core::f64::consts::PI;
 

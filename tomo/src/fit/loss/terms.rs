@@ -59,7 +59,7 @@ pub trait FrameTerm<T: Float>: Send + Sync {
 }
 
 /// A residual of something that no stations measured.
-pub(super) fn plain(model: f64, datum: f64, weight: f64) -> Residual {
+pub(in crate::fit) fn plain(model: f64, datum: f64, weight: f64) -> Residual {
     Residual { value: weight * (model - datum), datum: weight * datum, stations: Vec::new() }
 }
 

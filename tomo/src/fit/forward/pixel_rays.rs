@@ -29,7 +29,7 @@ impl RingRays {
 
 /// Rays of all pixels, pixel after pixel.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct PixelRays {
+pub(in crate::fit) struct PixelRays {
     /// Where they are on the screen, M to the right and upwards.
     pub places: Vec<[f64; 2]>,
     /// Pixel k has the rays `starts[k]..starts[k + 1]`.
@@ -106,7 +106,7 @@ impl PixelRays {
 }
 
 /// Which places on the screen are nearer to the critical curve than a limit, M.
-pub(super) fn near_the_ring(
+pub(in crate::fit) fn near_the_ring(
     (hole, observer): (&Kerr, &Observer),
     places: &[[f64; 2]],
     limit: f64,

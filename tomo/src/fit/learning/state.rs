@@ -1,8 +1,8 @@
 //! What a fit remembers from step to step, and how it goes back when its loss diverges.
 
-use super::objective::Loss;
-use super::occupancy::Occupancy;
 use super::training::{OccupancyPlan, Training};
+use crate::fit::forward::occupancy::Occupancy;
+use crate::fit::loss::objective::Loss;
 use crate::optimise::AdamState;
 use crate::representation::Representation;
 use kerrlight_common::simd::Float;
@@ -95,7 +95,7 @@ impl<T: Float> State<T> {
 }
 
 /// Back to the last good state, for the loss of `step`.
-pub(super) fn step_back<T: Float>(
+pub(in crate::fit) fn step_back<T: Float>(
     state: &mut State<T>,
     loss: f64,
     step: u64,

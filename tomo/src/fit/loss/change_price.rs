@@ -1,8 +1,8 @@
 //! What change costs while matter carries emission, for representations that are learnt: ∫∫ |∂e/∂t| dV dt at a fixed place
-//! of matter at the reference time. The linear problem has the same price ([`Change`](super::linear::Change)).
+//! of matter at the reference time. The linear problem has the same price ([`Change`](crate::fit::linear::Change)).
 
-use super::Field;
-use super::sightlines::Region;
+use crate::fit::Field;
+use crate::fit::forward::sightlines::Region;
 use crate::representation::{Gradient, Knots, Workspace};
 use kerrlight_common::simd::Float;
 use kerrlight_render::points::Coordinates;

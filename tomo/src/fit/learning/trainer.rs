@@ -1,9 +1,9 @@
 //! A fit with its memory.
 
-use super::change_price::ChangeBuffers;
 use super::device::DeviceRunner;
-use super::objective::{Buffers, Objective};
 use super::training::Training;
+use crate::fit::loss::change_price::ChangeBuffers;
+use crate::fit::loss::objective::{Buffers, Objective};
 use crate::representation::{Representation, WeightMatrix};
 use kerrlight_common::simd::Float;
 
@@ -17,14 +17,14 @@ pub struct Trainer<'a, T> {
     pub training: Training,
     /// A device that takes the steps in place of this processor, if there is one.
     pub device: Option<DeviceRunner<T>>,
-    pub(super) observed: Vec<usize>,
-    pub(super) buffers: Buffers<T>,
-    pub(super) changes: ChangeBuffers<T>,
-    pub(super) gradient: Vec<T>,
+    pub(in crate::fit) observed: Vec<usize>,
+    pub(in crate::fit) buffers: Buffers<T>,
+    pub(in crate::fit) changes: ChangeBuffers<T>,
+    pub(in crate::fit) gradient: Vec<T>,
     /// Which parameters are matrices.
-    pub(super) matrices: Vec<WeightMatrix>,
-    pub(super) pairs: Vec<(u32, u32)>,
-    pub(super) frames: Vec<usize>,
+    pub(in crate::fit) matrices: Vec<WeightMatrix>,
+    pub(in crate::fit) pairs: Vec<(u32, u32)>,
+    pub(in crate::fit) frames: Vec<usize>,
 }
 
 impl<'a, T: Float> Trainer<'a, T> {

@@ -152,7 +152,7 @@ impl Observable {
 
 /// Factors with which the emission of a node enters several images.
 #[derive(Clone, Debug)]
-pub(super) struct Planes<T> {
+pub(in crate::fit) struct Planes<T> {
     /// How many.
     pub count: usize,
     /// Pixels of one image.

@@ -1,13 +1,13 @@
 //! Steps of a fit: what is drawn, what is learnt, what is done when it goes wrong.
 
-use super::Field;
-use super::objective::{Gradients, Loss};
-use super::occupancy::Occupancy;
-use super::selection::Selection;
 use super::state::{Outcome, Progress, State, step_back};
 use super::trainer::Trainer;
 use super::training::{BatchSize, Training};
 use crate::Error;
+use crate::fit::Field;
+use crate::fit::forward::occupancy::Occupancy;
+use crate::fit::loss::objective::{Gradients, Loss};
+use crate::fit::loss::selection::Selection;
 use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::Axis;
 use rand::seq::index;
@@ -28,7 +28,7 @@ pub struct Place<'a, T> {
 }
 
 impl<T: Float> Trainer<'_, T> {
-    pub(super) fn advance(&mut self, state: &mut State<T>) -> Result<Outcome, Error> {
+    pub(in crate::fit) fn advance(&mut self, state: &mut State<T>) -> Result<Outcome, Error> {
         if let Some(mut delegate) = self.device.take() {
             let outcome = self.delegated(&mut delegate, state);
             self.device = Some(delegate);
@@ -54,7 +54,7 @@ impl<T: Float> Trainer<'_, T> {
         Ok(Outcome::Done(loss))
     }
 
-    pub(super) fn refresh(&mut self, now: &mut Progress<T>) {
+    pub(in crate::fit) fn refresh(&mut self, now: &mut Progress<T>) {
         let Some(plan) = self.training.occupancy else { return };
         let Some(mask) = &mut now.occupancy else { return };
         if now.step >= plan.warm_up && (now.step - plan.warm_up).is_multiple_of(plan.every.max(1)) {
@@ -66,7 +66,7 @@ impl<T: Float> Trainer<'_, T> {
     }
 
     /// The mask, once it is used.
-    pub(super) fn mask<'b>(&self, now: &'b Progress<T>) -> Option<&'b Occupancy> {
+    pub(in crate::fit) fn mask<'b>(&self, now: &'b Progress<T>) -> Option<&'b Occupancy> {
         let masked = self.training.occupancy.is_some_and(|plan| now.step >= plan.warm_up);
         now.occupancy.as_ref().filter(|_| masked)
     }
@@ -111,7 +111,7 @@ impl<T: Float> Trainer<'_, T> {
     }
 
     /// Draws the pairs or frames of a step.
-    pub(super) fn choose(&mut self, step: u64) {
+    pub(in crate::fit) fn choose(&mut self, step: u64) {
         let mut random = Pcg64::seed_from_u64(mix(self.training.seed, step, 0));
         let Self { objective, training, observed, pairs, frames, .. } = self;
         match training.batch {
@@ -147,7 +147,7 @@ impl<T: Float> Trainer<'_, T> {
     }
 
     /// Turns the axis, if it is learnt.
-    pub(super) fn turn(&self, now: &mut Progress<T>, of_axis: [f64; 3]) {
+    pub(in crate::fit) fn turn(&self, now: &mut Progress<T>, of_axis: [f64; 3]) {
         let Training { adam, axis_rate: Some(axis_rate), .. } = &self.training else { return };
         let mut moved = now.axis.vector();
         let rate = self.part(now, 0) * axis_rate.rate(now.step);
@@ -162,7 +162,7 @@ impl<T: Float> Trainer<'_, T> {
     }
 
     /// Learning rate of the parameters at step number `ahead` from here.
-    pub(super) fn rate(&self, now: &Progress<T>, ahead: u64) -> f64 {
+    pub(in crate::fit) fn rate(&self, now: &Progress<T>, ahead: u64) -> f64 {
         self.part(now, ahead) * self.training.rate.rate(now.step + ahead)
     }
 }

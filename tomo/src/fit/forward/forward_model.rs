@@ -3,11 +3,11 @@
 
 use super::fall::Fall;
 use super::occupancy::Occupancy;
-use super::quiescent::Quiescent;
 use super::shift::Shift;
 use super::sightlines::Sightlines;
 use super::stokes::{Observable, Planes};
 use crate::Error;
+use crate::fit::quiescent::Quiescent;
 use crate::representation::Representation;
 use kerrlight_common::simd::Float;
 use kerrlight_geodesic::Kerr;
@@ -49,33 +49,33 @@ pub struct Redshift {
 /// Nodes with all that does not change in a fit, in the scalar that it runs in.
 #[derive(Clone, Debug)]
 pub struct ForwardModel<T> {
-    pub(super) pixels: usize,
-    pub(super) pixel: Vec<u32>,
-    pub(super) starts: Vec<usize>,
-    pub(super) position: [Vec<T>; 3],
+    pub(in crate::fit) pixels: usize,
+    pub(in crate::fit) pixel: Vec<u32>,
+    pub(in crate::fit) starts: Vec<usize>,
+    pub(in crate::fit) position: [Vec<T>; 3],
     /// −Ω: by how much a point is turned back in a unit of time.
-    pub(super) rate: Vec<T>,
+    pub(in crate::fit) rate: Vec<T>,
     /// Ω · delay.
-    pub(super) phase: Vec<T>,
+    pub(in crate::fit) phase: Vec<T>,
     /// Times at which the light left, relative to the frame's.
-    pub(super) delay: Vec<T>,
-    pub(super) weight: Vec<T>,
-    pub(super) plain_weight: Vec<f64>,
-    pub(super) shift: Option<Shift>,
+    pub(in crate::fit) delay: Vec<T>,
+    pub(in crate::fit) weight: Vec<T>,
+    pub(in crate::fit) plain_weight: Vec<f64>,
+    pub(in crate::fit) shift: Option<Shift>,
     /// Where matter comes from that changes its radius; `rate` and `phase` then do not say it.
-    pub(super) fall: Option<Fall>,
+    pub(in crate::fit) fall: Option<Fall>,
     /// With which factors nodes enter several images; one image without.
-    pub(super) planes: Option<Planes<T>>,
+    pub(in crate::fit) planes: Option<Planes<T>>,
     /// What does not move; its parameters are the last of a field's.
-    pub(super) quiescent: Option<Quiescent>,
+    pub(in crate::fit) quiescent: Option<Quiescent>,
     /// Whether all rays add to the same pixel.
-    pub(super) is_flux: bool,
-    pub(super) factors: Vec<f64>,
+    pub(in crate::fit) is_flux: bool,
+    pub(in crate::fit) factors: Vec<f64>,
     weighted_for: Option<Axis>,
     /// Times of the frames since the reference time.
-    pub(super) times: Vec<T>,
+    pub(in crate::fit) times: Vec<T>,
     /// Earliest time of emission since the reference time.
-    pub(super) earliest: Option<T>,
+    pub(in crate::fit) earliest: Option<T>,
 }
 
 impl<T: Float> ForwardModel<T> {
@@ -122,7 +122,7 @@ impl<T: Float> ForwardModel<T> {
     }
 
     /// The same as data see it that are not images of total intensity alone; `factors` are those of all nodes
-    /// ([`PolarizedView::factors`](super::PolarizedView::factors)), and without them there is no Q, U and V.
+    /// ([`PolarizedView::factors`](crate::fit::PolarizedView::factors)), and without them there is no Q, U and V.
     ///
     /// # Errors
     /// If there are no parameters, or no factors for all of them.
@@ -170,7 +170,7 @@ impl<T: Float> ForwardModel<T> {
     }
 
     /// The same with an image beside the emission: fields then have its parameters behind their own
-    /// ([`WithStaticImage`](super::WithStaticImage)).
+    /// ([`WithStaticImage`](crate::fit::WithStaticImage)).
     ///
     /// # Errors
     /// If a number of the image is out of its range, or it has other pixels.
@@ -263,7 +263,7 @@ impl<T: Float> ForwardModel<T> {
 impl ForwardModel<f32> {
     /// Slope of each node's weight with respect to the axis, in the space around the sphere, and nothing; none without
     /// redshift.
-    pub(super) fn slopes_of_weights(&self, axis: Axis) -> Vec<[f32; 4]> {
+    pub(in crate::fit) fn slopes_of_weights(&self, axis: Axis) -> Vec<[f32; 4]> {
         self.shift.as_ref().map_or(Vec::new(), |shift| shift.slopes(axis, &self.plain_weight))
     }
 }

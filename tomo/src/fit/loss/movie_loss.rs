@@ -1,10 +1,10 @@
 //! What whole movies are like beside the data: their loss without a gradient, and their residuals.
 
-use super::forward_model::Field;
 use super::objective::{Buffers, Loss, Objective};
 use super::terms::FrameTerm;
-use super::verdict::Statistics;
 use crate::Error;
+use crate::fit::forward::forward_model::Field;
+use crate::fit::verdict::Statistics;
 use kerrlight_common::frames::Frames;
 use kerrlight_common::simd::Float;
 

@@ -1,8 +1,8 @@
 //! A fit's memory as bytes: safetensors, with a header in TOML that a person can read.
 
-use super::occupancy::Occupancy;
 use super::state::{Progress, State};
 use crate::Error;
+use crate::fit::forward::occupancy::Occupancy;
 use crate::optimise::AdamState;
 use kerrlight_common::toml_file;
 use kerrlight_render::dynamics::Axis;

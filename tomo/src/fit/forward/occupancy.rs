@@ -28,7 +28,7 @@ pub struct Occupancy {
     settings: OccupancySettings,
     half_width: f64,
     /// Largest emission of each cell that is remembered, z fastest.
-    pub(super) brightness: Vec<f32>,
+    pub(in crate::fit) brightness: Vec<f32>,
     occupied: Vec<bool>,
 }
 
@@ -67,13 +67,13 @@ impl Occupancy {
 
     /// Cells along each axis, and half the width of the cube, M.
     #[cfg(feature = "wgpu")]
-    pub(super) fn shape(&self) -> (u32, f32) {
+    pub(in crate::fit) fn shape(&self) -> (u32, f32) {
         (self.settings.cells as u32, self.half_width as f32)
     }
 
     /// Whether each cell may shine, z fastest.
     #[cfg(feature = "wgpu")]
-    pub(super) fn cells(&self) -> impl Iterator<Item = bool> {
+    pub(in crate::fit) fn cells(&self) -> impl Iterator<Item = bool> {
         self.occupied.iter().copied()
     }
 
@@ -116,7 +116,7 @@ impl Occupancy {
     }
 
     /// A random point of these cells, M.
-    pub(super) fn draw(&self, lit: &[usize], random: &mut Pcg64) -> [f64; 3] {
+    pub(in crate::fit) fn draw(&self, lit: &[usize], random: &mut Pcg64) -> [f64; 3] {
         let n = self.settings.cells;
         let width = self.cell_width();
         let cell = lit[random.random_range(0..lit.len())];
@@ -125,17 +125,17 @@ impl Occupancy {
     }
 
     /// Which cells may shine.
-    pub(super) fn lit(&self) -> Vec<usize> {
+    pub(in crate::fit) fn lit(&self) -> Vec<usize> {
         (0..self.occupied.len()).filter(|cell| self.occupied[*cell]).collect()
     }
 
     /// M.
-    pub(super) fn cell_width(&self) -> f64 {
+    pub(in crate::fit) fn cell_width(&self) -> f64 {
         2.0 * self.half_width / self.settings.cells as f64
     }
 
     /// Marks cells that are bright enough, and their neighbours.
-    pub(super) fn mark(&mut self) {
+    pub(in crate::fit) fn mark(&mut self) {
         let n = self.settings.cells;
         let peak = self.brightness.iter().fold(0.0f32, |peak, b| peak.max(*b));
         let least = (f64::from(peak) * self.settings.threshold) as f32;

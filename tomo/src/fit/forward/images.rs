@@ -73,7 +73,12 @@ impl<T: Float> ForwardModel<T> {
     }
 
     /// A ray's light into its pixel.
-    pub(super) fn put<U: core::ops::AddAssign>(&self, image: &mut [U], ray: usize, light: U) {
+    pub(in crate::fit) fn put<U: core::ops::AddAssign>(
+        &self,
+        image: &mut [U],
+        ray: usize,
+        light: U,
+    ) {
         let pixel = &mut image[self.pixel[ray] as usize];
         if self.is_flux { *pixel += light } else { *pixel = light }
     }

@@ -165,7 +165,7 @@ impl Sightlines {
     ///
     /// # Errors
     /// As those of [`trace`](Self::trace).
-    pub(super) fn of_pixels(
+    pub(in crate::fit) fn of_pixels(
         (hole, observer): (&Kerr, &Observer),
         rays: &PixelRays,
         screen: impl Fn([f64; 2]) -> [f64; 2],
@@ -227,12 +227,12 @@ impl Sightlines {
         [0, 1, 2].map(|c| self.position[c][k])
     }
 
-    pub(super) fn push(&mut self, point: [f64; 3], weight: f64) {
+    pub(in crate::fit) fn push(&mut self, point: [f64; 3], weight: f64) {
         self.position.iter_mut().zip(point).for_each(|(column, x)| column.push(x));
         self.weight.push(weight);
     }
 
-    pub(super) fn end_ray(&mut self, pixel: usize) {
+    pub(in crate::fit) fn end_ray(&mut self, pixel: usize) {
         if self.weight.len() > *self.starts.last().unwrap_or(&0) {
             self.starts.push(self.weight.len());
             self.pixel.push(pixel as u32);

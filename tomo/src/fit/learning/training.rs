@@ -1,8 +1,8 @@
 //! How a fit is run.
 
-use super::change_price::ChangePrice;
-use super::occupancy::OccupancySettings;
-use super::sightlines::Region;
+use crate::fit::forward::occupancy::OccupancySettings;
+use crate::fit::forward::sightlines::Region;
+use crate::fit::loss::change_price::ChangePrice;
 use crate::optimise::{Adam, Muon, Polynomial};
 use crate::representation::Representation;
 use kerrlight_common::simd::Float;

@@ -26,7 +26,7 @@ struct Node {
 
 /// g^power of all nodes for any axis.
 #[derive(Clone, Debug)]
-pub(super) struct Shift {
+pub(in crate::fit) struct Shift {
     nodes: Vec<Node>,
     power: f64,
 }

@@ -1,14 +1,14 @@
 //! Steps of a fit that something else than this processor takes: a graphics device.
 //!
 //! What is drawn, how long steps are, and what is done when the loss diverges is decided here, as ever; the device gets a
-//! stretch of steps and gives back what they lead to. Between stretches the whole state is in [`State`](super::State), so that a
+//! stretch of steps and gives back what they lead to. Between stretches the whole state is in [`State`](crate::fit::State), so that a
 //! checkpoint that one device has written is taken up by another.
 
-use super::objective::{Loss, Objective};
-use super::occupancy::Occupancy;
-use super::selection::Selection;
 use super::state::Progress;
 use crate::Error;
+use crate::fit::forward::occupancy::Occupancy;
+use crate::fit::loss::objective::{Loss, Objective};
+use crate::fit::loss::selection::Selection;
 use crate::optimise::Adam;
 use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::Axis;
@@ -86,11 +86,11 @@ pub trait StepDevice<T>: Send {
 
 /// A device with the steps that somebody wants to look at.
 pub struct DeviceRunner<T> {
-    pub(super) device: Box<dyn StepDevice<T>>,
-    pub(super) pause: u64,
-    pub(super) end: u64,
+    pub(in crate::fit) device: Box<dyn StepDevice<T>>,
+    pub(in crate::fit) pause: u64,
+    pub(in crate::fit) end: u64,
     /// Steps of a stretch of about half a second.
-    pub(super) pace: u64,
+    pub(in crate::fit) pace: u64,
 }
 
 impl<T: Float> DeviceRunner<T> {

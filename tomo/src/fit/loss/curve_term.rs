@@ -1,8 +1,8 @@
 //! Fluxes of an unresolved source in Stokes parameters, frame by frame.
 
-use super::FrameTerm;
 use super::terms::plain;
 use crate::Error;
+use crate::fit::FrameTerm;
 use kerrlight_common::simd::Float;
 use kerrlight_vlbi::data_terms::Residual;
 

@@ -1,9 +1,9 @@
 //! The loss of a field of emission, and its gradient with respect to parameters and axis.
 
-use super::batch::Batch;
-use super::forward_model::{Field, ForwardModel};
 use super::selection::Selection;
 use super::terms::{FrameTerm, ImageTerm};
+use crate::fit::forward::batch::Batch;
+use crate::fit::forward::forward_model::{Field, ForwardModel};
 use crate::representation::{Gradient, Groups, Representation, Workspace};
 use core::ops::Range;
 use kerrlight_common::simd::Float;
@@ -50,8 +50,8 @@ pub struct Gradients<'a, T> {
 /// Buffers that are kept from one step to the next.
 #[derive(Default)]
 pub struct Buffers<T> {
-    pub(super) batch: Batch<T>,
-    pub(super) workspace: Workspace,
+    pub(in crate::fit) batch: Batch<T>,
+    pub(in crate::fit) workspace: Workspace,
     image: Vec<T>,
     of_image: Vec<T>,
     cotangents: Vec<T>,
@@ -106,13 +106,13 @@ impl<T: Float> Objective<T> {
         (0..self.model.frames()).filter(seen).collect()
     }
 
-    pub(super) fn terms(&self) -> impl Iterator<Item = (&dyn FrameTerm<T>, f64)> {
+    pub(in crate::fit) fn terms(&self) -> impl Iterator<Item = (&dyn FrameTerm<T>, f64)> {
         let image = self.data.image.iter().map(|w| (&*w.term as &dyn FrameTerm<T>, w.weight));
         image.chain(self.data.others.iter().map(|w| (&*w.term, w.weight)))
     }
 
     /// Real data of each kind in a typical frame times `frames`: what χ² is divided by.
-    pub(super) fn data_of(&self, term: &dyn FrameTerm<T>, frames: usize) -> f64 {
+    pub(in crate::fit) fn data_of(&self, term: &dyn FrameTerm<T>, frames: usize) -> f64 {
         let all: usize = (0..term.frames()).map(|frame| term.degrees_of_freedom(frame)).sum();
         let observed = self.observed().len().max(1);
         (all as f64 / observed as f64 * frames as f64).max(1.0)

@@ -3,10 +3,10 @@
 //! Fits run in single precision, tests of their derivatives in double. What is generic is compiled anew in every program that
 //! uses it; these methods are not, and are compiled here once.
 
-use super::forward_model::{Field, Motion};
 use super::state::{Outcome, Progress, State};
 use super::trainer::Trainer;
 use crate::Error;
+use crate::fit::forward::forward_model::{Field, Motion};
 use crate::representation::Representation;
 use kerrlight_common::frames::Frames;
 use kerrlight_common::simd::Float;

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 /// The nodes of all rays on the fall of their matter.
 #[derive(Clone, Debug)]
-pub(super) struct Fall {
+pub(in crate::fit) struct Fall {
     flow: Arc<Falling>,
     origins: Vec<Origin>,
     limits: [f64; 2],

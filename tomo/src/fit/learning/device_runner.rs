@@ -13,7 +13,7 @@ const SECONDS: f64 = 0.5;
 
 impl<T: Float> Trainer<'_, T> {
     /// Steps up to the next one at which anything is done beside them.
-    pub(super) fn delegated(
+    pub(in crate::fit) fn delegated(
         &mut self,
         delegate: &mut DeviceRunner<T>,
         state: &mut State<T>,
