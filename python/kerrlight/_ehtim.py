@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from kerrlight import _core
-from kerrlight.interferometry import PRODUCTS, Observation, Station
+from kerrlight._stations import PRODUCTS, Station
 
 
 CALIBRATIONS = ("ampcal", "phasecal", "opacitycal", "dcal", "frcal")
@@ -30,8 +30,8 @@ def _hours(obs: Any) -> Any:
     return _core.hours_utc_of_gmst(int(obs.mjd), hours, float(first))
 
 
-def read(obs: Any) -> Observation:
-    """From an ``ehtim.obsdata.Obsdata``."""
+def read(obs: Any) -> dict[str, Any]:
+    """What an ``Observation`` is made of, from an ``ehtim.obsdata.Obsdata``."""
     circular = {"stokes": False, "circ": True}.get(obs.polrep)
     if circular is None:
         raise ValueError(f'polrep = "{obs.polrep}" is not allowed: stokes or circ')
@@ -56,7 +56,7 @@ def read(obs: Any) -> Observation:
     )
     for name in np.setdiff1d(np.union1d(data["t1"], data["t2"]), [station.name for station in array]):
         raise ValueError(f"station {name} of the data is not in tarr")
-    return Observation(
+    return dict(
         time=_hours(obs),
         stations=np.stack([data["t1"], data["t2"]], axis=-1).astype(str),
         uv=np.stack([data["u"], data["v"]], axis=-1).astype(np.float64),
@@ -76,7 +76,7 @@ def read(obs: Any) -> Observation:
     )
 
 
-def write(observation: Observation) -> Any:
+def write(observation: Any) -> Any:
     """An ``ehtim.obsdata.Obsdata``."""
     import ehtim
 

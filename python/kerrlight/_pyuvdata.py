@@ -9,7 +9,7 @@ from typing import Any, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerrlight.interferometry import Observation, Station
+from kerrlight._stations import Station
 
 LIGHT = 299792458.0
 """Metres per second."""
@@ -68,7 +68,7 @@ def _columns(data: Any, sigmas: Any, circular: bool, places: list[int | None]) -
     return {"products": products, "sigmas": errors, "circular": circular}
 
 
-def read(data: Any, sigmas: ArrayLike | None) -> Observation:
+def read(data: Any, sigmas: ArrayLike | None) -> dict[str, Any]:
     """An observation of a ``UVData``."""
     if str(data.vis_units).lower() != "jy":
         raise ValueError(f'vis_units = "{data.vis_units}" is not allowed: Jy')
@@ -89,7 +89,7 @@ def read(data: Any, sigmas: ArrayLike | None) -> Observation:
     frequencies = np.asarray(data.freq_array, dtype=np.float64).reshape(-1)
     widths = np.broadcast_to(np.asarray(data.channel_width, dtype=np.float64), count)
     uv = -np.asarray(data.uvw_array)[:, None, :2] * (frequencies[None, :, None] / LIGHT)
-    return Observation(
+    return dict(
         time=np.repeat((days - mjd) * 24.0, count),
         stations=np.repeat(names, count, axis=0),
         uv=uv.reshape(-1, 2),
@@ -108,7 +108,7 @@ def read(data: Any, sigmas: ArrayLike | None) -> Observation:
     )
 
 
-def _telescope(obs: Observation) -> Any:
+def _telescope(obs: Any) -> Any:
     from astropy.coordinates import EarthLocation
     from pyuvdata import Telescope
 
@@ -130,7 +130,7 @@ def _telescope(obs: Observation) -> Any:
     )
 
 
-def write(obs: Observation) -> Any:
+def write(obs: Any) -> Any:
     """A ``UVData`` of an observation."""
     from pyuvdata import UVData
 

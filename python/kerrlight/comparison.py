@@ -12,7 +12,7 @@ from typing import Any, Mapping, Union
 from kerrlight import _program
 from kerrlight._program import FitError
 from kerrlight.fit import Fit
-from kerrlight.pictures import Settings, overrides_of, text_of
+from kerrlight._settings import Settings, overrides_of, text_of
 from kerrlight.report import Report
 
 __all__ = ["Comparison", "compare"]

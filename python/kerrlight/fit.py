@@ -23,7 +23,7 @@ from kerrlight import _core, _program
 from kerrlight._arrays import column, finite
 from kerrlight._program import FitError
 from kerrlight.interferometry import Observation
-from kerrlight.pictures import Settings, overrides_of, text_of
+from kerrlight._settings import Settings, overrides_of, text_of
 from kerrlight.posterior import Posterior, draw
 from kerrlight.report import Report
 from kerrlight.results import Images, Number, Polarization, Ring, Step, numbers_of, step_of

@@ -11,8 +11,9 @@ from typing import Any, Union
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kerrlight import _core
+from kerrlight import _core, _ehtim, _pyuvdata
 from kerrlight._arrays import Floats, real
+from kerrlight._stations import PRODUCTS, Station
 from kerrlight.fourier import Fourier
 
 __all__ = ["Closures", "Observation", "Station"]
@@ -28,22 +29,6 @@ _RANGES = {
     "frequency_hz": (1e6, 1e15),
     "bandwidth_hz": (0.0, 1e15),
 }
-PRODUCTS = {False: ("", "q", "u", "v"), True: ("rr", "ll", "rl", "lr")}
-
-
-@dataclass(frozen=True)
-class Station:
-    """A telescope."""
-
-    name: str
-    position: tuple[float, float, float] | None = None
-    """Geocentric x, y and z in metres, where known."""
-    sefd: tuple[float, float] = (0.0, 0.0)
-    """System equivalent flux densities of the R and L feeds (Jy)."""
-    feed_rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Factors on parallactic angle and elevation, and a constant in degrees."""
-    leakage: tuple[complex, complex] = (0j, 0j)
-    """Of the R and L feeds; carried along for files."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -355,14 +340,10 @@ class Observation:
     @staticmethod
     def from_ehtim(obs: Any) -> Observation:
         """From an ``ehtim.obsdata.Obsdata``; its noise may not be in amplitude-only columns of other bases."""
-        from kerrlight import _ehtim
-
-        return _ehtim.read(obs)
+        return Observation(**_ehtim.read(obs))
 
     def to_ehtim(self) -> Any:
         """An ``ehtim.obsdata.Obsdata``; needs eht-imaging, one spectral channel, and stations with positions."""
-        from kerrlight import _ehtim
-
         return _ehtim.write(self)
 
     def _check_known(self) -> None:
@@ -385,15 +366,11 @@ class Observation:
         them they are 1/√nsample: pyuvdata keeps the weights of a UVFITS file, which in EHT files are 1/σ², as numbers
         of samples. What is flagged counts as not measured.
         """
-        from kerrlight import _pyuvdata
-
-        return _pyuvdata.read(data, sigmas)
+        return Observation(**_pyuvdata.read(data, sigmas))
 
     def to_pyuvdata(self) -> Any:
         """A ``pyuvdata.UVData``, with 1/σ² as numbers of samples, as :meth:`from_pyuvdata` reads it; needs pyuvdata, one
         spectral channel, and stations with positions."""
-        from kerrlight import _pyuvdata
-
         return _pyuvdata.write(self)
 
     def __repr__(self) -> str:

@@ -19,11 +19,12 @@ or TOML text says the same.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field
 from os import PathLike
 from typing import Any, Literal, Mapping, Sequence, Union
 
 from kerrlight import _core
+from kerrlight._settings import plain, text_of
 from kerrlight.flow import Infall, Keplerian, PowerLaw, Profile, Tabulated, Velocity
 
 __all__ = [
@@ -362,18 +363,4 @@ class Scene:
 
     def to_toml(self) -> str:
         """The text of a scene file."""
-        from kerrlight.pictures import text_of
-
         return text_of(self, None)[0] or ""
-
-
-def plain(value: Any) -> Any:
-    """Objects as the tables of a file; what is None or an empty list is left out."""
-    if isinstance(value, (Keplerian, PowerLaw, Tabulated, Infall, Profile)):
-        return value.table()
-    if is_dataclass(value) and not isinstance(value, type):
-        parts = {part.name: plain(getattr(value, part.name)) for part in fields(value)}
-        return {name: part for name, part in parts.items() if part is not None and not (isinstance(part, list) and not part)}
-    if isinstance(value, list):
-        return [plain(part) for part in value]
-    return value

@@ -1,8 +1,9 @@
 //! How calls cross the border: what is refused is a `ValueError` with the same words, a bug a `RuntimeError`.
 
+use crate::refusal::refused;
 use crate::threads::{Pool, stay_on_this_thread};
 use kerrlight_geodesic::interrupt::Stopped;
-use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 use std::any::Any;
 use std::fmt::Display;
@@ -10,11 +11,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
-
-/// The `ValueError` with the words of a refusal.
-pub fn refused(error: impl Display) -> PyErr {
-    PyValueError::new_err(format!("{error:#}"))
-}
 
 /// What work comes to, or what it panicked with.
 type Ended<T, E> = Result<Result<T, E>, Box<dyn Any + Send>>;

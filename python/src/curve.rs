@@ -1,7 +1,8 @@
 //! The critical curve and lensing bands.
 
-use crate::call::{detached, refused};
+use crate::call::detached;
 use crate::rays::Place;
+use crate::refusal::refused;
 use kerrlight_geodesic::analytic::{CriticalCurve, CriticalPoint, HalfOrbit, LensingBand};
 use kerrlight_geodesic::{Inclination, Kerr, interrupt};
 use numpy::{IntoPyArray, PyReadonlyArray1};

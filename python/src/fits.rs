@@ -1,6 +1,6 @@
 //! What fits know beside their settings.
 
-use crate::call::refused;
+use crate::refusal::refused;
 use kerrlight_tomo::fit::settings::Hole;
 use pyo3::prelude::*;
 

@@ -1,6 +1,7 @@
 //! From images to visibilities, and back.
 
-use crate::call::{detached, refused};
+use crate::call::detached;
+use crate::refusal::refused;
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::operator::{ImageGrid, Method, Operator, Pulse, Transform};

@@ -1,7 +1,8 @@
 //! Points along rays that are equidistant in Mino time, as far as is wanted, and the affine parameter there.
 
-use crate::call::{detached, refused};
+use crate::call::detached;
 use crate::rays::Place;
+use crate::refusal::refused;
 use kerrlight_geodesic::quadrature::gauss_legendre;
 use kerrlight_geodesic::{Error, Kerr, Observer, Path, Quantities, Tracer, interrupt};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};

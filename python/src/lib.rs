@@ -19,6 +19,7 @@ mod orbits;
 mod pictures;
 mod program;
 mod rays;
+mod refusal;
 mod representation;
 mod threads;
 mod volume;

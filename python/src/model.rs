@@ -1,8 +1,9 @@
 //! The forward model: from emission on nodes, or on voxels, to images, with its adjoint.
 
-use crate::call::{detached, refused};
+use crate::call::detached;
 use crate::model_settings::Settings;
 use crate::rays::Place;
+use crate::refusal::refused;
 use kerrlight_geodesic::{Kerr, interrupt};
 use kerrlight_render::dynamics::Axis;
 use kerrlight_render::polarization::StokesParameter;

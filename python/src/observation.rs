@@ -1,6 +1,7 @@
 //! Observations: files to columns, columns to files, closure quantities.
 
-use crate::call::{detached, refused};
+use crate::call::detached;
+use crate::refusal::refused;
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::Error;
 use kerrlight_vlbi::array::{FeedRotation, MOST_STATIONS, Station, check_position};

@@ -1,8 +1,9 @@
 //! Simulated observations of images and movies.
 
-use crate::call::{detached, refused};
+use crate::call::detached;
 use crate::fourier::pulse;
 use crate::observation::{Telescope, Visibilities, station};
+use crate::refusal::refused;
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::Error;
 use kerrlight_vlbi::array::{Array, BUILT_IN, built_in, parse};

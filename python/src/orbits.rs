@@ -1,6 +1,7 @@
 //! Special radii of a hole, and the redshift of matter on circular orbits.
 
-use crate::call::{detached, refused};
+use crate::call::detached;
+use crate::refusal::refused;
 use kerrlight_geodesic::plunge::Plunge;
 use kerrlight_geodesic::{Kerr, flow, interrupt, orbits};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};

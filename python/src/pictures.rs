@@ -1,6 +1,7 @@
 //! Pictures and films of scenes.
 
-use crate::call::{detached, refused};
+use crate::call::detached;
+use crate::refusal::refused;
 use kerrlight_cli::pictures::{Shot, Shown};
 use kerrlight_geodesic::interrupt;
 use kerrlight_render::picture::Summary;

@@ -1,6 +1,7 @@
 //! The program `kerrlight` inside Python's process.
 
-use crate::call::{refused, unwound};
+use crate::call::unwound;
+use crate::refusal::refused;
 use crate::representation::{self, Raised};
 use kerrlight_cli::{BUSY, Call, Ended, Program, Said};
 use pyo3::exceptions::PyKeyboardInterrupt;

@@ -1,6 +1,7 @@
 //! Tables of rays, and their derivatives.
 
-use crate::call::{at_once, detached, refused};
+use crate::call::{at_once, detached};
+use crate::refusal::refused;
 use kerrlight_geodesic::derivatives::{self, Differentiated, Gradient, Gradients};
 use kerrlight_geodesic::{
     Inclination, Integrator, Kerr, Observer, Placement, Points, RayTable, Request, Uncertainty,

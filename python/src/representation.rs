@@ -35,7 +35,7 @@ pub fn find(
 }
 
 fn load(py: Python<'_>, name: &str, own: &OwnSettings) -> PyResult<OfPython> {
-    let settings = serde_json::to_string(&own.table).map_err(crate::call::refused)?;
+    let settings = serde_json::to_string(&own.table).map_err(crate::refusal::refused)?;
     let region = (own.r_min, own.r_max, own.z_width);
     let module = py.import("kerrlight.representation")?;
     let instance = module.call_method1("_load", (name, region, settings))?;

@@ -1,7 +1,7 @@
 //! The threads that loops are shared among: pools of this process, made anew after a fork, whose child has none of its
 //! parent's threads.
 
-use crate::call::refused;
+use crate::refusal::refused;
 use kerrlight_cli::threads;
 use kerrlight_geodesic::interrupt;
 use pyo3::prelude::*;

@@ -1,6 +1,7 @@
 //! Drawings of volumes in flat space.
 
-use crate::call::{detached, refused};
+use crate::call::detached;
+use crate::refusal::refused;
 use kerrlight_render::volume::Volume;
 use kerrlight_render::volume::projection::{Surroundings, View, project};
 use numpy::{IntoPyArray, PyReadonlyArray1};
