@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::path::Path;
 
 /// Two grids of different rates, with changes of the words.
-fn experiment(folder: &Path, changes: &[(&str, &str)]) {
+pub fn experiment(folder: &Path, changes: &[(&str, &str)]) {
     let fit = root().join("scenes/fits/scene_1.toml");
     let mut text = format!(
         r#"
