@@ -3,7 +3,6 @@
 use super::folder::Folder;
 use super::world_results;
 use crate::checksum::sealed;
-use crate::output;
 use anyhow::{Context, bail};
 use kerrlight_tomo::fit::settings::{FitFile, Region, UnknownWorld};
 use kerrlight_tomo::fit::setup::{self, FoundWorld, Measured, Trial};
@@ -28,12 +27,10 @@ pub fn write(
 
 /// The world that a run has found, which is told; none if it has not looked.
 pub fn chosen(folder: &Folder, file: &FitFile) -> anyhow::Result<Option<Choice>> {
-    let path = folder.path().join(FILE);
-    let damaged = || format!("{} is damaged: remove it to look again", path.display());
-    let Some(results) = found(folder).with_context(damaged)? else { return Ok(None) };
+    let Some(results) = folder.found(FILE)? else { return Ok(None) };
     let Some(unknown) = file.unknown_world()? else { return Ok(None) };
     world_results::lines(&results).iter().for_each(|line| eprintln!("{line}"));
-    let world = world_of(file, &unknown.free, &results).with_context(damaged)?;
+    let world = world_of(file, &unknown.free, &results).with_context(|| folder.damaged(FILE))?;
     Ok(Some(Choice::World(world)))
 }
 
@@ -201,15 +198,6 @@ fn is_same(
         };
         above <= chance && free.iter().enumerate().all(is_near)
     })
-}
-
-/// What a run has found, if its world was not known.
-pub fn found(folder: &Folder) -> anyhow::Result<Option<Value>> {
-    let path = folder.path().join(FILE);
-    if !path.exists() {
-        return Ok(None);
-    }
-    Ok(Some(serde_json::from_str(&output::read_text(&path)?)?))
 }
 
 /// How sure a run is of the world that it has found.

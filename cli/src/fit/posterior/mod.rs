@@ -175,7 +175,7 @@ fn add_up(
     path: &Path,
     all: &[Kept],
 ) -> anyhow::Result<Answer> {
-    let world = world_search::found(folder)?;
+    let world = folder.found(world_search::FILE)?;
     let truth = prepared.measured.truth.as_ref();
     let truth = truth.map(|t| super::results::true_volume(&prepared.settings, t)).transpose()?;
     let found = summary::Summary::new(&prepared.settings, world.as_ref(), all, truth)?;
@@ -237,7 +237,7 @@ impl<'a> Drawing<'a> {
         (unknown, samples): (Option<&'a UnknownWorld>, u32),
         path: &Path,
     ) -> anyhow::Result<Self> {
-        let world = world_search::found(folder)?;
+        let world = folder.found(world_search::FILE)?;
         let complete = (1..=u64::from(samples)).all(|number| names(path, number)[1].is_file());
         let worlds = match (unknown, &world) {
             (Some(unknown), Some(world)) if !complete => {

@@ -83,7 +83,7 @@ impl Estimate<'_> {
         if let Some(linear) = linear::outcome(self.file, &self.folder.lines()?) {
             results["linear"] = linear;
         }
-        if let Some(held_out) = held_out::found(self.folder)? {
+        if let Some(held_out) = self.folder.found(held_out::FILE)? {
             results["held_out"] = held_out;
         }
         if let Some(closures) = closures::json(self.measured, &self.file.loss) {
@@ -127,11 +127,11 @@ impl Estimate<'_> {
 
     /// The worlds that were found, where they were not known.
     fn add_worlds(&self, results: &mut Value) -> anyhow::Result<()> {
-        if let Some(world) = world_search::found(self.folder)? {
+        if let Some(world) = self.folder.found(world_search::FILE)? {
             world_results::errors(&world).into_iter().for_each(|(key, value)| results[key] = value);
             results["world"] = world;
         }
-        if let Some(band) = band_search::found(self.folder)? {
+        if let Some(band) = self.folder.found(band_search::FILE)? {
             band_search::numbers(&band).into_iter().for_each(|(key, value)| results[key] = value);
             // Samples that were not fitted have one χ²: with the errors that a flare's past leaves of them.
             if band["validation_chi2_per_datum"].is_number()
