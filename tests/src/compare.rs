@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::path::Path;
 
 /// Two grids of different rates, with changes of the words.
-fn experiment(folder: &Path, changes: &[(&str, &str)]) {
+pub fn experiment(folder: &Path, changes: &[(&str, &str)]) {
     let fit = root().join("scenes/fits/scene_1.toml");
     let mut text = format!(
         r#"
@@ -232,7 +232,11 @@ fn experiments_are_listed_and_mistakes_are_named() {
         ("seeds = 2", "seed = 2", "unknown field `seed`"),
         ("rows = [\"rate\"]", "rows = [\"rates\"]", "there is no factor \"rates\""),
         ("kind = \"time\"", "kind = \"tim\"", "unknown variant `tim`"),
-        ("later = 0.25", "later = -1.0", "\"Volumes later\": later = -1 is not allowed"),
+        (
+            "later = 0.25",
+            "later = -1.0",
+            "later = -1 is not allowed: 0 to 1000 (lengths of the movie)",
+        ),
         ("scene_1.toml", "scene_0.toml", "scene_0.toml"),
         ("[0.1, 0.4]", "[-0.1, -0.4]", "no case can be run; rate -0.1, seed 1"),
     ] {
@@ -294,7 +298,7 @@ fn exact_draws_are_results_of_cases() {
     assert!(refused.contains("random_nodes_within_95\" needs draws"), "{refused}");
     experiment(at, &[("seeds = 2", "samples = 1\nseeds = 2")]);
     let refused = fail(at, &["compare", "rates.toml", "-o", "out"]);
-    assert!(refused.contains("samples = 1 is not allowed: 2 to 100000"), "{refused}");
+    assert!(refused.contains("samples = 1 is not allowed: 2 to 1e5 (draws)"), "{refused}");
     let few = |samples| ("seeds = 2", samples);
     experiment(at, &[value, few("samples = 2\nseeds = 1"), ("[0.1, 0.4]", "[0.1]")]);
     succeed(at, &["compare", "rates.toml", "-o", "out"]);

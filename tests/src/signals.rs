@@ -108,27 +108,8 @@ fn exact_what_keeps_nothing_ends_at_once() {
 
 /// A comparison of two long fits.
 fn experiment(folder: &Path) {
-    let fit = root().join("scenes/fits/scene_1.toml");
-    let text = format!(
-        r#"
-        title = "Two rates"
-        question = "Which rate?"
-        seeds = 1
-        fit = {fit:?}
-        [set]
-        screen.pixels = 16
-        simulation.movie.frames = 8
-        output.nodes = 16
-        representation = {{ kind = "grid", grid.nodes = 16 }}
-        region.nodes = {{ equal-mino-time = {{ per_ray = 40 }} }}
-        training = {{ steps = 1000000, log_every = 10, start = "drawn" }}
-        [[factor]]
-        name = "rate"
-        key = "representation.grid.rate"
-        values = [0.1, 0.4]
-        "#
-    );
-    std::fs::write(folder.join("rates.toml"), text).unwrap();
+    let long = [("seeds = 2", "seeds = 1"), ("steps = 30", "steps = 1000000")];
+    crate::compare::experiment(folder, &long);
 }
 
 /// The folder of the first case.

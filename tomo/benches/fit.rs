@@ -3,8 +3,7 @@
 //!
 //! Processor time a thread, as in the bench `representation`; threads are as many as `RAYON_NUM_THREADS` says.
 
-#[allow(dead_code)]
-#[path = "paper/mod.rs"]
+#[path = "../examples/paper/mod.rs"]
 mod paper;
 #[allow(dead_code)]
 #[path = "support/mod.rs"]
@@ -21,6 +20,8 @@ use kerrlight_tomo::representation::{
 };
 use support::{large_sgemm, least, wanted};
 
+/// Frames of the movie.
+const FRAMES: usize = 128;
 const REGION: Region = Region { r_min: 2.0, r_max: 5.0, z_width: f64::INFINITY };
 
 fn axis() -> Axis {
@@ -28,9 +29,9 @@ fn axis() -> Axis {
 }
 
 fn objective() -> Objective<f32> {
-    let truth = paper::Truth::scene("1", axis()).expect("a scene");
+    let truth = paper::Truth::about(axis());
     let lines = paper::lines_in(REGION, &paper::screen(64), 100).expect("rays");
-    let model = paper::forward_model(&lines, paper::FRAMES).expect("a model");
+    let model = paper::forward_model(&lines, FRAMES).expect("a model");
     let term = ImageTerm::new(truth.movie(&model), lines.pixels, 1.0).expect("a movie");
     let image = Some(Weighted { weight: 1.0, term: Box::new(term) });
     Objective { model, data: Data { image, others: Vec::new() } }

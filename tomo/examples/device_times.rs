@@ -6,9 +6,6 @@
 //! Settings, all optional: `representation` (bhnerf, feature-grid, grid), `optimiser` (adam, muon), `points` (57344), `steps`
 //! (200), `stretch` (256: after so many the state comes back), `device`.
 
-// Other examples use more of it.
-#[allow(dead_code)]
-#[path = "../benches/paper/mod.rs"]
 mod paper;
 
 use kerrlight_geodesic::gpu::{Adapter, Compute, GpuError, KernelTime, Needs, adapter};
@@ -132,7 +129,7 @@ fn ceilings(adapter: &Adapter) -> Result<(), GpuError> {
 
 fn objective() -> Answer<(Objective<f32>, Axis)> {
     let axis = Axis::new([0.5, 0.0, -(0.75f64.sqrt())])?;
-    let truth = paper::Truth::scene("1", axis)?;
+    let truth = paper::Truth::about(axis);
     let lines = paper::lines_in(REGION, &paper::screen(64), 100)?;
     let mut model = paper::forward_model(&lines, 16)?;
     model.weigh(axis);

@@ -3,14 +3,19 @@
 use super::labels::{ONE_CHI2, RESULTS};
 use crate::fit::posterior::{RANKED, WITHIN};
 use anyhow::{Context, bail};
-use kerrlight_common::toml_file;
+use kerrlight_common::toml_file::Keys;
+use kerrlight_tomo::fit::settings::read;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::LazyLock;
 use toml::{Table, Value};
 
+static KEYS: LazyLock<Keys> = LazyLock::new(Keys::of::<Experiment>);
+
 /// An experiment: fits that differ in named factors, and what is shown of them.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
     /// In a few words.
@@ -24,13 +29,16 @@ pub struct Experiment {
     #[serde(default)]
     pub reading: Vec<String>,
     /// Seeds 1 to this are run of every case.
+    #[schemars(range(min = 1))]
     pub seeds: u64,
     /// Draws around every fit, as `kerrlight posterior` makes them; none, without it.
+    #[schemars(range(min = 2, max = 100_000), extend("unit" = "draws"))]
     pub samples: Option<u32>,
     /// The fit that all cases change, relative to this file; levels of factors may name others.
     pub fit: Option<PathBuf>,
     /// Settings of all cases.
     #[serde(default)]
+    #[schemars(with = "std::collections::BTreeMap<String, schemars::Schema>")]
     pub set: Table,
     /// What `--quick` changes.
     #[serde(default)]
@@ -50,15 +58,18 @@ pub struct Experiment {
 }
 
 /// What `--quick` changes: a look at whether an experiment runs, not a measurement.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Quick {
     /// Seeds.
+    #[schemars(range(min = 1))]
     pub seeds: Option<u64>,
     /// Draws around every fit.
+    #[schemars(range(min = 2, max = 100_000), extend("unit" = "draws"))]
     pub samples: Option<u32>,
     /// Settings of all cases, after everything else.
     #[serde(default)]
+    #[schemars(with = "std::collections::BTreeMap<String, schemars::Schema>")]
     pub set: Table,
     /// `factor=level` that are kept; all without any.
     #[serde(default)]
@@ -66,7 +77,7 @@ pub struct Quick {
 }
 
 /// Something that cases differ in.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Factor {
     /// Its name.
@@ -78,13 +89,14 @@ pub struct Factor {
     pub key: Option<String>,
     /// ... and its values, which are also their names.
     #[serde(default)]
+    #[schemars(with = "Vec<schemars::Schema>")]
     pub values: Vec<Value>,
     /// Values are multiplied by this before they become settings: for units.
     pub scale: Option<f64>,
 }
 
 /// What a factor may be.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Level {
     /// Its name.
@@ -95,6 +107,7 @@ pub struct Level {
     pub fit: Option<PathBuf>,
     /// Settings.
     #[serde(default)]
+    #[schemars(with = "std::collections::BTreeMap<String, schemars::Schema>")]
     pub set: Table,
     /// Settings with dots that are taken away.
     #[serde(default)]
@@ -105,7 +118,7 @@ pub struct Level {
 pub const QUALITIES: [&str; 4] = ["psnr_db", "psnr_inside_db", "correlation", "axis_dot_truth"];
 
 /// A table of means and standard deviations over seeds.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TableAsked {
     /// What it shows.
@@ -130,17 +143,18 @@ pub struct TableAsked {
 }
 
 /// A row of numbers from elsewhere, to hold the others against.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Companion {
     /// What they are, and whose.
     pub name: String,
     /// One for each combination of the columns' levels, the last factor fastest; NaN where there is none.
+    #[schemars(with = "Vec<schemars::Schema>")]
     pub values: Vec<f64>,
 }
 
 /// A picture.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FigureAsked {
     /// Which.
@@ -164,6 +178,7 @@ pub struct FigureAsked {
     pub view: Option<[f64; 2]>,
     /// Which part of the movie has passed when volumes are shown, carried along from the reference time; at the
     /// reference time itself without it.
+    #[schemars(range(min = 0.0, max = 1000.0), extend("unit" = "lengths of the movie"))]
     pub later: Option<f64>,
     /// Levels of the other factors.
     #[serde(default)]
@@ -171,7 +186,7 @@ pub struct FigureAsked {
 }
 
 /// Kinds of pictures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FigureKind {
     /// The truth and the recovered volumes.
@@ -199,7 +214,7 @@ pub enum FigureKind {
 impl Experiment {
     /// Reads and checks.
     pub fn parse(text: &str) -> anyhow::Result<Self> {
-        let experiment: Self = toml_file::read(text)?;
+        let experiment: Self = read(text, &KEYS)?;
         experiment.check()?;
         Ok(experiment)
     }
@@ -209,13 +224,8 @@ impl Experiment {
         self.quick.samples.filter(|_| quick).or(self.samples)
     }
 
-    /// Refuses numbers of draws that mean nothing, and results of draws where there are none.
+    /// Refuses results of draws where there are none.
     fn check_draws(&self) -> anyhow::Result<()> {
-        for (key, samples) in [("samples", self.samples), ("quick.samples", self.quick.samples)] {
-            if let Some(samples) = samples.filter(|n| !(2..=100_000).contains(n)) {
-                bail!("{key} = {samples} is not allowed: 2 to 100000");
-            }
-        }
         let tables = self.table.iter().map(|table| (&table.title, Some(&table.value)));
         let figures = self.figure.iter().map(|figure| (&figure.title, figure.value.as_ref()));
         let is_of_draws = |value: &String| {
@@ -242,9 +252,6 @@ impl Experiment {
     }
 
     fn check(&self) -> anyhow::Result<()> {
-        if self.seeds == 0 {
-            bail!("seeds = 0 is not allowed: 1 or more");
-        }
         self.check_draws()?;
         self.check_seed()?;
         for (k, factor) in self.factor.iter().enumerate() {
@@ -275,9 +282,6 @@ impl Experiment {
             let name = || format!("figure {:?}", figure.title);
             figure.value.as_deref().map(known_result).transpose().with_context(name)?;
             self.shown(&figure.rows, &figure.columns, &figure.r#where, false).with_context(name)?;
-            if let Some(later) = figure.later.filter(|later| !(0.0..=1000.0).contains(later)) {
-                bail!("{}: later = {later} is not allowed: 0 to 1000 times the movie", name());
-            }
         }
         Ok(())
     }

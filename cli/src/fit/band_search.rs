@@ -2,7 +2,6 @@
 
 use super::folder::Folder;
 use crate::checksum::sealed;
-use crate::output;
 use anyhow::Context;
 use kerrlight_tomo::fit::band::Interval;
 use kerrlight_tomo::fit::settings::FitFile;
@@ -23,9 +22,8 @@ pub fn write(folder: &Folder, problem: &Problem, scan: &BandScan) -> anyhow::Res
 
 /// The geometry that a run has found, which is told; none if it has not looked.
 pub fn chosen(folder: &Folder) -> anyhow::Result<Option<Choice>> {
-    let path = folder.path().join(FILE);
-    let damaged = || format!("{} is damaged: remove it to look again", path.display());
-    let Some(results) = found(folder).with_context(damaged)? else { return Ok(None) };
+    let Some(results) = folder.found(FILE)? else { return Ok(None) };
+    let damaged = || folder.damaged(FILE);
     sentences(&results).iter().for_each(|line| eprintln!("{line}"));
     let best = |key: &str| results[key]["best"].as_f64().with_context(damaged);
     let background = match &results["background_jy"] {
@@ -189,15 +187,6 @@ fn results(scan: &BandScan, file: &FitFile) -> anyhow::Result<Value> {
         "truth": {"inclination_deg": truth},
         "geometries": scan.geometries.iter().map(row).collect::<Vec<_>>(),
     }))
-}
-
-/// What a run has found, if it has looked.
-pub fn found(folder: &Folder) -> anyhow::Result<Option<Value>> {
-    let path = folder.path().join(FILE);
-    if !path.exists() {
-        return Ok(None);
-    }
-    Ok(Some(serde_json::from_str(&output::read_text(&path)?)?))
 }
 
 /// Numbers for tables: of the 95 % interval, of the band, and the probability that matter turns as the law says.

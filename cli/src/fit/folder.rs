@@ -109,6 +109,21 @@ impl Folder {
         self.file(CHECKPOINT)?.write(bytes)
     }
 
+    /// What a search has kept in a file; none if it has not looked.
+    pub fn found(&self, name: &str) -> anyhow::Result<Option<Value>> {
+        let path = self.path.join(name);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let found = serde_json::from_str(&output::read_text(&path)?);
+        found.map(Some).with_context(|| self.damaged(name))
+    }
+
+    /// Says of such a file that it is not what a search keeps.
+    pub fn damaged(&self, name: &str) -> String {
+        format!("{} is damaged: remove it to look again", self.path.join(name).display())
+    }
+
     /// Adds a line to the log.
     pub fn log(&self, line: &Value) -> anyhow::Result<()> {
         let path = self.path.join(LOG);

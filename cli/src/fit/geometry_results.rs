@@ -30,11 +30,7 @@ pub fn lines(results: &Value) -> Vec<String> {
         })
         .collect();
     lines.extend(own(results).into_iter().map(|said| format!("error: {said}")));
-    lines.extend(small_residuals(results).map(|said| format!("note: {said}")));
-    lines.extend(rival(results).map(|said| format!("note: {said}")));
-    lines.extend(unfinished(results).map(|said| format!("note: {said}")));
-    lines.extend(edges(results).into_iter().map(|said| format!("note: {said}")));
-    lines.extend(unexplained(results).map(|said| format!("note: {said}")));
+    lines.extend(notes(results).map(|said| format!("note: {said}")));
     let chi2 = reduced(results["chi2_per_datum"].as_f64().unwrap_or(f64::NAN));
     lines.push(format!(
         "search: {} of {} starts ended at the best one; χ²/N = {chi2}",
@@ -103,16 +99,18 @@ pub fn sentences(results: &Value) -> Vec<String> {
     if !own.is_empty() {
         all.push(format!("Errors: {}.", own.join("; ")));
     }
-    all.extend(small_residuals(results).map(|said| format!("Note that {said}.")));
-    all.extend(rival(results).map(|said| format!("Note that {said}.")));
-    all.extend(unfinished(results).map(|said| format!("Note that {said}.")));
-    all.extend(edges(results).into_iter().map(|said| format!("Note that {said}.")));
-    all.extend(unexplained(results).map(|said| format!("Note that {said}.")));
+    all.extend(notes(results).map(|said| format!("Note that {said}.")));
     all.push(format!(
         "The geometry was searched for from {} places; {} of the searches ended near the best one.",
         results["starts"], results["ended_at_the_best"]
     ));
     all
+}
+
+/// What keeps a geometry from being as sure as its intervals say.
+fn notes(results: &Value) -> impl Iterator<Item = String> {
+    let before = [small_residuals(results), rival(results), unfinished(results)];
+    before.into_iter().flatten().chain(edges(results)).chain(unexplained(results))
 }
 
 /// How much of the error of each parameter the model makes itself, and what errors leave out; nothing where data are

@@ -3,7 +3,6 @@
 use super::folder::Folder;
 use super::geometry_results;
 use crate::checksum::sealed;
-use crate::output;
 use anyhow::{Context, bail};
 use kerrlight_tomo::fit::geometry::{
     Free, Geometry, ModelError, ModelErrors, Parameter, Span, Spread,
@@ -30,12 +29,11 @@ pub fn write(
 
 /// The geometry that a run has found, which is told; none if it has not looked.
 pub fn chosen(folder: &Folder, file: &FitFile) -> anyhow::Result<Option<Choice>> {
-    let path = folder.path().join(FILE);
-    let damaged = || format!("{} is damaged: remove it to look again", path.display());
-    let Some(results) = found(folder).with_context(damaged)? else { return Ok(None) };
+    let Some(results) = folder.found(FILE)? else { return Ok(None) };
     let Some(unknown) = file.unknown_geometry()? else { return Ok(None) };
     geometry_results::lines(&results).iter().for_each(|line| eprintln!("{line}"));
-    let geometry = geometry_of(file, &unknown.free, &results).with_context(damaged)?;
+    let geometry =
+        geometry_of(file, &unknown.free, &results).with_context(|| folder.damaged(FILE))?;
     Ok(Some(Choice::Geometry(geometry)))
 }
 
@@ -203,15 +201,6 @@ fn is_same(
         };
         above <= chance && free.iter().enumerate().all(is_near)
     })
-}
-
-/// What a run has found, if its geometry was not known.
-pub fn found(folder: &Folder) -> anyhow::Result<Option<Value>> {
-    let path = folder.path().join(FILE);
-    if !path.exists() {
-        return Ok(None);
-    }
-    Ok(Some(serde_json::from_str(&output::read_text(&path)?)?))
 }
 
 /// How sure a run is of the geometry that it has found.

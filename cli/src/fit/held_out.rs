@@ -2,7 +2,6 @@
 
 use super::folder::Folder;
 use crate::checksum::sealed;
-use crate::output;
 use crate::report::{Axis, LinePlot, Marks, Series};
 use anyhow::Context;
 use kerrlight_tomo::fit::settings::{FitFile, HeldOutSettings};
@@ -11,7 +10,7 @@ use kerrlight_tomo::recovery::Choice;
 use serde_json::{Value, json};
 
 /// What was found, in the folder of the run.
-const FILE: &str = "held_out.json";
+pub const FILE: &str = "held_out.json";
 
 /// Keeps the values that were compared.
 pub fn write(folder: &Folder, file: &FitFile, held: &[Held]) -> anyhow::Result<()> {
@@ -21,22 +20,21 @@ pub fn write(folder: &Folder, file: &FitFile, held: &[Held]) -> anyhow::Result<(
 
 /// The weight that a run has chosen, which is told; none if it has not.
 pub fn chosen(folder: &Folder) -> anyhow::Result<Option<Choice>> {
-    let Some(results) = found(folder)? else { return Ok(None) };
+    let Some(results) = folder.found(FILE)? else { return Ok(None) };
     sentence(&results).iter().for_each(|line| eprintln!("{line}"));
-    Ok(Some(Choice::Weight(weight(&results)?)))
+    Ok(Some(Choice::Weight(weight(&results, folder)?)))
 }
 
-fn weight(results: &Value) -> anyhow::Result<f64> {
-    let chosen = results["chosen"].as_f64();
-    chosen.with_context(|| format!("{FILE} is damaged: remove it to look again"))
+fn weight(results: &Value, folder: &Folder) -> anyhow::Result<f64> {
+    results["chosen"].as_f64().with_context(|| folder.damaged(FILE))
 }
 
 /// The settings with the weight that a run has chosen.
 pub fn settled(file: &FitFile, folder: &Folder) -> anyhow::Result<FitFile> {
-    let (Some(settings), Some(results)) = (&file.held_out, found(folder)?) else {
+    let (Some(settings), Some(results)) = (&file.held_out, folder.found(FILE)?) else {
         return Ok(file.clone());
     };
-    Ok(settings.setting.put(file.clone(), weight(&results)?))
+    Ok(settings.setting.put(file.clone(), weight(&results, folder)?))
 }
 
 fn results(settings: &HeldOutSettings, held: &[Held]) -> Value {
@@ -53,17 +51,6 @@ fn results(settings: &HeldOutSettings, held: &[Held]) -> Value {
         "folds": settings.folds,
         "values": held.iter().map(one).collect::<Vec<_>>(),
     })
-}
-
-/// What a run has chosen, if it chose.
-pub fn found(folder: &Folder) -> anyhow::Result<Option<Value>> {
-    let path = folder.path().join(FILE);
-    if !path.exists() {
-        return Ok(None);
-    }
-    let text = output::read_text(&path)?;
-    let damaged = || format!("{} is damaged: remove it to look again", path.display());
-    serde_json::from_str(&text).map(Some).with_context(damaged)
 }
 
 /// What was chosen, and whether the best value lies at an end of the list.

@@ -83,7 +83,7 @@ impl Estimate<'_> {
         if let Some(linear) = linear::outcome(self.file, &self.folder.lines()?) {
             results["linear"] = linear;
         }
-        if let Some(held_out) = held_out::found(self.folder)? {
+        if let Some(held_out) = self.folder.found(held_out::FILE)? {
             results["held_out"] = held_out;
         }
         if let Some(closures) = closures::json(self.measured, &self.file.loss) {
@@ -127,13 +127,13 @@ impl Estimate<'_> {
 
     /// The geometries that were found, where they were not known.
     fn add_geometries(&self, results: &mut Value) -> anyhow::Result<()> {
-        if let Some(geometry) = geometry_search::found(self.folder)? {
+        if let Some(geometry) = self.folder.found(geometry_search::FILE)? {
             geometry_results::errors(&geometry)
                 .into_iter()
                 .for_each(|(key, value)| results[key] = value);
             results["geometry"] = geometry;
         }
-        if let Some(band) = band_search::found(self.folder)? {
+        if let Some(band) = self.folder.found(band_search::FILE)? {
             band_search::numbers(&band).into_iter().for_each(|(key, value)| results[key] = value);
             // Samples that were not fitted have one χ²: with the errors that a flare's past leaves of them.
             if band["validation_chi2_per_datum"].is_number()

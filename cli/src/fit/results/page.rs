@@ -34,7 +34,7 @@ impl Estimate<'_> {
         plots.extend(psnr_plot(&lines));
         plots.extend(held_out::plot(&results["held_out"]));
         plots.extend(self.light_curves(&found.seen)?);
-        if let Some(band) = band_search::found(self.folder)? {
+        if let Some(band) = self.folder.found(band_search::FILE)? {
             plots.extend(band_plots::of_runs(&[("these data".to_owned(), band)], ""));
         }
         plots.push(self.light_curve(&found.movie)?);
