@@ -44,7 +44,7 @@ pub use quiescent::QuiescentSettings;
 pub use recovery::{
     AxisScan, AxisSearch, Kind, Linear, Occupancy, Optimiser, Representation, Start, Training,
 };
-pub use search::{WorldSearch, WorldSteps, WorldView};
+pub use search::{WorldSearch, WorldView};
 pub use simulation::{
     GlyphShape, Movie, Noise, Observation, Ring, Shines, Simulation, Spot, Truth, Tube,
 };
