@@ -5,7 +5,7 @@ use super::world_results;
 use crate::checksum::sealed;
 use anyhow::{Context, bail};
 use kerrlight_tomo::fit::settings::{FitFile, Region, UnknownWorld};
-use kerrlight_tomo::fit::setup::{self, FoundWorld, Measured, Trial};
+use kerrlight_tomo::fit::setup::{self, FoundWorld, Measured, Resolution, Trial};
 use kerrlight_tomo::fit::world::{Free, ModelError, ModelErrors, Parameter, Span, Spread, World};
 use kerrlight_tomo::recovery::{Choice, Problem, settled};
 use serde_json::{Map, Value, json};
@@ -125,10 +125,16 @@ fn results(
         "truth": truth,
         "chi2_per_datum": found.reduced_chi2,
         "noise_factor": found.noise_factor,
+        "resolution": resolution(found.resolution),
         "starts": trials.len(),
         "ended_at_the_best": same,
         "trials": trials,
     }))
+}
+
+/// What the best world was looked at through.
+fn resolution(Resolution { nodes, pixels, rays, panels }: Resolution) -> Value {
+    json!({"nodes": nodes, "pixels": pixels, "rays_per_pixel": rays * rays, "panels": panels})
 }
 
 /// Radii at which velocities are compared.

@@ -57,7 +57,8 @@ pub use still::{Still, StillView};
 pub use truth::Truth;
 pub use visibilities::{VisibilitySettings, frames_of, prepared};
 pub use world::{
-    FoundWorld, SearchWatch, Trial, WorldPosterior, find_world, in_world, known_world, true_world,
+    FoundWorld, Resolution, SearchWatch, Trial, WorldPosterior, find_world, in_world, known_world,
+    true_world,
 };
 
 use super::linear::Prior;

@@ -5,10 +5,12 @@ mod fine;
 mod posterior;
 mod search;
 mod seen;
+mod steps;
 mod tangent;
 
 pub use posterior::WorldPosterior;
 pub use search::{FoundWorld, SearchWatch, Trial, find_world};
+pub use steps::Resolution;
 
 use super::instrument::ring;
 use super::{Instrument, Measured, Result, axis, motion};
@@ -88,7 +90,7 @@ fn model(file: &FitFile, instrument: &Instrument, motion: &Motion) -> Result<Wor
         x,
         y,
         ring: ring(file)?,
-        quartered: None,
+        parts: None,
         observer_radius: file.observer.radius,
         region: file.region.limits(),
         order,

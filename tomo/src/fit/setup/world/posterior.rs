@@ -1,10 +1,11 @@
 //! How sure a world is: the bowl beneath the ripples, along other rays and with other voxels; and draws of worlds.
 
 use super::seen::Seen;
-use crate::fit::settings::{FitFile, UnknownWorld};
+use crate::fit::settings::{FitFile, UnknownWorld, WorldView};
 use crate::fit::setup::{Measured, Result};
 use crate::fit::world::{
-    Effort, Envelope, Estimate, Free, ModelErrors, Polish, Polished, Spread, World, WorldProblem,
+    Effort, Envelope, Estimate, Free, ModelErrors, Polish, Polished, Spread, World, WorldModel,
+    WorldProblem,
 };
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
@@ -78,7 +79,7 @@ pub(super) fn surely(
 }
 
 /// Data through other pixels, and what of the world is not known; none where pixels are those of the data.
-pub(super) type Resampled<'a> = Option<(&'a Seen, &'a UnknownWorld)>;
+pub(super) type Resampled<'a> = Option<(&'a Seen, &'a UnknownWorld, &'a WorldView)>;
 
 /// The bowl beneath the ripples, along other lattices of rays, each with other voxels, where the data alone decide, and with
 /// other pixels, where those are samples only.
@@ -93,18 +94,19 @@ fn enveloped(
         other_voxels(effort, problem.gaussian.map_or(number, |_| SAME))
     };
     for number in 1..=LATTICES {
+        let split = problem.model.split;
         let mut look = |problem: &WorldProblem<'_, f32>| {
-            let model = &problem.model.seen_along(number);
+            let model = &WorldModel { split, ..problem.model.seen_along(number) };
             let effort = other_voxels(problem.effort, number);
             surroundings.look(&WorldProblem { model, effort, ..*problem })
         };
         let other = resampled
-            .and_then(|(seen, unknown)| Some((seen.resampled.get(number as usize - 1)?, unknown)));
+            .and_then(|(seen, ..)| Some((seen.resampled.get(number as usize - 1)?, resampled?)));
         match other {
             None => look(problem)?,
-            Some((seen, unknown)) => {
+            Some((seen, (_, unknown, view))) => {
                 let how = (problem.scale, problem.memory);
-                seen.with(unknown, &unknown.search.fine, how, look)?;
+                seen.with(unknown, view, how, look)?;
             }
         }
     }

@@ -24,10 +24,8 @@ pub(super) struct Seen {
     pub(super) resampled: Vec<Seen>,
 }
 
-/// Pixels of single rays do not count where they are nearer to the critical curve, M: to that of the coarse search's world,
-/// about which populations spread, and to that of the world where steps begin. Second images of matter at 3 to 9 M are
-/// within 0.7 M.
-pub(super) const BESIDE_THE_RING: [f64; 2] = [1.0, 0.8];
+/// Pixels do not count where they are nearer to the critical curve, M. Second images of matter at 3 to 9 M are within 0.7 M.
+const BESIDE_THE_RING: f64 = 0.8;
 
 /// Pixels of a look through others over those of the fit, along each side: finer and wider ones.
 const RESAMPLED: [f64; 3] = [1.15, 0.87, 1.25];
@@ -40,15 +38,10 @@ impl Seen {
         Self::new(file, measured, view, 0)
     }
 
-    /// For steps between worlds that are much alike: their volumes are solved for nearly to the end.
-    pub fn closely(file: &FitFile, measured: &Measured, view: &WorldView) -> Result<Self> {
-        Self::exactly(file, measured, view, 0)
-    }
-
-    /// For a search among worlds that are much alike, whose volumes are solved for nearly to the end too; and the same
-    /// through other pixels.
+    /// For a search among worlds that are much alike, whose volumes are solved for nearly to the end; and the same through
+    /// other pixels.
     pub fn finely(file: &FitFile, measured: &Measured, view: &WorldView) -> Result<Self> {
-        let mut seen = Self::exactly(file, measured, view, file.screen.pixels / 2)?;
+        let mut seen = Self::exactly(file, measured, view)?;
         if measured.pulse == Pulse::Delta && !has_images(file) {
             let pixels = seen.view.file.screen.pixels as f64;
             for share in RESAMPLED {
@@ -68,10 +61,10 @@ impl Seen {
     }
 
     /// Visibilities are seen through as many pixels as are asked for, were they more than those of the fit, with all nodes on
-    /// rays; through `few` pixels or fewer, and where there are images, as a coarse search sees them.
-    fn exactly(file: &FitFile, measured: &Measured, view: &WorldView, few: usize) -> Result<Self> {
+    /// rays; through half of these or fewer, and where there are images, as a coarse search sees them.
+    fn exactly(file: &FitFile, measured: &Measured, view: &WorldView) -> Result<Self> {
         let WorldView { pixels, frames, .. } = *view;
-        if has_images(file) || pixels == file.screen.pixels || pixels <= few {
+        if has_images(file) || pixels == file.screen.pixels || 2 * pixels <= file.screen.pixels {
             return Self::new(file, measured, view, 1);
         }
         let view = CoarseView::sampled(file, measured, pixels)?;
@@ -151,7 +144,7 @@ impl Seen {
     pub fn smoothly<R>(
         &self,
         problem: &WorldProblem<'_, f32>,
-        (world, limit): (World, f64),
+        world: World,
         work: impl FnOnce(&WorldProblem<'_, f32>) -> Result<R>,
     ) -> Result<R> {
         let CoarseView { file, measured, .. } = &self.view;
@@ -159,7 +152,7 @@ impl Seen {
             return work(problem);
         }
         let mut data = measured.terms(&file.loss, problem.model.x.len())?;
-        let ring = problem.model.ring_pixels(&world, limit)?;
+        let ring = problem.model.ring_pixels(&world, BESIDE_THE_RING)?;
         data.image =
             data.image.map(|image| Imaged { term: Box::new(image.term.without(ring)), ..image });
         let terms = terms(&data).into_iter();
@@ -167,7 +160,7 @@ impl Seen {
             Some(_) => terms.collect(),
             None => terms.map(|term| counted(term, problem.frames)).collect(),
         };
-        let memory = problem.memory.about(key((world.bits(), limit.to_bits())));
+        let memory = problem.memory.about(key(world.bits()));
         work(&WorldProblem { terms: &terms, memory, ..*problem })
     }
 
