@@ -182,45 +182,6 @@ fn exact_geometry_of_a_movie_with_one_ray_a_pixel_is_found() {
     }
 }
 
-/// Finer steps begin where the search has ended: what they move the geometry by is part of its errors, of which geometries are drawn.
-#[test]
-#[ignore = "long"]
-fn exact_finer_steps_count_what_they_move_the_geometry_by() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("fit.toml"), settings(60)).unwrap();
-    let about = [
-        "observer.inclination_deg={uniform=[50.0,70.0]}",
-        "observer.position_angle_deg={uniform=[-10.0,10.0]}",
-        "search.starts=1",
-        "screen.ring_rays=4",
-        "representation=linear-grid",
-        "representation.linear-grid.nodes=20",
-    ];
-    let fit = |more: &[&str]| {
-        let mut words = vec!["fit", "fit.toml"];
-        about.iter().for_each(|set| words.extend(["--set", set]));
-        succeed(folder.path(), &[&words[..], more].concat());
-    };
-    fit(&["-o", "plain"]);
-    let finest = "search.finest={nodes=24,iterations=60,pixels=28,frames=12}";
-    fit(&["-o", "finer", "--set", finest, "--samples", "3"]);
-    let [plain, finer] =
-        ["plain", "finer"].map(|name| read(&folder.path().join(name).join("geometry.json")));
-    for name in ["inclination_deg", "position_angle_deg"] {
-        let of = |geometry: &Value, key: &str| geometry[key][name].as_f64().unwrap();
-        let moved = of(&finer, "geometry") - of(&plain, "geometry");
-        let whole = of(&plain, "sigma").hypot(moved);
-        let sigma = of(&finer, "sigma");
-        println!("{name}: {} ± {sigma}, moved by {moved}", of(&finer, "geometry"));
-        assert!(moved != 0.0 && (sigma / whole - 1.0).abs() < 1e-9, "{finer}");
-        let away = of(&finer, "geometry") - of(&finer, "truth");
-        assert!(away.abs() < 4.0 * sigma && sigma < 3.0, "{finer}");
-    }
-    let drawn = read(&folder.path().join("finer/posterior/posterior.json"));
-    let mean = drawn["geometry"]["inclination_deg"]["mean"].as_f64().unwrap();
-    assert!((mean - 60.0).abs() < 5.0, "{mean}");
-}
-
 /// The search begins again, the fit goes on.
 #[test]
 #[ignore = "long"]
@@ -250,14 +211,6 @@ fn exact_impossible_priors_are_refused_before_anything_is_written() {
             "motion.velocity.infall.beta_r.uniform.1 = 1.5 is not allowed: 0 to 1",
         ),
         ("search.starts=0", "search.starts = 0 is not allowed"),
-        (
-            "search.finest={nodes=24,iterations=40,pixels=20,frames=12}",
-            "no steps are taken here: they need screen.ring_rays",
-        ),
-        (
-            "screen.ring_rays=4 search.finest={nodes=1,iterations=40,pixels=20,frames=12}",
-            "search.finest.nodes = 1 is not allowed: 2 to 128",
-        ),
         ("axis={from={start=[0.0,0.0,1.0],rate=0.1,last_rate=0.1}}", "[axis.known]"),
         ("hole.spin={uniform=[0.0,0.5]}", "simulation.hole.spin is missing: hole.spin has a prior"),
         ("observer.inclination_deg=60.0 observer.position_angle_deg=0.0", "there is none"),

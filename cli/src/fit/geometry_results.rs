@@ -228,8 +228,8 @@ fn unexplained(results: &Value) -> Option<String> {
     };
     Some(format!(
         "the volume of the best geometry leaves χ²/N = {chi2:.2}, {means}: matter may move by another law than \
-         motion.velocity, or emission lie outside of the region; else search.finest or linear.degree = \"quadratic\" \
-         may help, as may a higher order of region.nodes, and pulse = \"delta\" where data are of finer pixels"
+         motion.velocity, or emission lie outside of the region; else linear.degree = \"quadratic\" may help, and \
+         pulse = \"delta\" where data are of finer pixels"
     ))
 }
 

@@ -8,7 +8,7 @@ use kerrlight_tomo::fit::geometry::{
     Free, Geometry, ModelError, ModelErrors, Parameter, Span, Spread,
 };
 use kerrlight_tomo::fit::settings::{FitFile, Region, UnknownGeometry};
-use kerrlight_tomo::fit::setup::{self, FitData, FoundGeometry, Trial};
+use kerrlight_tomo::fit::setup::{self, FitData, FoundGeometry, Resolution, Trial};
 use kerrlight_tomo::recovery::{Choice, Problem, settled};
 use serde_json::{Map, Value, json};
 
@@ -128,10 +128,16 @@ fn results(
         "truth": truth,
         "chi2_per_datum": found.reduced_chi2,
         "noise_factor": found.noise_factor,
+        "resolution": resolution(found.resolution),
         "starts": trials.len(),
         "ended_at_the_best": same,
         "trials": trials,
     }))
+}
+
+/// What the best geometry was looked at through.
+fn resolution(Resolution { nodes, pixels, rays, panels }: Resolution) -> Value {
+    json!({"nodes": nodes, "pixels": pixels, "rays_per_pixel": rays * rays, "panels": panels})
 }
 
 /// Radii at which velocities are compared.

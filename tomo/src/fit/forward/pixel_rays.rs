@@ -77,15 +77,15 @@ impl PixelRays {
         all
     }
 
-    /// With a ray in the middle of each quarter of the pixels (M wide) that have one ray.
-    pub fn quartered(self, spacing: f64) -> Self {
+    /// With a ray in the middle of each of n × n parts of the pixels (M wide) that have one ray.
+    pub fn divided(self, (spacing, n): (f64, usize)) -> Self {
+        let place = |k: usize| ((k as f64 + 0.5) / n as f64 - 0.5) * spacing;
         let mut all = Self { places: Vec::new(), starts: vec![0] };
         for range in self.starts.windows(2) {
             match self.places[range[0]..range[1]] {
                 [[x, y]] => {
-                    let (near, far) = (-0.25 * spacing, 0.25 * spacing);
-                    let quarters = [[near, near], [near, far], [far, near], [far, far]];
-                    all.places.extend(quarters.map(|[u, v]| [x + u, y + v]));
+                    let parts = (0..n * n).map(|k| [x + place(k / n), y + place(k % n)]);
+                    all.places.extend(parts);
                 }
                 ref several => all.places.extend_from_slice(several),
             }
@@ -160,8 +160,8 @@ mod tests {
     }
 
     #[test]
-    fn exact_quarters_are_those_of_pixels_with_one_ray() {
-        let rays = rays(8).quartered(0.5);
+    fn exact_divided_pixels_are_those_with_one_ray() {
+        let rays = rays(8).divided((0.5, 2));
         assert_eq!(rays.starts, [0, 8, 12, 16, 24]);
         assert_eq!(rays.places[8..12], [[-0.125; 2], [-0.125, 0.125], [0.125, -0.125], [0.125; 2]]);
     }

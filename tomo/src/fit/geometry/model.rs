@@ -61,8 +61,9 @@ pub struct GeometryModel {
     pub y: Vec<f64>,
     /// More rays for pixels near the critical curve, where they are wanted.
     pub ring: Option<RingRays>,
-    /// Width of pixels, M, where each is the mean over its quarters; none where it is what its middle shows.
-    pub quartered: Option<f64>,
+    /// Width of pixels, M, and into how many parts each side is cut, where a pixel is the mean over the middles of its
+    /// parts; none where it is what its own middle shows.
+    pub parts: Option<(f64, usize)>,
     /// Distance of the observer, M; infinity without one.
     pub observer_radius: Option<f64>,
     /// Where emission may be.
@@ -183,8 +184,8 @@ impl GeometryModel {
             Some(ring) => PixelRays::new(ring, seen, [&self.x, &self.y], turn(geometry)),
             None => PixelRays::single(&self.x, &self.y),
         };
-        match self.quartered {
-            Some(spacing) => rays.quartered(spacing),
+        match self.parts {
+            Some(parts) => rays.divided(parts),
             None => rays,
         }
     }

@@ -226,7 +226,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     }
 
     /// Number of data, each times the factor on its χ².
-    pub(super) fn data(&self) -> f64 {
+    pub fn data(&self) -> f64 {
         let count = |term: &Weighted<'_, T>| -> usize {
             self.frames.iter().map(|frame| term.term.degrees_of_freedom(*frame)).sum()
         };

@@ -31,7 +31,7 @@ fn model(law: Law) -> GeometryModel {
         x,
         y,
         ring: None,
-        quartered: None,
+        parts: None,
         observer_radius: None,
         region: Region { r_min: 0.0, r_max: 17.0, z_width: f64::INFINITY },
         order: 12,

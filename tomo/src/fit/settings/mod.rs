@@ -41,7 +41,7 @@ pub use quantity::{PriorSettings, Quantity};
 pub use quiescent::QuiescentSettings;
 pub use recovery::{AxisScan, AxisSearch, Linear, Occupancy, Optimiser, Start, Training};
 pub use representation::{FeatureGrid, Grid, Kind, LinearGrid, Network, Own, Representation};
-pub use search::{GeometrySearch, SearchSteps, SearchView};
+pub use search::{GeometrySearch, SearchView};
 pub use simulation::{
     GlyphShape, Movie, Noise, Observation, Ring, Shines, Simulation, Spot, Truth, Tube,
 };

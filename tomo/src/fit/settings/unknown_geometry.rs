@@ -1,6 +1,6 @@
 //! Parameters of the geometry that are not known.
 
-use super::{FitError, FitFile, GeometrySearch, LossKind, PriorSettings, Quantity, Within};
+use super::{FitError, FitFile, GeometrySearch, PriorSettings, Quantity, Within};
 use crate::Error;
 use crate::fit::geometry::{Free, Parameter, Prior};
 use rand::{RngExt, SeedableRng};
@@ -14,11 +14,6 @@ pub struct UnknownGeometry {
     /// How they are searched for.
     pub search: GeometrySearch,
 }
-
-/// Why finer steps are refused.
-const NO_STEPS: &str = "search.finest is what the last steps look at, and no steps are taken here: they need \
-                        screen.ring_rays or images, data in which the volume is a convex problem, and emission that \
-                        does not change";
 
 /// Sets draws of the geometry apart from those of the noise.
 const DRAWN: u64 = 0x77a1_d5ee_d000_0001;
@@ -58,11 +53,7 @@ impl FitFile {
                 Some(_) => Err(FitError::Conflict(NOTHING.to_owned()).into()),
             };
         }
-        let unknown = UnknownGeometry { free, search: given.unwrap_or_default() };
-        if unknown.search.finest.is_some() && !self.is_stepped() {
-            return Err(FitError::Conflict(NO_STEPS.to_owned()).into());
-        }
-        Ok(Some(unknown))
+        Ok(Some(UnknownGeometry { free, search: given.unwrap_or_default() }))
     }
 
     /// Puts values drawn from the priors in their places, with the seed of the fit.
@@ -80,13 +71,6 @@ impl FitFile {
     pub(super) fn first_prior(&self) -> Option<&'static str> {
         let mut all = self.quantities().into_iter();
         all.find(|(.., quantity)| quantity.prior().is_some()).map(|(_, key, _)| key)
-    }
-
-    /// Whether steps along differences of images follow a search.
-    fn is_stepped(&self) -> bool {
-        let are_smooth = self.screen.ring_rays.is_some()
-            || self.loss.iter().all(|loss| loss.data == LossKind::Image);
-        are_smooth && self.is_convex() && self.change.is_none()
     }
 }
 

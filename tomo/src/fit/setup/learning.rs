@@ -318,8 +318,6 @@ fn enough_nodes_and_iterations(file: &FitFile) -> Result<()> {
     if let Some(unknown) = file.unknown_geometry()? {
         grids.push(("search.coarse.nodes", unknown.search.coarse.nodes));
         grids.push(("search.fine.nodes", unknown.search.fine.nodes));
-        let finest = unknown.search.finest.map(|view| ("search.finest.nodes", view.nodes));
-        grids.extend(finest);
     }
     match grids.into_iter().find(|(_, nodes)| *nodes < least) {
         Some((key, nodes)) => {

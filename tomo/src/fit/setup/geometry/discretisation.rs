@@ -1,45 +1,35 @@
 //! Errors of a geometry that the model of the fit makes: its voxels, its pixels, and its sums along rays.
 
-use super::search_data::{BESIDE_THE_RING, SearchData};
+use super::search_data::SearchData;
+use super::steps::{Place, finer};
 use crate::fit::geometry::{
     Effort, GeometryModel, GeometryProblem, ModelErrors, Refined, Refinement, Spread, Standing,
 };
-use crate::fit::settings::{SearchView, UnknownGeometry};
-use crate::fit::setup::drawn::is_drawn_elsewhere;
-use crate::fit::setup::{CoarseView, Result};
+use crate::fit::settings::UnknownGeometry;
+use crate::fit::setup::Result;
 use kerrlight_vlbi::operator::Pulse;
 
-/// Voxels and pixels of a finer model over those of a search, along each side.
-const FINER: f64 = 1.5;
 /// Voxels along each axis, at most.
 const MOST: usize = 128;
 
-fn finer(count: usize) -> usize {
-    (FINER * count as f64).round() as usize
-}
-
 /// Errors that the model has of itself in a geometry that a search has found with χ²/N of `reduced`, through pixels of this
-/// width, M; none where data are simulated by the same sums.
+/// width, M.
 pub(super) fn errors(
-    (seen, view): (&SearchData, &SearchView),
+    place: &Place,
     (unknown, width): (&UnknownGeometry, f64),
     problem: &GeometryProblem<'_, f32>,
     (spread, reduced): (&Spread, f64),
 ) -> Result<ModelErrors> {
-    let file = &seen.view.file;
-    if file.data.is_none() && !is_drawn_elsewhere(file)? {
-        return Ok(ModelErrors::default());
-    }
-    if let Some(why) = left_out(seen, problem) {
+    if let Some(why) = left_out(&place.seen, problem) {
         let known = spread.unexplained(problem.excess(reduced), reduced).into_iter().collect();
         return Ok(ModelErrors { known, left_out: Some(why) });
     }
     let geometry = spread.geometry;
-    seen.smoothly(problem, (geometry, BESIDE_THE_RING[1]), |problem| {
+    place.seen.smoothly(problem, geometry, |problem| {
         let standing = problem.standing(geometry)?;
         let voxels = voxels(&standing, problem)?;
         let sums = sums(&standing, problem)?;
-        let pixels = pixels((seen, view), (unknown, width), &standing, problem)?;
+        let pixels = pixels(place, (unknown, width), &standing, problem)?;
         let refined: Vec<Refined> = [voxels, sums, pixels].into_iter().flatten().collect();
         Ok(ModelErrors { known: standing.errors(problem.free, &refined), left_out: None })
     })
@@ -79,7 +69,7 @@ fn sums(standing: &Standing, problem: &GeometryProblem<'_, f32>) -> Result<Optio
 /// Images may be samples or means over pixels. Visibilities are those of a smooth image, whose sums converge faster than any
 /// power of the pixel, unless the data are known to have pixels. Polarised light is seen along single rays.
 fn pixels(
-    (seen, view): (&SearchData, &SearchView),
+    Place { seen, view, errors, .. }: &Place,
     (unknown, width): (&UnknownGeometry, f64),
     standing: &Standing,
     problem: &GeometryProblem<'_, f32>,
@@ -90,16 +80,18 @@ fn pixels(
     }
     if seen.is_images() {
         let kind = Refinement { onwards: onwards(2.0, 2.0), ..kind };
-        let model = GeometryModel { quartered: Some(width), ..problem.model.clone() };
+        let rays = problem.model.parts.map_or(1, |(_, rays)| rays);
+        let model = GeometryModel { parts: Some((width, 2 * rays)), ..problem.model.clone() };
         return standing.refined(kind, &GeometryProblem { model: &model, ..*problem });
     }
-    let CoarseView { file, measured, .. } = &seen.view;
-    if measured.pulse != Pulse::Delta {
+    if seen.view.measured.pulse != Pulse::Delta {
         return Ok(None);
     }
-    let other = seen.sampled(finer(file.screen.pixels))?;
-    let how = (problem.scale, problem.memory);
-    other.with(unknown, view, how, |problem| standing.refined(kind, problem))
+    let other = seen.sampled(finer(seen.view.file.screen.pixels))?;
+    other.with(unknown, view, (*errors, problem.memory), |finer| {
+        let model = GeometryModel { split: problem.model.split, ..finer.model.clone() };
+        standing.refined(kind, &GeometryProblem { model: &model, ..*finer })
+    })
 }
 
 /// What endless refinement does over what a `finer`-fold one does, where errors go with this power of the size of parts.

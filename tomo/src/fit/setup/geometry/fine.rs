@@ -1,19 +1,22 @@
-//! The search about the best end of the coarse ones, steps from its best geometry, and how sure that one is.
+//! From the ends of the coarse searches to the best geometry, and how sure that one is.
 
 use super::discretisation;
-use super::posterior::{Resampled, polished, surely};
-use super::search_data::{BESIDE_THE_RING, SearchData};
+use super::posterior::{polished, surely};
+use super::search::Trial;
+use super::search_data::SearchData;
+use super::steps::{Place, Resolution};
 use super::tangent::Anchor;
 use crate::fit::geometry::{
-    Effort, Exploration, Explored, Geometry, GeometryProblem, Polished, Spread, TrialWatch,
+    Effort, Exploration, Explored, Geometry, GeometryModel, GeometryProblem, Spread, TrialWatch,
 };
 use crate::fit::journal::Memory;
 use crate::fit::linear::{StopRule, refined};
 use crate::fit::settings::{FitFile, SearchView, UnknownGeometry};
+use crate::fit::setup::drawn::is_drawn_elsewhere;
 use crate::fit::setup::{FitData, Result, spacing};
 
 /// How sure a geometry is, its χ²/N, and the geometry.
-type Sure = (Option<Spread>, f64, Geometry);
+pub(super) type Sure = (Option<Spread>, f64, Geometry);
 
 /// What is looked at in detail, about one geometry.
 pub(super) struct Detail<'a> {
@@ -30,134 +33,132 @@ pub(super) struct Detail<'a> {
 }
 
 impl Detail<'_> {
-    /// From the best end of the coarse search, which leaves so much of each datum, to the best geometry, and by what χ² was
-    /// multiplied there; none if it was cancelled.
+    /// From the ends of the coarse searches, the best of which leaves so much of each datum, to the best geometry, by what χ²
+    /// was multiplied there, and what it was looked at through; none if it was cancelled. Where steps lead on from the ends,
+    /// these move.
     pub fn search(
         &self,
-        start: (Geometry, Option<&Anchor>),
+        (trials, anchor): (&mut [Trial], &Anchor),
         reduced_chi2: f64,
         how: &Exploration,
         watch: &mut TrialWatch<'_>,
-    ) -> Result<Option<(Sure, f64)>> {
-        let search = &self.unknown.search;
+    ) -> Result<Option<(Sure, f64, Resolution)>> {
         let errors = (self.scale)(reduced_chi2);
-        let seen = SearchData::finely(self.file, self.measured, &search.fine)?;
-        let found = self.through((&seen, &search.fine), errors, |fine, problem| {
-            fine.search(problem, start, how, watch)
+        let SearchView { nodes, pixels, .. } = self.unknown.search.fine;
+        let at = Resolution { nodes, pixels, rays: 1, panels: 1 };
+        let place = self.place(at, errors)?;
+        let [is_stepped, is_convex] = self.through(&place, |problem| {
+            Ok([is_stepped(&place.seen, problem), problem.is_convex()])
+        })?;
+        if is_stepped && is_convex {
+            return self.steps(place, trials, watch);
+        }
+        let found = self.through(&place, |problem| match is_convex {
+            true => populated(problem, anchor.geometry, how, watch),
+            false => about_volumes(&place.seen, problem, anchor, how, watch),
         })?;
         let Some((spread, reduced, geometry)) = found else { return Ok(None) };
-        let Some(finest) = search.finest() else {
-            let spread = self.beside_its_own((&seen, &search.fine), errors, (spread, reduced))?;
-            return Ok(Some(((spread, reduced, geometry), errors)));
-        };
-        let errors = (self.scale)(reduced / errors);
-        let seen = SearchData::closely(self.file, self.measured, &finest)?;
-        let (polished, reduced) =
-            self.through((&seen, &finest), errors, |fine, problem| fine.finest(problem, geometry))?;
-        let geometry = polished.best.geometry;
-        let free = &self.unknown.free;
-        // What finer voxels and pixels moved the geometry by is what finer ones still might.
-        let spread = spread.map(|spread| spread.moved(free, geometry));
-        let spread = self.beside_its_own((&seen, &finest), errors, (spread, reduced))?;
-        Ok(Some(((spread, reduced, geometry), errors)))
+        let own = |spread| self.beside_its_own(&place, (spread, reduced));
+        let spread = spread.map(own).transpose()?;
+        Ok(Some(((spread, reduced, geometry), errors, at)))
     }
 
-    /// With the errors that the model has of itself.
-    fn beside_its_own(
+    /// Data at a resolution.
+    pub fn place(&self, at: Resolution, errors: f64) -> Result<Place> {
+        let Resolution { nodes, pixels, .. } = at;
+        let view = SearchView { nodes, pixels, ..self.unknown.search.fine };
+        let seen = SearchData::finely(self.file, self.measured, &view)?;
+        Ok(Place { seen, at, view, errors })
+    }
+
+    /// Whether data are of another model than that of the fit.
+    pub fn is_foreign(&self) -> Result<bool> {
+        Ok(self.file.data.is_some() || is_drawn_elsewhere(self.file)?)
+    }
+
+    /// With the errors that the model has of itself, where data are of another one.
+    pub fn beside_its_own(
         &self,
-        (seen, view): (&SearchData, &SearchView),
-        scale: f64,
-        (spread, reduced): (Option<Spread>, f64),
-    ) -> Result<Option<Spread>> {
-        let Some(spread) = spread else { return Ok(None) };
+        place: &Place,
+        (spread, reduced): (Spread, f64),
+    ) -> Result<Spread> {
+        if !self.is_foreign()? {
+            return Ok(spread);
+        }
         let about = (self.unknown, spacing(&self.file.screen)?);
-        let own = self.through((seen, view), scale, |_, problem| {
-            discretisation::errors((seen, view), about, problem, (&spread, reduced))
+        let own = self.through(place, |problem| {
+            discretisation::errors(place, about, problem, (&spread, reduced))
         })?;
-        Ok(Some(spread.beside(&self.unknown.free, own)))
+        Ok(spread.beside(&self.unknown.free, own))
     }
 
-    fn through<R>(
+    /// Does something with what is looked at.
+    pub fn through<R>(
         &self,
-        (seen, view): (&SearchData, &SearchView),
-        scale: f64,
-        work: impl FnOnce(&Fine<'_>, &GeometryProblem<'_, f32>) -> Result<R>,
+        place: &Place,
+        work: impl FnOnce(&GeometryProblem<'_, f32>) -> Result<R>,
     ) -> Result<R> {
-        let Self { unknown, memory, .. } = *self;
-        let fine = Fine { seen, unknown };
-        seen.with(unknown, view, (scale, memory), |problem| work(&fine, problem))
+        let Place { seen, at, view, errors } = place;
+        let width = spacing(&self.file.screen)?;
+        seen.with(self.unknown, view, (*errors, self.memory), |problem| {
+            let model = GeometryModel {
+                parts: (at.rays > 1).then_some((width, at.rays)),
+                split: at.panels * problem.model.split,
+                ..problem.model.clone()
+            };
+            work(&GeometryProblem { model: &model, ..*problem })
+        })
+    }
+
+    /// The same with data that change smoothly about a geometry.
+    pub fn smoothly<R>(
+        &self,
+        place: &Place,
+        about: Geometry,
+        work: impl FnOnce(&GeometryProblem<'_, f32>) -> Result<R>,
+    ) -> Result<R> {
+        self.through(place, |problem| place.seen.smoothly(problem, about, work))
     }
 }
 
-/// A search about one geometry.
-struct Fine<'a> {
-    /// Data.
-    seen: &'a SearchData,
-    /// What is not known.
-    unknown: &'a UnknownGeometry,
+/// The search about the best end of the coarse ones by a population of geometries, and how sure it is.
+fn populated(
+    problem: &GeometryProblem<'_, f32>,
+    start: Geometry,
+    how: &Exploration,
+    watch: &mut TrialWatch<'_>,
+) -> Result<Option<Sure>> {
+    let explored = quick(problem).explore((start, None), how, watch)?;
+    explored.map(|explored| valued(problem, &explored)).transpose()
 }
 
-impl Fine<'_> {
-    /// The search about the best end of the coarse one, and how sure it is.
-    fn search(
-        &self,
-        problem: &GeometryProblem<'_, f32>,
-        (start, volume): (Geometry, Option<&Anchor>),
-        how: &Exploration,
-        watch: &mut TrialWatch<'_>,
-    ) -> Result<Option<Sure>> {
-        let quick = quick(problem);
-        let Some(volume) = volume.filter(|_| !problem.is_convex()) else {
-            let beside = (start, BESIDE_THE_RING[0]);
-            let explored = self
-                .seen
-                .smoothly(&quick, beside, |problem| problem.explore((start, None), how, watch))?;
-            let Some(explored) = explored else { return Ok(None) };
-            return self.steps(problem, &explored).map(Some);
-        };
-        let first =
-            self.seen.about(&quick, volume, |quick| Ok(Anchor::of(quick, &quick.solve(start)?)))?;
-        let Some(first) = first else {
-            let x = refined(&volume.voxels, &volume.x, &problem.voxels())?;
-            let Some(explored) = quick.explore((start, Some(&x)), how, watch)? else {
-                return Ok(None);
-            };
-            return surely_about((self.seen, problem), None, &explored).map(Some);
-        };
-        let explored =
-            self.seen.about(&quick, &first, |quick| quick.explore((start, None), how, watch))?;
-        let Some(explored) = explored.flatten() else { return Ok(None) };
-        let short = Exploration { trials: how.trials / 2, ..*how };
-        let Some(explored) = nearer(self.seen, &quick, explored, &short, watch)? else {
+/// The same where data are convex about a volume only.
+fn about_volumes(
+    seen: &SearchData,
+    problem: &GeometryProblem<'_, f32>,
+    volume: &Anchor,
+    how: &Exploration,
+    watch: &mut TrialWatch<'_>,
+) -> Result<Option<Sure>> {
+    let (quick, start) = (quick(problem), volume.geometry);
+    let first = seen.about(&quick, volume, |quick| Ok(Anchor::of(quick, &quick.solve(start)?)))?;
+    let Some(first) = first else {
+        let x = refined(&volume.voxels, &volume.x, &problem.voxels())?;
+        let Some(explored) = quick.explore((start, Some(&x)), how, watch)? else {
             return Ok(None);
         };
-        let anchor = Anchor::of(problem, &explored.best);
-        let found = self.seen.about(problem, &anchor, |problem| {
-            surely_about((self.seen, problem), None, &explored)
-        })?;
-        Ok(found.map(|(spread, reduced, geometry)| {
-            (spread.filter(|_| reduced < WAY), reduced, geometry)
-        }))
-    }
-
-    /// Steps from the best geometry of a population, and how sure their end is.
-    fn steps(&self, problem: &GeometryProblem<'_, f32>, explored: &Explored) -> Result<Sure> {
-        let beside = (explored.best.geometry, BESIDE_THE_RING[1]);
-        self.seen.smoothly(problem, beside, |problem| {
-            surely_about((self.seen, problem), Some((self.seen, self.unknown)), explored)
-        })
-    }
-
-    /// Steps from a geometry that a search with fewer voxels and pixels has found, to the best one near it and its χ²/N.
-    fn finest(
-        &self,
-        problem: &GeometryProblem<'_, f32>,
-        start: Geometry,
-    ) -> Result<(Polished, f64)> {
-        self.seen.smoothly(problem, (start, BESIDE_THE_RING[1]), |problem| {
-            polished(problem, &problem.solve(start)?)
-        })
-    }
+        return surely_about((seen, problem), &explored).map(Some);
+    };
+    let explored = seen.about(&quick, &first, |quick| quick.explore((start, None), how, watch))?;
+    let Some(explored) = explored.flatten() else { return Ok(None) };
+    let short = Exploration { trials: how.trials / 2, ..*how };
+    let Some(explored) = nearer(seen, &quick, explored, &short, watch)? else {
+        return Ok(None);
+    };
+    let anchor = Anchor::of(problem, &explored.best);
+    let found = seen.about(problem, &anchor, |problem| surely_about((seen, problem), &explored))?;
+    Ok(found
+        .map(|(spread, reduced, geometry)| (spread.filter(|_| reduced < WAY), reduced, geometry)))
 }
 
 /// A problem whose volumes tell geometries apart and no more: populations look for where steps begin, with volumes that are
@@ -178,15 +179,19 @@ const WAY: f64 = 3.0;
 /// How sure the best of the geometries that were explored is.
 fn surely_about(
     (seen, problem): (&SearchData, &GeometryProblem<'_, f32>),
-    resampled: Resampled<'_>,
     explored: &Explored,
 ) -> Result<Sure> {
     if is_stepped(seen, problem) {
         let (polished, reduced) = polished(problem, &explored.best)?;
-        let spread = surely(problem, resampled, &polished, reduced)?;
+        let spread = surely(problem, None, &polished, reduced)?;
         let geometry = spread.as_ref().map_or(polished.best.geometry, |spread| spread.geometry);
         return Ok((spread, reduced, geometry));
     }
+    valued(problem, explored)
+}
+
+/// How sure it is, by the values of the geometries around.
+fn valued(problem: &GeometryProblem<'_, f32>, explored: &Explored) -> Result<Sure> {
     let reduced = problem.scale * problem.left(&explored.best)?;
     let spread = Spread::of(problem.free, &explored.samples, reduced);
     let geometry = lower(&quick(problem), explored, spread.as_ref())?;

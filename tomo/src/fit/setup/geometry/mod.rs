@@ -5,10 +5,12 @@ mod fine;
 mod posterior;
 mod search;
 mod search_data;
+mod steps;
 mod tangent;
 
 pub use posterior::GeometryPosterior;
 pub use search::{FoundGeometry, SearchWatch, Trial, find_geometry};
+pub use steps::Resolution;
 
 use super::instrument::ring;
 use super::{FitData, Instrument, Result, axis, motion};
@@ -88,7 +90,7 @@ fn model(file: &FitFile, instrument: &Instrument, motion: &Motion) -> Result<Geo
         x,
         y,
         ring: ring(file)?,
-        quartered: None,
+        parts: None,
         observer_radius: file.observer.radius,
         region: file.region.limits(),
         order,

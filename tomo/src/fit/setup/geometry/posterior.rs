@@ -2,10 +2,10 @@
 
 use super::search_data::SearchData;
 use crate::fit::geometry::{
-    Effort, Envelope, Estimate, Free, Geometry, GeometryProblem, ModelErrors, Polish, Polished,
-    Spread,
+    Effort, Envelope, Estimate, Free, Geometry, GeometryModel, GeometryProblem, ModelErrors,
+    Polish, Polished, Spread,
 };
-use crate::fit::settings::{FitFile, UnknownGeometry};
+use crate::fit::settings::{FitFile, SearchView, UnknownGeometry};
 use crate::fit::setup::{FitData, Result};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
@@ -79,7 +79,7 @@ pub(super) fn surely(
 }
 
 /// Data through other pixels, and what of the geometry is not known; none where pixels are those of the data.
-pub(super) type Resampled<'a> = Option<(&'a SearchData, &'a UnknownGeometry)>;
+pub(super) type Resampled<'a> = Option<(&'a SearchData, &'a UnknownGeometry, &'a SearchView)>;
 
 /// The bowl beneath the ripples, along other lattices of rays, each with other voxels, where the data alone decide, and with
 /// other pixels, where those are samples only.
@@ -94,18 +94,19 @@ fn enveloped(
         other_voxels(effort, problem.gaussian.map_or(number, |_| SAME))
     };
     for number in 1..=LATTICES {
+        let split = problem.model.split;
         let mut look = |problem: &GeometryProblem<'_, f32>| {
-            let model = &problem.model.seen_along(number);
+            let model = &GeometryModel { split, ..problem.model.seen_along(number) };
             let effort = other_voxels(problem.effort, number);
             surroundings.look(&GeometryProblem { model, effort, ..*problem })
         };
         let other = resampled
-            .and_then(|(seen, unknown)| Some((seen.resampled.get(number as usize - 1)?, unknown)));
+            .and_then(|(seen, ..)| Some((seen.resampled.get(number as usize - 1)?, resampled?)));
         match other {
             None => look(problem)?,
-            Some((seen, unknown)) => {
+            Some((seen, (_, unknown, view))) => {
                 let how = (problem.scale, problem.memory);
-                seen.with(unknown, &unknown.search.fine, how, look)?;
+                seen.with(unknown, view, how, look)?;
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use super::fine::{Detail, PART, nearer};
 use super::search_data::SearchData;
+use super::steps::Resolution;
 use super::tangent::Anchor;
 use crate::fit::geometry::{
     Estimate, Exploration, Explored, Geometry, GeometryProblem, Spread, TrialWatch,
@@ -41,6 +42,8 @@ pub struct FoundGeometry {
     /// Errors that the search took over those of the data: below 1 where residuals are much smaller than the errors,
     /// as those of images without noise.
     pub noise_factor: f64,
+    /// What it was looked at through in the end.
+    pub resolution: Resolution,
     /// The searches from all starts.
     pub trials: Vec<Trial>,
 }
@@ -54,7 +57,7 @@ const WIDTHS: [f64; 2] = [1.5, 0.4];
 /// Geometries of a search for each of that from the twin of its end.
 const TWIN: usize = 6;
 
-/// Looks for the geometry from all starts, and again with finer voxels about the best end; none if it was cancelled. What the
+/// Looks for the geometry from all starts, and on from their ends with finer voxels; none if it was cancelled. What the
 /// journal knows of an earlier search that was interrupted is not looked at again.
 ///
 /// # Errors
@@ -77,7 +80,7 @@ pub fn find_geometry(
     let found = coarse.with(unknown, &search.coarse, (scale(first), memory), |problem| {
         from_starts(&coarse, problem, file.seed, unknown, watch)
     })?;
-    let Some(Found { start, volume, reduced_chi2, trials }) = found else {
+    let Some(Found { best, reduced_chi2, mut trials }) = found else {
         return Ok(None);
     };
     let how = Exploration { width: WIDTHS[1], trials: search.fine.trials, seed: file.seed };
@@ -85,21 +88,20 @@ pub fn find_geometry(
     let mut told = |trials: usize, best: f64| watch((count - 1, count), trials, best);
     // The coarse search has left less than it began with.
     let detail = Detail { file, measured, unknown, memory, scale: &scale };
-    let found = detail.search((start, volume.as_ref()), reduced_chi2, &how, &mut told)?;
-    Ok(found.map(|((spread, reduced, geometry), errors)| FoundGeometry {
+    let found = detail.search((&mut trials, &best), reduced_chi2, &how, &mut told)?;
+    Ok(found.map(|((spread, reduced, geometry), errors, resolution)| FoundGeometry {
         geometry,
         reduced_chi2: reduced / errors,
         noise_factor: errors.powf(-0.5),
         spread,
+        resolution,
         trials,
     }))
 }
 
-/// What the coarse search has found: where the fine one begins, with χ²/N there.
+/// What the coarse searches have found: their best end, with χ²/N there.
 struct Found {
-    start: Geometry,
-    /// The volume there, where it was looked for from several starts.
-    volume: Option<Anchor>,
+    best: Anchor,
     reduced_chi2: f64,
     trials: Vec<Trial>,
 }
@@ -128,9 +130,8 @@ fn from_starts(
         }
     }
     let Some(best) = best else { return Ok(None) };
-    let (start, reduced_chi2) = (best.geometry, problem.left(&best)?);
-    let volume = Some(Anchor::of(problem, &best));
-    Ok(Some(Found { start, volume, reduced_chi2, trials }))
+    let reduced_chi2 = problem.left(&best)?;
+    Ok(Some(Found { best: Anchor::of(problem, &best), reduced_chi2, trials }))
 }
 
 /// Geometries whose lit fields are tried, for each from which a search begins.

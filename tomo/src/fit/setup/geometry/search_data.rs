@@ -24,10 +24,8 @@ pub(super) struct SearchData {
     pub(super) resampled: Vec<SearchData>,
 }
 
-/// Pixels of single rays do not count where they are nearer to the critical curve, M: to that of the coarse search's geometry,
-/// about which populations spread, and to that of the geometry where steps begin. Second images of matter at 3 to 9 M are
-/// within 0.7 M.
-pub(super) const BESIDE_THE_RING: [f64; 2] = [1.0, 0.8];
+/// Pixels do not count where they are nearer to the critical curve, M. Second images of matter at 3 to 9 M are within 0.7 M.
+const BESIDE_THE_RING: f64 = 0.8;
 
 /// Pixels of a look through others over those of the fit, along each side: finer and wider ones.
 const RESAMPLED: [f64; 3] = [1.15, 0.87, 1.25];
@@ -40,15 +38,10 @@ impl SearchData {
         Self::new(file, measured, view, 0)
     }
 
-    /// For steps between geometries that are much alike: their volumes are solved for nearly to the end.
-    pub fn closely(file: &FitFile, measured: &FitData, view: &SearchView) -> Result<Self> {
-        Self::exactly(file, measured, view, 0)
-    }
-
-    /// For a search among geometries that are much alike, whose volumes are solved for nearly to the end too; and the same
-    /// through other pixels.
+    /// For a search among geometries that are much alike, whose volumes are solved for nearly to the end; and the same through
+    /// other pixels.
     pub fn finely(file: &FitFile, measured: &FitData, view: &SearchView) -> Result<Self> {
-        let mut seen = Self::exactly(file, measured, view, file.screen.pixels / 2)?;
+        let mut seen = Self::exactly(file, measured, view)?;
         if measured.pulse == Pulse::Delta && !has_images(file) {
             let pixels = seen.view.file.screen.pixels as f64;
             for share in RESAMPLED {
@@ -68,10 +61,10 @@ impl SearchData {
     }
 
     /// Visibilities are seen through as many pixels as are asked for, were they more than those of the fit, with all nodes on
-    /// rays; through `few` pixels or fewer, and where there are images, as a coarse search sees them.
-    fn exactly(file: &FitFile, measured: &FitData, view: &SearchView, few: usize) -> Result<Self> {
+    /// rays; through half of these or fewer, and where there are images, as a coarse search sees them.
+    fn exactly(file: &FitFile, measured: &FitData, view: &SearchView) -> Result<Self> {
         let SearchView { pixels, frames, .. } = *view;
-        if has_images(file) || pixels == file.screen.pixels || pixels <= few {
+        if has_images(file) || pixels == file.screen.pixels || 2 * pixels <= file.screen.pixels {
             return Self::new(file, measured, view, 1);
         }
         let view = CoarseView::sampled(file, measured, pixels)?;
@@ -151,7 +144,7 @@ impl SearchData {
     pub fn smoothly<R>(
         &self,
         problem: &GeometryProblem<'_, f32>,
-        (geometry, limit): (Geometry, f64),
+        geometry: Geometry,
         work: impl FnOnce(&GeometryProblem<'_, f32>) -> Result<R>,
     ) -> Result<R> {
         let CoarseView { file, measured, .. } = &self.view;
@@ -159,7 +152,7 @@ impl SearchData {
             return work(problem);
         }
         let mut data = measured.terms(&file.loss, problem.model.x.len())?;
-        let ring = problem.model.ring_pixels(&geometry, limit)?;
+        let ring = problem.model.ring_pixels(&geometry, BESIDE_THE_RING)?;
         data.image =
             data.image.map(|image| Imaged { term: Box::new(image.term.without(ring)), ..image });
         let terms = terms(&data).into_iter();
@@ -167,7 +160,7 @@ impl SearchData {
             Some(_) => terms.collect(),
             None => terms.map(|term| counted(term, problem.frames)).collect(),
         };
-        let memory = problem.memory.about(key((geometry.bits(), limit.to_bits())));
+        let memory = problem.memory.about(key(geometry.bits()));
         work(&GeometryProblem { terms: &terms, memory, ..*problem })
     }
 

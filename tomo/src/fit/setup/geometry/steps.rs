@@ -1,0 +1,227 @@
+//! Steps from the ends of all searches to the best geometry, through voxels, pixels and sums along rays as fine as the data ask
+//! for.
+
+use super::fine::{Detail, Sure};
+use super::posterior::{Resampled, polished, surely};
+use super::search::Trial;
+use super::search_data::SearchData;
+use crate::fit::geometry::{Free, Geometry, GeometryProblem, Polished, TrialWatch};
+use crate::fit::linear::Voxels;
+use crate::fit::settings::SearchView;
+use crate::fit::setup::{Result, spacing};
+use kerrlight_vlbi::operator::Pulse;
+
+/// What geometries are compared through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resolution {
+    /// Voxels along each axis.
+    pub nodes: usize,
+    /// Pixels along each side.
+    pub pixels: usize,
+    /// Rays along each side of a pixel of images, which is their mean.
+    pub rays: usize,
+    /// Panels of a ray for each of the coarsest.
+    pub panels: u32,
+}
+
+/// Voxels, and pixels of visibilities, of a finer model over those of a search, along each side.
+const FINER: f64 = 1.5;
+/// Rays along each side of a pixel, and panels, at most.
+const MOST: usize = 4;
+/// Ends nearer than this part of each parameter's scale are the same place.
+const ALIKE: f64 = 0.1;
+
+/// Data at a resolution.
+pub(super) struct Place {
+    pub seen: SearchData,
+    pub at: Resolution,
+    pub view: SearchView,
+    /// By what χ² is multiplied.
+    pub errors: f64,
+}
+
+/// Where steps from a geometry have ended.
+#[derive(Clone)]
+struct Stepped {
+    polished: Polished,
+    /// χ²/N times what χ² is multiplied by.
+    reduced: f64,
+    /// −ln of the density over the number of data.
+    per_datum: f64,
+}
+
+impl Stepped {
+    fn geometry(&self) -> Geometry {
+        self.polished.best.geometry
+    }
+}
+
+fn lowest(all: &[Stepped]) -> Option<&Stepped> {
+    all.iter().min_by(|a, b| a.per_datum.total_cmp(&b.per_datum))
+}
+
+fn is_alike(free: &[Free], a: &Geometry, b: &Geometry) -> bool {
+    free.iter().all(|Free { parameter, .. }| {
+        let apart = parameter.difference(a.get(*parameter), b.get(*parameter));
+        apart.abs() < ALIKE * parameter.scale()
+    })
+}
+
+pub(super) fn finer(count: usize) -> usize {
+    (FINER * count as f64).round() as usize
+}
+
+impl Detail<'_> {
+    /// From the ends of all searches, which move to where steps lead, to the best geometry; none if it was cancelled.
+    ///
+    /// Coarse voxels displace ends, so that the best of them need not lead to the best geometry. Pixels of images are samples
+    /// or means: steps are taken with both. Some pixels are left out, at first those near the critical curve of each end:
+    /// values are compared once they are the same for all.
+    pub fn steps(
+        &self,
+        first: Place,
+        trials: &mut [Trial],
+        watch: &mut TrialWatch<'_>,
+    ) -> Result<Option<(Sure, f64, Resolution)>> {
+        let ends: Vec<Geometry> = trials.iter().map(|trial| trial.end).collect();
+        let Some(near) = self.each(&first, None, &ends, watch)? else { return Ok(None) };
+        let mut best = (first, near);
+        if self.may_be_means(&best.0)? {
+            let place = self.place(Resolution { rays: 2, ..best.0.at }, best.0.errors)?;
+            let Some(near) = self.each(&place, None, &ends, watch)? else { return Ok(None) };
+            let least = |all: &[Stepped]| lowest(all).map_or(f64::INFINITY, |end| end.per_datum);
+            if least(&near) < least(&best.1) {
+                best = (place, near);
+            }
+        }
+        let (place, near) = best;
+        let ends: Vec<Geometry> = near.iter().map(Stepped::geometry).collect();
+        let about = lowest(&near).map(Stepped::geometry);
+        let Some(all) = self.each(&place, about, &ends, watch)? else { return Ok(None) };
+        for (trial, stepped) in trials.iter_mut().zip(&all) {
+            let Stepped { polished, reduced, .. } = stepped;
+            trial.end = stepped.geometry();
+            trial.value = polished.best.value;
+            trial.reduced_chi2 = reduced / place.errors;
+            trial.further = polished.further;
+        }
+        let Some(best) = lowest(&all).cloned() else { return Ok(None) };
+        let (place, best) = self.refined(place, best)?;
+        let errors = (self.scale)(best.reduced / place.errors);
+        let place = Place { errors, ..place };
+        let sure = self.sure(&place, &best)?;
+        Ok(Some((sure, errors, place.at)))
+    }
+
+    /// Whether pixels may be means over several rays: those of images that another model has made.
+    fn may_be_means(&self, place: &Place) -> Result<bool> {
+        let is_plain = self.file.polarization.is_none();
+        Ok(place.seen.is_images() && is_plain && self.is_foreign()?)
+    }
+
+    /// Steps from each geometry, from those that are alike once, without the pixels near the critical curve of a geometry or of
+    /// each; none if it was cancelled.
+    fn each(
+        &self,
+        place: &Place,
+        about: Option<Geometry>,
+        starts: &[Geometry],
+        watch: &mut TrialWatch<'_>,
+    ) -> Result<Option<Vec<Stepped>>> {
+        let mut all: Vec<Stepped> = Vec::new();
+        for start in starts {
+            let mut before = starts[..all.len()].iter();
+            let stepped = match before.position(|other| is_alike(&self.unknown.free, other, start))
+            {
+                Some(k) => all[k].clone(),
+                None => self.stepped(place, about.unwrap_or(*start), *start)?,
+            };
+            all.push(stepped);
+            let least = all.iter().map(|end| end.polished.best.value).fold(f64::INFINITY, f64::min);
+            if !watch(all.len(), least) {
+                return Ok(None);
+            }
+        }
+        Ok(Some(all))
+    }
+
+    fn stepped(&self, place: &Place, about: Geometry, start: Geometry) -> Result<Stepped> {
+        self.smoothly(place, about, |problem| {
+            let (polished, reduced) = polished(problem, &problem.solve(start)?)?;
+            let per_datum = problem.reduced(polished.best.value);
+            Ok(Stepped { polished, reduced, per_datum })
+        })
+    }
+
+    /// Steps at higher resolutions, as long as these explain more than chance does: what lowers χ²/2 at the best geometry by
+    /// more than its standard deviation. More voxels explain more in any case, and count where χ² asks for them.
+    fn refined(&self, mut place: Place, mut best: Stepped) -> Result<(Place, Stepped)> {
+        if !self.is_foreign()? {
+            return Ok((place, best));
+        }
+        loop {
+            let geometry = best.geometry();
+            let (value, chance, finer) = self.smoothly(&place, geometry, |problem| {
+                let chance = (0.5 * problem.data()).sqrt();
+                let asks = problem.excess(best.reduced) > 0.0;
+                Ok((problem.solve(geometry)?.value, chance, self.finer(&place, problem, asks)?))
+            })?;
+            let mut next: Option<(f64, Place)> = None;
+            for at in finer {
+                let there = self.place(at, place.errors)?;
+                let gain =
+                    value - self.smoothly(&there, geometry, |p| Ok(p.solve(geometry)?.value))?;
+                if gain > next.as_ref().map_or(chance, |(most, _)| *most) {
+                    next = Some((gain, there));
+                }
+            }
+            let Some((_, there)) = next else { return Ok((place, best)) };
+            best = self.stepped(&there, geometry, geometry)?;
+            place = there;
+        }
+    }
+
+    /// Resolutions that are higher in one of their parts: voxels, where they are asked for, down to half a pixel.
+    fn finer(
+        &self,
+        place: &Place,
+        problem: &GeometryProblem<'_, f32>,
+        asks_for_voxels: bool,
+    ) -> Result<Vec<Resolution>> {
+        let Place { at, seen, .. } = place;
+        let mut all = Vec::new();
+        // Whether pixels are means at all was decided where steps began: either model has minima of its own.
+        if seen.is_images() && at.rays > 1 && at.rays < MOST {
+            all.push(Resolution { rays: 2 * at.rays, ..*at });
+        }
+        if !seen.is_images() && self.measured.pulse == Pulse::Delta {
+            let pixels = finer(at.pixels);
+            let most = 2 * self.unknown.search.fine.pixels;
+            all.extend((pixels <= most).then_some(Resolution { pixels, ..*at }));
+        }
+        if (at.panels as usize) < MOST {
+            all.push(Resolution { panels: 2 * at.panels, ..*at });
+        }
+        let nodes = finer(at.nodes);
+        let voxels = Voxels::cube(nodes, self.file.region.r_max, problem.effort.degree);
+        let is_wide = voxels.shape().spacing[0] >= 0.5 * spacing(&seen.view.file.screen)?;
+        if asks_for_voxels && problem.gaussian.is_none() && is_wide {
+            all.push(Resolution { nodes, ..*at });
+        }
+        Ok(all)
+    }
+
+    /// How sure the best geometry is, with the errors that the model has of itself.
+    fn sure(&self, place: &Place, best: &Stepped) -> Result<Sure> {
+        let resampled: Resampled<'_> = Some((&place.seen, self.unknown, &place.view));
+        let about = best.geometry();
+        let (spread, reduced, geometry) = self.smoothly(place, about, |problem| {
+            let (polished, reduced) = polished(problem, &best.polished.best)?;
+            let spread = surely(problem, resampled, &polished, reduced)?;
+            let geometry = spread.as_ref().map_or(polished.best.geometry, |spread| spread.geometry);
+            Ok((spread, reduced, geometry))
+        })?;
+        let Some(spread) = spread else { return Ok((None, reduced, geometry)) };
+        Ok((Some(self.beside_its_own(place, (spread, reduced))?), reduced, geometry))
+    }
+}
