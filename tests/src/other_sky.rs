@@ -176,33 +176,35 @@ fn code_drawn_geometries_look_alike_through_both_forward_models() {
     }
 }
 
-/// Voxels and pixels of the fit are too coarse for the filaments: χ² of 4 and errors of the data alone would claim a spin that
-/// is wrong by 300 of them. A search of a single start that gives up early has to know as well.
+/// Voxels and pixels that the search begins with are too coarse for the filaments, and a start of so few evaluations ends
+/// at a spin of 0.8: steps lead on from there, at the resolution that the data ask for.
 #[test]
 #[ignore = "long"]
-fn exact_intervals_hold_the_geometries_of_another_forward_model() {
-    for (starts, (sky, noise)) in [
-        ([2, 250], (filaments(), 0.01)),
-        ([2, 250], (spots_and_arc(), 0.02)),
-        ([1, 100], (filaments(), 0.01)),
-        ([1, 100], (spots_and_arc(), 0.02)),
-    ] {
+fn exact_searches_find_the_geometries_of_another_forward_model() {
+    for (starts, (sky, noise)) in
+        [([1, 100], (filaments(), 0.01)), ([2, 250], (spots_and_arc(), 0.02))]
+    {
         let folder = tempfile::tempdir().expect("a folder");
         let geometry = found(folder.path(), &sky, noise, starts);
         for (name, truth, most) in [
-            ("spin", sky.0.spin, 0.4),
-            ("inclination_deg", sky.0.inclination_deg, 3.0),
-            ("position_angle_deg", sky.0.position_angle_deg, 3.0),
+            ("spin", sky.0.spin, 0.02),
+            ("inclination_deg", sky.0.inclination_deg, 0.3),
+            ("position_angle_deg", sky.0.position_angle_deg, 0.3),
         ] {
             let [found, sigma] =
                 ["geometry", "sigma"].map(|of| geometry[of][name].as_f64().unwrap());
             let own = |source: &str| geometry["model_error"][source][name].as_f64().unwrap();
             let own = ["voxels", "pixels", "sums along rays"].map(own);
             println!("{name} = {found:.4} ± {sigma:.4}, {truth}: {own:?}");
-            let is_open = geometry["open"][name] == true;
-            let holds = (found - truth).abs() < 3.0 * sigma && sigma < most;
-            assert!(is_open || holds, "{geometry}");
-            assert!(own.iter().all(|own| *own <= sigma * (1.0 + 1e-9)) || is_open, "{geometry}");
+            let away = (found - truth).abs();
+            assert!(away < most && away < 3.0 * sigma && sigma < most, "{geometry}");
+            assert!(own.iter().all(|own| *own <= sigma * (1.0 + 1e-9)), "{geometry}");
         }
+        assert!(geometry["chi2_per_datum"].as_f64().unwrap() < 1.05, "{geometry}");
+        // Images are means over pixels.
+        assert!(geometry["resolution"]["rays_per_pixel"].as_u64().unwrap() >= 4, "{geometry}");
+        assert_eq!(geometry["ended_at_the_best"], geometry["starts"], "{geometry}");
+        let trials = geometry["trials"].as_array().unwrap();
+        assert!(trials.iter().all(|trial| trial["converged"] == true), "{geometry}");
     }
 }
