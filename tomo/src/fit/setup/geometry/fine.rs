@@ -1,36 +1,18 @@
 //! From the ends of the coarse searches to the best geometry, and how sure that one is.
 
+use super::detail::{Detail, Sure, Trial};
 use super::discretisation;
 use super::posterior::{polished, surely};
-use super::search::Trial;
 use super::search_data::SearchData;
 use super::steps::{Place, Resolution};
 use super::tangent::Anchor;
 use crate::fit::geometry::{
     Effort, Exploration, Explored, Geometry, GeometryModel, GeometryProblem, Spread, TrialWatch,
 };
-use crate::fit::journal::Memory;
 use crate::fit::linear::{StopRule, refined};
-use crate::fit::settings::{FitFile, SearchView, UnknownGeometry};
+use crate::fit::settings::SearchView;
 use crate::fit::setup::drawn::is_drawn_elsewhere;
-use crate::fit::setup::{FitData, Result, spacing};
-
-/// How sure a geometry is, its χ²/N, and the geometry.
-pub(super) type Sure = (Option<Spread>, f64, Geometry);
-
-/// What is looked at in detail, about one geometry.
-pub(super) struct Detail<'a> {
-    /// Settings.
-    pub file: &'a FitFile,
-    /// Data.
-    pub measured: &'a FitData,
-    /// What is not known.
-    pub unknown: &'a UnknownGeometry,
-    /// What an earlier search has found.
-    pub memory: Memory<'a>,
-    /// By what χ² is multiplied where it leaves so much of each datum.
-    pub scale: &'a dyn Fn(f64) -> f64,
-}
+use crate::fit::setup::{Result, spacing};
 
 impl Detail<'_> {
     /// From the ends of the coarse searches, the best of which leaves so much of each datum, to the best geometry, by what χ²

@@ -1,5 +1,6 @@
 //! From settings to a geometry that is not known: its model, its parameters, the search for them and their errors.
 
+mod detail;
 mod discretisation;
 mod fine;
 mod posterior;
@@ -8,8 +9,9 @@ mod search_data;
 mod steps;
 mod tangent;
 
+pub use detail::Trial;
 pub use posterior::GeometryPosterior;
-pub use search::{FoundGeometry, SearchWatch, Trial, find_geometry};
+pub use search::{FoundGeometry, SearchWatch, find_geometry};
 pub use steps::Resolution;
 
 use super::instrument::ring;

@@ -1,6 +1,7 @@
 //! The search for a geometry: from many starts with coarse voxels, then with fine ones.
 
-use super::fine::{Detail, PART, nearer};
+use super::detail::{Detail, Trial};
+use super::fine::{PART, nearer};
 use super::search_data::SearchData;
 use super::steps::Resolution;
 use super::tangent::Anchor;
@@ -12,23 +13,6 @@ use crate::fit::settings::{FieldKind, FitFile, Linear, UnknownGeometry};
 use crate::fit::setup::{FitData, Result};
 
 use rayon::prelude::*;
-
-/// Where one search ended, in [`Geometry`]'s units.
-#[derive(Clone, Debug)]
-pub struct Trial {
-    /// Where it began.
-    pub start: Geometry,
-    /// Where it ended.
-    pub end: Geometry,
-    /// χ² over the number of data there.
-    pub reduced_chi2: f64,
-    /// Half of χ² there, and −ln of the priors' densities.
-    pub value: f64,
-    /// Geometries that were evaluated.
-    pub trials: usize,
-    /// The lowest point of a quadratic form through the geometries around; none without such a form.
-    pub further: Option<Geometry>,
-}
 
 /// A geometry that was found.
 #[derive(Clone, Debug)]

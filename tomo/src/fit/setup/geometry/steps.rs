@@ -1,9 +1,8 @@
 //! Steps from the ends of all searches to the best geometry, through voxels, pixels and sums along rays as fine as the data ask
 //! for.
 
-use super::fine::{Detail, Sure};
+use super::detail::{Detail, Sure, Trial};
 use super::posterior::{Resampled, polished, surely};
-use super::search::Trial;
 use super::search_data::SearchData;
 use crate::fit::geometry::{Free, Geometry, GeometryProblem, Polished, TrialWatch};
 use crate::fit::linear::Voxels;

@@ -1,0 +1,40 @@
+//! What searches hand on to one another.
+
+use crate::fit::geometry::{Geometry, Spread};
+use crate::fit::journal::Memory;
+use crate::fit::settings::{FitFile, UnknownGeometry};
+use crate::fit::setup::FitData;
+
+/// Where one search ended, in [`Geometry`]'s units.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// Where it began.
+    pub start: Geometry,
+    /// Where it ended.
+    pub end: Geometry,
+    /// χ² over the number of data there.
+    pub reduced_chi2: f64,
+    /// Half of χ² there, and −ln of the priors' densities.
+    pub value: f64,
+    /// Geometries that were evaluated.
+    pub trials: usize,
+    /// The lowest point of a quadratic form through the geometries around; none without such a form.
+    pub further: Option<Geometry>,
+}
+
+/// How sure a geometry is, its χ²/N, and the geometry.
+pub(super) type Sure = (Option<Spread>, f64, Geometry);
+
+/// What is looked at in detail, about one geometry.
+pub(super) struct Detail<'a> {
+    /// Settings.
+    pub file: &'a FitFile,
+    /// Data.
+    pub measured: &'a FitData,
+    /// What is not known.
+    pub unknown: &'a UnknownGeometry,
+    /// What an earlier search has found.
+    pub memory: Memory<'a>,
+    /// By what χ² is multiplied where it leaves so much of each datum.
+    pub scale: &'a dyn Fn(f64) -> f64,
+}
