@@ -50,7 +50,8 @@ pub fn sealed(mut object: serde_json::Value) -> String {
 /// whose entries come as [`listed`], one entry at a time is in memory.
 pub fn seal_list(
     out: &mut impl Write,
-    (mut object, name): (serde_json::Value, &str),
+    mut object: serde_json::Value,
+    name: &str,
     mut entries: impl Iterator<Item = String>,
 ) -> std::io::Result<()> {
     let Some(first) = entries.next() else {
@@ -106,7 +107,7 @@ mod tests {
             let object = json!({"title": "t", "quick": false});
             let mut text = Vec::new();
             let each = entries.iter().map(listed);
-            seal_list(&mut text, (object.clone(), "cases"), each).unwrap();
+            seal_list(&mut text, object.clone(), "cases", each).unwrap();
             let text = String::from_utf8(text).unwrap();
             let mut whole = object;
             whole["cases"] = json!(entries);

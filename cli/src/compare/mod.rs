@@ -118,7 +118,7 @@ impl Compare {
             bail!("{}: no case can be run; {}: {why}", name.display(), first.name());
         }
         if self.list {
-            return Ok(listing::cases(chosen, &self.command(&asked, (threads, memory))));
+            return Ok(listing::cases(chosen, &self.command(&asked, threads, memory)));
         }
         if !self.collect {
             ran::check_data(&chosen)?;
@@ -169,7 +169,7 @@ impl Compare {
     }
 
     /// The command that runs the same cases in the same folder.
-    fn command(&self, asked: &Asked, (threads, memory): (Option<u16>, Option<u64>)) -> Vec<String> {
+    fn command(&self, asked: &Asked, threads: Option<u16>, memory: Option<u64>) -> Vec<String> {
         let name = self.experiment.iter().map(|name| name.display().to_string());
         let mut words: Vec<String> = ["kerrlight".to_owned(), "compare".to_owned()].into();
         words.extend(name);

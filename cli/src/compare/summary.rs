@@ -119,7 +119,7 @@ impl<'a> Summary<'a> {
         });
         let version = env!("CARGO_PKG_VERSION");
         let object = json!({"title": title, "version": version, "quick": quick});
-        output.write_with(|file| Ok(checksum::seal_list(file, (object, "cases"), entries)?))?;
+        output.write_with(|file| Ok(checksum::seal_list(file, object, "cases", entries)?))?;
         Ok(Self::new(all))
     }
 

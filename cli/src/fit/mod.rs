@@ -119,7 +119,7 @@ impl Fit {
             let work = Work::read(&text).with_context(|| path.display().to_string())?;
             let work = work.prepared(&base_dir_of(&text), registry)?;
             work.check_device(device.as_ref())?;
-            return self.run_all(&work, &text, (&folder, true), device);
+            return self.run_all(&work, &text, &folder, true, device);
         }
         let guess = self.data.as_deref().map(|data| init::guess(data, self.model)).transpose()?;
         let (own, base_dir) = self.settings(guess.as_ref())?;
@@ -146,7 +146,7 @@ impl Fit {
             None => Folder::unnamed()?,
         };
         let folder = Folder::create(&folder, &text, Inputs::new(&text, read))?;
-        self.run_all(&prepared, &text, (&folder, false), device)
+        self.run_all(&prepared, &text, &folder, false, device)
     }
 
     /// The settings as an answer; those of a program that calls this one have to make sense.
@@ -177,7 +177,8 @@ impl Fit {
         &self,
         work: &Prepared,
         text: &str,
-        (folder, resume): (&Folder, bool),
+        folder: &Folder,
+        resume: bool,
         device: Option<FitDevice>,
     ) -> anyhow::Result<Answer> {
         let recorder = recorder(folder);

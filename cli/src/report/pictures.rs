@@ -46,7 +46,7 @@ pub fn slices(
     hole_radius: f64,
     unit: &str,
 ) -> anyhow::Result<Figure> {
-    slices_with(shown, through, (hole_radius, None), unit)
+    slices_with(shown, through, hole_radius, None, unit)
 }
 
 /// The same with outlines of another volume.
@@ -56,7 +56,8 @@ pub fn slices(
 pub fn slices_with(
     shown: &[Shown],
     through: Through,
-    (hole_radius, outlines): (f64, Option<Outlines<'_>>),
+    hole_radius: f64,
+    outlines: Option<Outlines<'_>>,
     unit: &str,
 ) -> anyhow::Result<Figure> {
     let last = shown.last().ok_or_else(|| anyhow!("there is nothing to draw"))?;

@@ -87,7 +87,8 @@ fn on_nodes(
 /// If the volume is larger than memory, or out of range.
 pub fn recovered_at(
     file: &FitFile,
-    (trainer, motion): (&mut Trainer<'_, f32>, &Motion),
+    trainer: &mut Trainer<'_, f32>,
+    motion: &Motion,
     state: &State<f32>,
     since: f64,
 ) -> Result<Volume, Error> {

@@ -17,7 +17,7 @@ pub fn annotate(plain: &str) -> String {
     let keys = if is_image { StaticImageFile::keys() } else { FitFile::keys() };
     for line in plain.lines() {
         if let Some(heading) = heading(line) {
-            out += &left_out(keys, (plain, table), &there);
+            out += &left_out(keys, plain, table, &there);
             (table, there) = (heading, Vec::new());
             out += &format!("\n# {}\n{line}\n", keys.about(table));
         } else if let Some(name) = name_of(line) {
@@ -27,7 +27,7 @@ pub fn annotate(plain: &str) -> String {
             out += &format!("{line}\n");
         }
     }
-    out + &left_out(keys, (plain, table), &there)
+    out + &left_out(keys, plain, table, &there)
 }
 
 fn heading(line: &str) -> Option<&str> {
@@ -56,7 +56,7 @@ fn beside(value: &str, note: &str) -> String {
 }
 
 /// Keys of a table that may be added: none that has a heading of its own in the settings.
-fn left_out(keys: &Keys, (plain, table): (&str, &str), there: &[&str]) -> String {
+fn left_out(keys: &Keys, plain: &str, table: &str, there: &[&str]) -> String {
     let is_headed = |key: &Key| {
         let mut headings = plain.lines().filter_map(heading);
         table.is_empty() && headings.any(|heading| heading.split('.').next() == Some(&*key.name))

@@ -176,7 +176,7 @@ fn of_data(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Resul
     let [data] = data else { return of_files(data, toml, model) };
     if model == Some(Model::Image) {
         let (_, observation) = crate::interferometry::read(data)?;
-        return of_observation(&observation, (data, toml), model);
+        return of_observation(&observation, data, toml, model);
     }
     let path = toml::Value::String(seen_from(toml, data)?).to_string();
     let extension = data.extension().and_then(|e| e.to_str()).unwrap_or_default();
@@ -185,7 +185,7 @@ fn of_data(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Resul
     }
     let name = data.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let first = match crate::interferometry::read(data) {
-        Ok((_, observation)) => return of_observation(&observation, (data, toml), model),
+        Ok((_, observation)) => return of_observation(&observation, data, toml, model),
         Err(first) => first,
     };
     // A table may hold a light curve, and a FITS file or a table an image.
@@ -250,7 +250,8 @@ fn called(observation: &Observation, source: Option<&Source>) -> String {
 /// no more than is known of it.
 fn of_observation(
     observation: &Observation,
-    (data, toml): (&Path, &Path),
+    data: &Path,
+    toml: &Path,
     model: Option<Model>,
 ) -> anyhow::Result<String> {
     let path = toml::Value::String(seen_from(toml, data)?).to_string();

@@ -196,7 +196,8 @@ fn again(folder: &Folder, samples: u32) -> String {
 fn geometries<'a>(
     prepared: &'a Problem,
     unknown: &'a UnknownGeometry,
-    (folder, geometry): (&Folder, &Value),
+    folder: &Folder,
+    geometry: &Value,
 ) -> anyhow::Result<GeometryPosterior<'a>> {
     let free = &unknown.free;
     let best = geometry_search::geometry_of(&prepared.settings, free, geometry)?;
@@ -241,7 +242,7 @@ impl<'a> Drawing<'a> {
         let complete = (1..=u64::from(samples)).all(|number| names(path, number)[1].is_file());
         let geometries = match (unknown, &geometry) {
             (Some(unknown), Some(geometry)) if !complete => {
-                Some(geometries(prepared, unknown, (folder, geometry))?)
+                Some(geometries(prepared, unknown, folder, geometry)?)
             }
             _ => None,
         };

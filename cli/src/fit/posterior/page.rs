@@ -62,7 +62,7 @@ fn figures(
     let at = Through::Point(Through::Maximum.point(&found.ensemble.mean));
     let outlines = Some(Outlines { volume: noise, levels: SIGMAS });
     let mut first =
-        report::slices_with(&shown, Through::Maximum, (hole_radius, outlines), "model units")?;
+        report::slices_with(&shown, Through::Maximum, hole_radius, outlines, "model units")?;
     let [white, blue] = SIGMAS;
     first.caption = format!(
         "{} The mean is above {white} standard deviations inside the white line, above {blue} inside the blue one.",

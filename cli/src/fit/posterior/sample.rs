@@ -59,11 +59,11 @@ pub fn draw(
     let training = setup::training(file, rate, times)?;
     let mut state = State::new(&*representation, axis, &training);
     let mut trainer = Trainer::new(objective, &*representation, training);
-    if !begin(file, &mut trainer, &mut state, times, (keeper, told))? {
+    if !begin(file, &mut trainer, &mut state, times, keeper, told)? {
         return Ok(None);
     }
     let steps = if file.representation.kind == Kind::LinearGrid { 0 } else { file.training.steps };
-    if !learn(&mut trainer, &mut state, (steps, keeper), told)? {
+    if !learn(&mut trainer, &mut state, steps, keeper, told)? {
         return Ok(None);
     }
     let frames: Vec<usize> = (0..measured.times.len()).collect();
@@ -107,7 +107,8 @@ fn begin(
     trainer: &mut Trainer<'_, f32>,
     state: &mut State<f32>,
     times: [f64; 2],
-    (keeper, told): (&SignalGuard, &dyn Fn(&str)),
+    keeper: &SignalGuard,
+    told: &dyn Fn(&str),
 ) -> anyhow::Result<bool> {
     let is_linear = file.representation.kind == Kind::LinearGrid;
     let change = setup::change(file, times)?;
@@ -140,7 +141,8 @@ fn begin(
 fn learn(
     trainer: &mut Trainer<'_, f32>,
     state: &mut State<f32>,
-    (steps, keeper): (u64, &SignalGuard),
+    steps: u64,
+    keeper: &SignalGuard,
     told: &dyn Fn(&str),
 ) -> anyhow::Result<bool> {
     while state.now.step < steps {

@@ -86,7 +86,7 @@ impl Summary {
         let features = ensemble.features(&volumes);
         let geometry = geometry.map_or(Vec::new(), |geometry| intervals(file, geometry, draws));
         let coverage = truth.as_ref().map(|truth| covered(file, &ensemble, truth)).transpose()?;
-        let ranked = |truth: &Volume| ranks(file, (&ensemble, &features), &volumes, truth);
+        let ranked = |truth: &Volume| ranks(file, &ensemble, &features, &volumes, truth);
         let ranks = truth.as_ref().map(ranked).transpose()?;
         let certain = certain(&ensemble);
         let open = open(file, &ensemble)?;
@@ -277,7 +277,8 @@ fn covered(file: &FitFile, ensemble: &Ensemble, truth: &Volume) -> anyhow::Resul
 /// Ranks of the truth among the draws, of what is listed in [`RANKED`].
 fn ranks(
     file: &FitFile,
-    (ensemble, features): (&Ensemble, &[Feature]),
+    ensemble: &Ensemble,
+    features: &[Feature],
     draws: &[Volume],
     truth: &Volume,
 ) -> anyhow::Result<[Ranks; 3]> {

@@ -38,7 +38,7 @@ impl Estimate<'_> {
         };
         for time in times {
             let since = time - self.motion.reference;
-            let volume = recovered_at(self.file, (trainer, self.motion), state, since)?;
+            let volume = recovered_at(self.file, trainer, self.motion, state, since)?;
             found.recovered.push(integral(&volume));
             if let (Some(truth), Some(curve)) = (known, &mut found.truth) {
                 let truth = true_volume_at(self.file, truth, since)?;

@@ -93,7 +93,7 @@ fn exact_evidence_is_the_density_of_the_data() {
     let values = DVector::from_iterator(used.len(), used.iter().map(|k| data[*k]));
     let factor = covariance.clone().cholesky().unwrap();
     let expected = -0.5 * (values.dot(&factor.solve(&values)) + covariance.determinant().ln())
-        + positive(&seen, &found.best, &used, (&factor.inverse(), &values));
+        + positive(&seen, &found.best, &used, &factor.inverse(), &values);
     assert!((found.ln_evidence - expected).abs() < 1e-8 * expected.abs(), "{found:?} {expected}");
 }
 
@@ -102,7 +102,8 @@ fn positive(
     seen: &field::BandCovariance,
     band: &Band,
     used: &[usize],
-    (inverse, values): (&DMatrix<f64>, &DVector<f64>),
+    inverse: &DMatrix<f64>,
+    values: &DVector<f64>,
 ) -> f64 {
     let ([own, of_one], mean) = (seen.own_total, band.mean * band.mean);
     let across = (&seen.total + &seen.uniform * (mean * of_one)) * band.power;
@@ -278,7 +279,7 @@ fn exact_evidence_before_a_background() {
     };
     let seen = curve.seen(&truth).unwrap();
     let (with, inverse, values) = density(seen.full(&found.best));
-    let with = with + positive(&seen, &found.best, &used, (&inverse, &values));
+    let with = with + positive(&seen, &found.best, &used, &inverse, &values);
     let without = density(DMatrix::zeros(30, 30)).0;
     assert!((found.ln_evidence - with).abs() < 1e-7 * with.abs(), "{found:?} {with}");
     let alone = without_flare(&curve, core::slice::from_ref(&data), &[BACKGROUND]).unwrap()[0];

@@ -25,7 +25,7 @@ impl GraphicsFit {
                 let scale = rays * variance / pairs.len() as f64;
                 let slope = (2.0 * image.weight * scale) as f32;
                 for (some, ends) in pieces(pairs, self.pieces.pairs, learns) {
-                    self.pairs(stretch, some, slope, k, (ends, 0))?;
+                    self.pairs(stretch, some, slope, k, ends, 0)?;
                 }
                 let squares = Squares { scale, dark: 0.0, weight: image.weight };
                 Ok(Pending::There(Some(squares), Vec::new()))
@@ -46,7 +46,8 @@ impl GraphicsFit {
         pairs: &[(u32, u32)],
         slope: f32,
         record: usize,
-        (ends, frames): (Ends, usize),
+        ends: Ends,
+        frames: usize,
     ) -> Result<(), GpuError> {
         let Self { device, pixels, .. } = self;
         let (model, image) = (&stretch.objective.model, &stretch.objective.data.image);
@@ -90,7 +91,7 @@ impl GraphicsFit {
                 visibilities.set(&self.device, some, &factors, record)?;
             }
             let pairs = pairs_of(stretch, some);
-            self.pairs(stretch, &pairs, slope, record, (ends, some.len()))?;
+            self.pairs(stretch, &pairs, slope, record, ends, some.len())?;
         }
         Ok(Pending::There(image.map(|(_, squares)| squares), shares))
     }

@@ -99,7 +99,7 @@ pub fn scan_band(
     let better =
         |a: &usize, b: &usize| geometries[*a].ln_posterior.total_cmp(&geometries[*b].ln_posterior);
     let best = (0..geometries.len()).max_by(better).unwrap_or(0);
-    let [azimuth, radius] = placed(file, measured, settings, curve, (&geometries, best))?;
+    let [azimuth, radius] = placed(file, measured, settings, curve, &geometries, best)?;
     let geometry = &geometries[best];
     let rows = rows(file, measured, settings, curve, geometry.flow())?;
     let data = turned(curve, geometry.position_angle_deg);
@@ -160,7 +160,8 @@ fn placed(
     measured: &FitData,
     settings: &BandSettings,
     curve: &Curve,
-    (geometries, best): (&[BandGeometry], usize),
+    geometries: &[BandGeometry],
+    best: usize,
 ) -> Result<[Interval; 2]> {
     let most = geometries[best].ln_posterior;
     let likely: Vec<&BandGeometry> =

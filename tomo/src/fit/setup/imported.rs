@@ -127,12 +127,8 @@ impl Reduction {
             true => all_products(observation, &self.rows).within(name)?,
             false => prepared(observation, &self.rows).within(name)?,
         };
-        add_systematic(
-            "data.visibilities.systematic",
-            self.systematic,
-            (&mut observation, losses),
-        )?;
-        medium::correct(&mut observation, losses, (self.scattering, self.variability), name)?;
+        add_systematic("data.visibilities.systematic", self.systematic, &mut observation, losses)?;
+        medium::correct(&mut observation, losses, self.scattering, self.variability, name)?;
         Ok(observation)
     }
 }

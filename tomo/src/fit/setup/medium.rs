@@ -15,7 +15,8 @@ use kerrlight_vlbi::observation::Observation;
 pub(super) fn correct(
     observation: &mut Observation,
     losses: &[Loss],
-    (scattering, variability): (Option<Scattering>, Option<Variability>),
+    scattering: Option<Scattering>,
+    variability: Option<Variability>,
     name: &str,
 ) -> Result<()> {
     if scattering == Some(Scattering::SgrA) {

@@ -87,7 +87,7 @@ pub(super) fn spoil(
         add_thermal_noise(observation, file.seed);
     }
     if let Some(part) = seen.systematic {
-        add_systematic("simulation.observation.systematic", part, (observation, &fit.loss))?;
+        add_systematic("simulation.observation.systematic", part, observation, &fit.loss)?;
     }
     Ok(Spoiled { gains, leakage })
 }
@@ -96,7 +96,8 @@ pub(super) fn spoil(
 pub(super) fn add_systematic(
     name: &str,
     part: f64,
-    (observation, losses): (&mut Observation, &[Loss]),
+    observation: &mut Observation,
+    losses: &[Loss],
 ) -> Result<()> {
     if !(part >= 0.0 && part.is_finite()) {
         return Err(FitError::range(name, part, "0 or above").into());

@@ -52,7 +52,7 @@ fn shares(knots: Knots, time: f64) -> Vec<(f64, f64)> {
 }
 
 /// The same written plainly, and its derivative.
-fn plain_in_time(knots: Knots, p: &[f64], dp: &[f64], (at, dat): (&[f64], &[f64])) -> (f64, f64) {
+fn plain_in_time(knots: Knots, p: &[f64], dp: &[f64], at: &[f64], dat: &[f64]) -> (f64, f64) {
     let n = settings().nodes.iter().product::<usize>();
     let (mut sum, mut change) = (0.0, 0.0);
     for (knot, (share, growth)) in shares(knots, at[0]).into_iter().enumerate() {
@@ -81,7 +81,7 @@ fn exact_changing_fields_conform() {
     {
         let field = field(count, allowed);
         let tangent = |p: &[f64], dp: &[f64], at: &[f64], dat: &[f64]| {
-            plain_in_time(field.knots, p, dp, (at, dat))
+            plain_in_time(field.knots, p, dp, at, dat)
         };
         let (representation, within) = (&field, 1.3);
         check(&Subject { representation, within, parameter_noise: 1.0, tangent: &tangent });

@@ -38,7 +38,7 @@ impl Spots {
             }
             let ends = [&Node::at(path, from), &Node::at(path, to)];
             match self.spans.as_deref() {
-                Some(spans) => intersections.by_spans(spans, tree, ends, 0, (walk, met)),
+                Some(spans) => intersections.by_spans(spans, tree, ends, 0, walk, met),
                 None => intersections.through(tree, ends, walk, met),
             }
         }
@@ -99,7 +99,8 @@ impl Meeting<'_> {
         ever: &SpotTree,
         [start, end]: [&Node; 2],
         depth: u32,
-        (walk, met): (&mut WalkScratch, &mut Vec<Intersections>),
+        walk: &mut WalkScratch,
+        met: &mut Vec<Intersections>,
     ) {
         let [first, last] = self.times([start, end]).map(|time| spans.number(time));
         if last.saturating_sub(first) <= 1 {
@@ -114,8 +115,8 @@ impl Meeting<'_> {
         }
         let middle = 0.5 * (start.point.mino_time + end.point.mino_time);
         let middle = Node::at(self.path, middle);
-        self.by_spans(spans, ever, [start, &middle], depth + 1, (walk, met));
-        self.by_spans(spans, ever, [&middle, end], depth + 1, (walk, met));
+        self.by_spans(spans, ever, [start, &middle], depth + 1, walk, met);
+        self.by_spans(spans, ever, [&middle, end], depth + 1, walk, met);
     }
 }
 
