@@ -45,7 +45,7 @@ pub struct StaticImageFile {
     /// Penalties on the brightness over its mean; lengths are parts of the field.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub regulariser: Vec<PenaltySettings>,
-    /// A round envelope in the middle of the field that light is expected in.
+    /// A Gaussian in the middle of the field that light is expected in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub envelope: Option<EnvelopeSettings>,
     /// A factor on all penalties, chosen by cross-validation; 1 without it.
@@ -112,7 +112,7 @@ pub enum StartImage {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EnvelopeSettings {
-    /// Full width at half maximum of the Gaussian that has its second moment, µas.
+    /// Full width at half maximum, µas.
     #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
     pub fwhm_uas: f64,
     /// Factor on the entropy relative to it.

@@ -84,7 +84,7 @@ fn strength(observation: &Observation, average_s: f64, long_only: bool) -> Strin
         .map_or(0, |mut kept| setup::frames_of(&mut kept).0.len());
     match FOLDS.min(frames / 2) {
         0 | 1 => String::new(),
-        folds => format!("[strength]\nvalues = [30.0, 100.0]\nfolds = {folds}"),
+        folds => format!("[strength]\nvalues = [10.0, 30.0, 100.0]\nfolds = {folds}"),
     }
 }
 
