@@ -34,7 +34,7 @@ pub fn chosen(folder: &Folder, file: &FitFile) -> anyhow::Result<Option<Choice>>
     geometry_results::lines(&results).iter().for_each(|line| eprintln!("{line}"));
     let geometry =
         geometry_of(file, &unknown.free, &results).with_context(|| folder.damaged(FILE))?;
-    Ok(Some(Choice::Geometry(geometry)))
+    Ok(Some(Choice::Geometry { geometry, rays: rays_of(&results) }))
 }
 
 /// Geometries of one of the coarse searches at most.
@@ -138,6 +138,11 @@ fn results(
 /// What the best geometry was looked at through.
 fn resolution(Resolution { nodes, pixels, rays, panels }: Resolution) -> Value {
     json!({"nodes": nodes, "pixels": pixels, "rays_per_pixel": rays * rays, "panels": panels})
+}
+
+/// Rays along each side of a pixel that the best geometry was looked at through.
+pub fn rays_of(results: &Value) -> usize {
+    results["resolution"]["rays_per_pixel"].as_u64().map_or(1, |rays| rays.isqrt() as usize)
 }
 
 /// Radii at which velocities are compared.

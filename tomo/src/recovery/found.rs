@@ -47,7 +47,12 @@ pub enum Searched {
 #[non_exhaustive]
 pub enum Choice {
     /// The geometry.
-    Geometry(Geometry),
+    Geometry {
+        /// Spin, direction of the observer and parameters of the flow.
+        geometry: Geometry,
+        /// Rays along each side of a pixel, which is their mean.
+        rays: usize,
+    },
     /// The best band.
     Band {
         /// Degrees.
@@ -67,7 +72,9 @@ impl Found<'_> {
     /// What the fit goes on with.
     pub fn choice(&self) -> Choice {
         match self {
-            Found::Geometry(_, _, found) => Choice::Geometry(found.geometry),
+            Found::Geometry(_, _, found) => {
+                Choice::Geometry { geometry: found.geometry, rays: found.resolution.rays }
+            }
             Found::Band(_, scan) => {
                 let best = &scan.geometries[scan.best];
                 Choice::Band {

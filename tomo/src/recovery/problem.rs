@@ -102,7 +102,7 @@ impl Problem {
         setup::representation(settings, registry, setup::emission_times(instrument, motion))?;
         if settings.unknown_geometry()?.is_some() {
             let geometry = setup::known_geometry(settings);
-            setup::in_geometry(settings, instrument, measured, &geometry, 0)?;
+            setup::in_geometry(settings, instrument, measured, &geometry, (1, 0))?;
         }
         let seen = self.objective(instrument, motion, measured)?.observed().len();
         if let Some(held_out) = &settings.held_out {

@@ -31,7 +31,8 @@ impl ResolvedFit {
     pub fn in_geometry(
         problem: &Problem,
         file: &FitFile,
-        (geometry, rays): (&Geometry, u64),
+        geometry: &Geometry,
+        rays: (usize, u64),
     ) -> Result<Self, Error> {
         let Problem { instrument, measured, .. } = problem;
         let (instrument, motion) = setup::in_geometry(file, instrument, measured, geometry, rays)?;
@@ -41,7 +42,9 @@ impl ResolvedFit {
     fn of(problem: &Problem, choice: &Choice) -> Result<Option<Self>, Error> {
         let Problem { settings, measured, .. } = problem;
         let placed = match choice {
-            Choice::Geometry(geometry) => Self::in_geometry(problem, settings, (geometry, 0))?,
+            Choice::Geometry { geometry, rays } => {
+                Self::in_geometry(problem, settings, geometry, (*rays, 0))?
+            }
             Choice::Band { inclination_deg, position_angle_deg, rotation_factor, background } => {
                 let mut file = setup::in_band_geometry(settings, *inclination_deg);
                 if let Some(law) = &mut file.polarization {

@@ -226,6 +226,8 @@ struct Drawing<'a> {
     file: FitFile,
     unknown: Option<&'a UnknownGeometry>,
     geometries: Option<GeometryPosterior<'a>>,
+    /// Rays along each side of a pixel.
+    rays: usize,
     /// Noise of a draw over the errors of the data.
     factor: f64,
 }
@@ -251,7 +253,8 @@ impl<'a> Drawing<'a> {
             None => noise_of(folder)?,
         };
         let file = held_out::settled(&prepared.settings, folder)?;
-        Ok(Self { prepared, file, unknown, geometries, factor })
+        let rays = geometry.as_ref().map_or(1, geometry_search::rays_of);
+        Ok(Self { prepared, file, unknown, geometries, rays, factor })
     }
 
     /// A draw of an earlier call, or a new one; none if it was stopped.
@@ -295,7 +298,7 @@ impl<'a> Drawing<'a> {
         let data = geometries.data(noise)?;
         let geometry = geometries.draw(number);
         let ResolvedFit { file, instrument, motion, .. } =
-            ResolvedFit::in_geometry(self.prepared, &file, (&geometry, number))?;
+            ResolvedFit::in_geometry(self.prepared, &file, &geometry, (self.rays, number))?;
         let through =
             Through { file: &file, instrument: &instrument, motion: &motion, registry, measured };
         let drawn = sample::draw(&through, &data, keeper, told)?;

@@ -15,7 +15,7 @@ pub use search::{FoundGeometry, SearchWatch, find_geometry};
 pub use steps::Resolution;
 
 use super::instrument::ring;
-use super::{FitData, Instrument, Result, axis, motion};
+use super::{FitData, Instrument, Result, axis, motion, spacing};
 use crate::fit::geometry::{Geometry, GeometryModel, Law, Parameter};
 use crate::fit::settings::{AxisSearch, FitError, FitFile};
 use crate::fit::{Motion, Sampling};
@@ -40,8 +40,8 @@ pub fn true_geometry(file: &FitFile) -> Result<Geometry> {
     Ok(known_geometry(&file.simulated()?))
 }
 
-/// What a fit looks through in a geometry, along the rays near the critical curve of this number, and how matter moves there.
-/// Rays of number 0 are the usual ones.
+/// What a fit looks through in a geometry, and how matter moves there. A pixel is the mean over so many rays along each side
+/// of it; those near the critical curve are of a number, 0 for the usual ones.
 ///
 /// # Errors
 /// If a setting is missing or out of range.
@@ -50,10 +50,13 @@ pub fn in_geometry(
     instrument: &Instrument,
     measured: &FitData,
     geometry: &Geometry,
-    rays: u64,
+    (rays, number): (usize, u64),
 ) -> Result<(Instrument, Motion)> {
     let plain = motion(file, measured.times.clone())?;
-    let model = model(file, instrument, &plain)?.seen_along(rays);
+    let mut model = model(file, instrument, &plain)?.seen_along(number);
+    if rays > 1 {
+        model.parts = Some((spacing(&file.screen)?, rays));
+    }
     let hole = Kerr::new(geometry.get(Parameter::Spin))?;
     let found = Instrument {
         pixels: instrument.pixels.clone(),
