@@ -87,8 +87,7 @@ impl Shape {
     /// Shares of the flux in the pixels of a grid.
     fn shares(self, x: &[f64], size: f64, grid: ImageGrid) -> Vec<f64> {
         let pixel = grid.pixel_rad / MICROARCSECOND;
-        // Nothing is narrower than pixels tell.
-        let width = |ln: f64| ln.clamp(-5.0, 9.0).exp().hypot(pixel);
+        let width = |ln: f64| drawn(ln, pixel);
         let bell = |square: f64, ln: f64| (-4.0 * LN_2 * square / width(ln).powi(2)).exp();
         let light = |east: f64, north: f64| match self {
             Self::Gaussian => {
@@ -128,8 +127,9 @@ impl Shape {
         all.into_iter().map(|x| x / sum).collect()
     }
 
-    /// Names, values and units of its sizes.
-    fn sizes(self, x: &[f64], size: f64) -> Vec<(&'static str, f64, &'static str)> {
+    /// Names, values and units of its sizes, as pixels of this width show them.
+    fn sizes(self, x: &[f64], size: f64, pixel: f64) -> Vec<(&'static str, f64, &'static str)> {
+        let width = |ln: f64| drawn(ln, pixel);
         let turn = |east: f64, north: f64| east.atan2(north).to_degrees().rem_euclid(360.0);
         match self {
             Self::Gaussian => {
@@ -137,26 +137,31 @@ impl Shape {
                 // The longer axis is where the form is least.
                 let angle = 0.5 * (-x[2]).atan2(x[1]).to_degrees();
                 vec![
-                    ("major axis", (x[0] + 0.5 * h).exp(), "µas"),
-                    ("minor axis", (x[0] - 0.5 * h).exp(), "µas"),
+                    ("major axis", width(x[0]) * (0.5 * h).exp(), "µas"),
+                    ("minor axis", width(x[0]) * (-0.5 * h).exp(), "µas"),
                     ("position angle", angle.rem_euclid(180.0), "°"),
                 ]
             }
-            Self::Disc => vec![("diameter", x[0].exp(), "µas")],
-            Self::Ring => vec![("diameter", x[0].exp(), "µas"), ("width", x[1].exp(), "µas")],
+            Self::Disc => vec![("diameter", width(x[0]), "µas")],
+            Self::Ring => vec![("diameter", width(x[0]), "µas"), ("width", width(x[1]), "µas")],
             Self::Crescent => vec![
-                ("diameter", x[0].exp(), "µas"),
-                ("width", x[1].exp(), "µas"),
+                ("diameter", width(x[0]), "µas"),
+                ("width", width(x[1]), "µas"),
                 ("brightest direction", turn(x[2], x[3]), "°"),
             ],
             Self::Double => vec![
                 ("distance", size * x[2].hypot(x[3]), "µas"),
                 ("direction", turn(x[2], x[3]), "°"),
-                ("width of one", x[0].exp(), "µas"),
-                ("width of the other", x[1].exp(), "µas"),
+                ("width of one", width(x[0]), "µas"),
+                ("width of the other", width(x[1]), "µas"),
             ],
         }
     }
+}
+
+/// A width of this logarithm in a picture: nothing is narrower than its pixels tell.
+fn drawn(ln: f64, pixel: f64) -> f64 {
+    ln.clamp(-5.0, 9.0).exp().hypot(pixel)
 }
 
 /// Fits all shapes; none if `go_on` said no.
@@ -225,7 +230,7 @@ fn best(
     let (total, count) = independent(problem, file, &chi2);
     Some(ShapeFit {
         shape,
-        sizes: shape.sizes(&found.parameters[1..], size),
+        sizes: shape.sizes(&found.parameters[1..], size, grid.pixel_rad / MICROARCSECOND),
         shares: shape.shares(&found.parameters[1..], size, grid),
         flux_jy: here.iter().sum(),
         chi2,
