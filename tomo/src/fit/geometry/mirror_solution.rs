@@ -9,8 +9,8 @@ use core::f64::consts::PI;
 use kerrlight_common::simd::Float;
 
 impl<T: Float + Default> GeometryProblem<'_, T> {
-    /// The twin of a geometry; none if its inclination is not free.
-    pub fn twin(&self, geometry: &Geometry) -> Option<Geometry> {
+    /// The mirror solution of a geometry; none if its inclination is not free.
+    pub fn mirror_solution(&self, geometry: &Geometry) -> Option<Geometry> {
         let other = |parameter: Parameter, value: f64| match parameter {
             Parameter::Inclination => PI - value,
             Parameter::Spin => -value,
@@ -18,9 +18,9 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
             _ => value,
         };
         self.free.iter().find(|free| free.parameter == Parameter::Inclination)?;
-        let one = |twin: Geometry, free: &super::Free| {
+        let one = |mirror: Geometry, free: &super::Free| {
             let value = other(free.parameter, geometry.get(free.parameter));
-            twin.with(free.parameter, free.inside(value))
+            mirror.with(free.parameter, free.inside(value))
         };
         Some(self.free.iter().fold(*geometry, one))
     }

@@ -38,8 +38,8 @@ pub type SearchWatch<'a> = dyn FnMut((usize, usize), usize, f64) -> bool + 'a;
 /// Width of the first population from a start, and of the one about the best end, in units of a parameter's scale.
 const WIDTHS: [f64; 2] = [1.5, 0.4];
 
-/// Geometries of a search for each of that from the twin of its end.
-const TWIN: usize = 6;
+/// Geometries of a search for each of that from the mirror solution of its end.
+const MIRROR: usize = 6;
 
 /// Looks for the geometry from all starts, and on from their ends with finer voxels; none if it was cancelled. What the
 /// journal knows of an earlier search that was interrupted is not looked at again.
@@ -182,16 +182,18 @@ fn lowest(problem: &GeometryProblem<'_, f32>, explored: &Explored) -> Result<Opt
     Ok(Spread::of(problem.free, &explored.samples, reduced).map(|form| form.geometry))
 }
 
-/// Where a search has ended, or a short one from the twin of that geometry, if that ends at a better one.
+/// Where a search has ended, or a short one from the mirror solution of that geometry, if that ends at a better one.
 fn or_twin(
     problem: &GeometryProblem<'_, f32>,
     mut explored: Explored,
     how: &Exploration,
     watch: &mut TrialWatch<'_>,
 ) -> Result<Option<Explored>> {
-    let Some(twin) = problem.twin(&explored.best.geometry) else { return Ok(Some(explored)) };
-    let short = Exploration { width: WIDTHS[1], trials: how.trials / TWIN, ..*how };
-    let Some(other) = problem.explore((twin, None), &short, watch)? else { return Ok(None) };
+    let Some(mirror) = problem.mirror_solution(&explored.best.geometry) else {
+        return Ok(Some(explored));
+    };
+    let short = Exploration { width: WIDTHS[1], trials: how.trials / MIRROR, ..*how };
+    let Some(other) = problem.explore((mirror, None), &short, watch)? else { return Ok(None) };
     if other.best.value < explored.best.value {
         explored.best = other.best;
     }
