@@ -95,7 +95,7 @@ impl<T: Float> Frames<T> {
         self.pixels
     }
 
-    /// Whether they are in memory.
+    /// Returns whether they are in memory.
     pub fn is_in_memory(&self) -> bool {
         matches!(self.store, Store::Memory(_))
     }
@@ -193,7 +193,7 @@ impl<T: Float> Frames<T> {
     }
 }
 
-/// What part of the memory a movie may take.
+/// Share of the memory that a movie may take.
 const SHARE: f64 = 1.0 / 8.0;
 
 /// Takes an image.

@@ -1,6 +1,6 @@
-//! What the crates of kerrlight share and none of them is about: how much [`memory`] may be taken, movies larger than
-//! memory ([`frames`]), arrays of NumPy ([`numpy`]), TOML that names lines ([`toml_file`]), elementary functions on
-//! SIMD lanes ([`simd`]), Stokes parameters ([`stokes`]) and [`units`].
+//! Foundations that all crates of kerrlight share: limits on [`memory`], movies larger than memory ([`frames`]),
+//! arrays of NumPy ([`numpy`]), TOML that names lines ([`toml_file`]), elementary functions on SIMD lanes ([`simd`]),
+//! Stokes parameters ([`stokes`]) and [`units`].
 
 // In the order of the flow of data: a module imports from those above it.
 pub mod memory;

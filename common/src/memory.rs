@@ -19,7 +19,7 @@ std::thread_local! {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{what} would take {} of memory, but the limit is {}", shown(*.needed), shown(*.limit as f64))]
 pub struct TooLarge {
-    /// What it is.
+    /// Name of the thing that needs the memory.
     pub what: String,
     /// Bytes, estimated.
     pub needed: f64,

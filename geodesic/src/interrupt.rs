@@ -33,7 +33,7 @@ pub fn obey(flag: &'static AtomicBool) {
     FLAG.set(Some(flag));
 }
 
-/// Whether work on this thread is told to stop.
+/// Returns whether work on this thread is told to stop.
 #[inline]
 pub fn is_wanted() -> bool {
     FLAG.get().is_some_and(|flag| flag.load(Ordering::Relaxed))

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-/// What work comes to, or what it panicked with.
+/// Result of work, or its panic.
 type Ended<T, E> = Result<Result<T, E>, Box<dyn Any + Send>>;
 
 /// Does long work without the interpreter lock. A signal stops work of Python's main thread within moments, as Ctrl-C.
@@ -82,7 +82,7 @@ fn watched<T: Send, E: Display + Send>(
     }
 }
 
-/// What is told of work that has ended.
+/// Returns the result of work that has ended.
 fn finished<T, E: Display>(result: Ended<T, E>) -> PyResult<T> {
     result.map_err(|panic| unwound(&*panic))?.map_err(refused)
 }
@@ -95,7 +95,7 @@ pub fn unwound(panic: &(dyn Any + Send)) -> PyErr {
     }
 }
 
-/// What a panic said.
+/// Returns the words of a panic.
 fn message(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<&str>().copied();
     text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("panic")

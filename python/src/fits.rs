@@ -1,4 +1,4 @@
-//! What fits know beside their settings.
+//! Properties of fits beside their settings.
 
 use crate::refusal::refused;
 use kerrlight_tomo::fit::settings::Hole;

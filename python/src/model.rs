@@ -123,7 +123,7 @@ impl Model {
         self.planes() * self.model.pixels()
     }
 
-    /// What a node gives to an image per emission.
+    /// Returns the light that a node gives to an image per emission.
     fn light(&self, plane: usize, frame: usize, k: usize) -> f64 {
         let weight = self.weight(frame, k);
         self.factors.get(plane).map_or(weight, |factors| weight * factors[k])
@@ -289,7 +289,7 @@ impl Model {
         (self.model.pixels(), self.nodes(), self.model.frames())
     }
 
-    /// What each wanted Stokes parameter is multiplied by at each node, one after the other.
+    /// Returns the factor of each wanted Stokes parameter at each node, one after the other.
     fn factors<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         self.factors.concat().into_pyarray(py).into_any()
     }

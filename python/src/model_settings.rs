@@ -1,11 +1,11 @@
-//! What a forward model is made with.
+//! Settings of a forward model.
 
 use kerrlight_render::dynamics::{Axis, Velocity};
 use kerrlight_render::polarization::{PolarizationLaw, StokesParameter};
 use kerrlight_tomo::fit::{Motion, Region, Sampling, SightlineRequest};
 use pyo3::prelude::*;
 
-/// What a model is made with, beside hole, observer and screen.
+/// Settings of a forward model, beside hole, observer and screen.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Settings {

@@ -43,7 +43,7 @@ pub struct Visibilities {
 /// telescope.
 pub type Telescope = (String, Option<[f64; 3]>, [f64; 2], [f64; 3], [Complex64; 2]);
 
-/// What an observation has beside its rows.
+/// Metadata of an observation, beside its rows.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 struct Metadata {
@@ -189,7 +189,7 @@ impl Visibilities {
         Ok(PyBytes::new(py, &detached(py, work)?))
     }
 
-    /// What there is beside rows.
+    /// Returns the metadata, beside the rows.
     fn metadata<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (dict, of) = (PyDict::new(py), &self.observation);
         dict.set_item("source", &of.source)?;

@@ -37,7 +37,7 @@ fn array(name: &str, text: Option<&str>) -> PyResult<Vec<Telescope>> {
     Ok(array.stations.iter().map(crate::observation::telescope).collect())
 }
 
-/// What is observed when, where and how.
+/// Plan of an observation: times, array and source.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 struct Plan {
@@ -129,7 +129,7 @@ impl Plan {
     }
 }
 
-/// What an array sees of a movie of images of width × height pixels over a field (µas), of Stokes I, and of Q, U and V
+/// Observes a movie of images of width × height pixels over a field (µas) with an array: Stokes I, and Q, U and V
 /// where they are given.
 #[pyfunction]
 fn observe(

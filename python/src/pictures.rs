@@ -54,7 +54,7 @@ fn with_infinities(value: &mut toml::Value) {
     }
 }
 
-/// Whether two texts say the same, whatever their order and their comments.
+/// Returns whether two texts are the same TOML, whatever their order and their comments.
 #[pyfunction]
 fn same_toml(first: &str, second: &str) -> PyResult<bool> {
     let [first, second] = [first, second].map(|text| text.parse::<toml::Table>().map_err(refused));
@@ -135,7 +135,7 @@ impl Picture {
         Ok(dict)
     }
 
-    /// What its EXR file says of it.
+    /// Returns the attributes in the header of its EXR file.
     fn attributes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
         for (name, value) in &self.shown.attributes {

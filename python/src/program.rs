@@ -40,7 +40,7 @@ fn program(py: Python<'_>, arguments: Vec<OsString>, launcher: Vec<OsString>) ->
     })
 }
 
-/// What the thread that has called hears of, with whom to tell that it has heard.
+/// A message to the calling thread, with the sender that waits for its answer.
 enum Message {
     Words(String),
     Line(String),

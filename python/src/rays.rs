@@ -42,7 +42,7 @@ impl Place {
     }
 }
 
-/// What is wanted of rays.
+/// Quantities wanted of rays.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 struct Wanted {

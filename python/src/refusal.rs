@@ -1,4 +1,4 @@
-//! What is refused, as Python has it.
+//! Refusals, as Python's exceptions.
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

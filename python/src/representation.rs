@@ -9,7 +9,8 @@ use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use std::panic::resume_unwind;
 
-/// What a method of the class raised. The trait has no errors: it unwinds, and the program catches it.
+/// An exception that a method of the class raised. The trait has no errors: it unwinds, and the program catches
+/// it.
 #[derive(thiserror::Error, Debug)]
 #[error("the representation raised {}", said(.0))]
 pub struct Raised(pub PyErr);

@@ -20,7 +20,7 @@ pub struct Pool {
 static POOLS: [AtomicPtr<Pool>; 2] = [const { AtomicPtr::new(null_mut()) }; 2];
 
 thread_local! {
-    /// Whether this thread is the only one of a pool of its own; the pool lives as long as the process.
+    /// True if this thread is the only one of a pool of its own; the pool lives as long as the process.
     static IS_ALONE: bool = {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
         pool.map(std::mem::forget).is_ok()
@@ -32,7 +32,7 @@ pub fn stay_on_this_thread() {
     IS_ALONE.with(|_| ());
 }
 
-/// Whether this thread has been made the only one of a pool.
+/// Returns whether this thread has been made the only one of a pool.
 fn is_alone() -> bool {
     rayon::current_num_threads() == 1 && IS_ALONE.with(|is_alone| *is_alone)
 }

@@ -5,7 +5,7 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// What is expected of an experiment.
+/// Expected result of an experiment.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Expected {
@@ -54,11 +54,11 @@ pub struct Order {
 /// How one expectation fared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
-    /// What was expected of what, and by whom.
+    /// Quantity, case and source of the expectation.
     pub what: String,
-    /// What was found; nothing if no case of it has results.
+    /// Measured value; nothing if no case of it has results.
     pub found: Option<String>,
-    /// Whether it is as expected.
+    /// True if it is as expected.
     pub passed: bool,
 }
 

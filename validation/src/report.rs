@@ -1,4 +1,4 @@
-//! What an oracle says, and how it is written down.
+//! Reports of oracles.
 
 use std::fmt::Write;
 
@@ -7,11 +7,11 @@ use std::fmt::Write;
 pub struct Case {
     /// Who says so.
     pub authority: &'static str,
-    /// What is compared.
+    /// Quantity that is compared.
     pub name: String,
     /// The authority's value, or what the sample is.
     pub expected: String,
-    /// What was found.
+    /// Measured value.
     pub found: String,
     /// The error, in the measure that the name tells.
     pub error: f64,
@@ -58,7 +58,7 @@ impl Case {
         }
     }
 
-    /// Whether the error is allowed; NaN is not.
+    /// Returns whether the error is allowed; NaN is not.
     pub fn passed(&self) -> bool {
         self.error <= self.allowed
     }

@@ -1,5 +1,5 @@
-//! What the direct Fourier transform of a movie and its adjoint cost, for a fit to ngEHT data; the
-//! dot-product test first, so that nothing wrong is timed.
+//! Cost of the direct Fourier transform of a movie and of its adjoint, for a fit to ngEHT data; the
+//! dot-product test comes first, so that nothing wrong is timed.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use kerrlight_common::units::MICROARCSECOND;

@@ -1,4 +1,4 @@
-//! What every operator and every data term has to satisfy, in any precision: one call each.
+//! Tests that every operator and every data term has to pass, in any precision: one call each.
 
 use super::data_terms::DataTerm;
 use super::operator::{Float, Operator};

@@ -1,4 +1,4 @@
-//! What an array of radio telescopes sees of an image, and the files that arrays left.
+//! Radio interferometry: visibilities of images, and the files of arrays.
 //!
 //! Data flow: [`mod@array`] (stations) → [`earth`] (sidereal time, projected baselines) →
 //! [`schedule`] (when, and which baselines) → [`observation`] (visibilities with errors) ↔ [`files`]. [`simulate`]

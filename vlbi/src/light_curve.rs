@@ -16,21 +16,21 @@ pub struct Flux {
     pub sigma_jy: Option<f64>,
 }
 
-/// What was measured at one time.
+/// Measurement at one time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sample {
     /// Hours of UTC.
     pub time_h: f64,
     /// I, Q, U and V, those that were measured.
     pub stokes: [Option<Flux>; 4],
-    /// What measured it, such as a baseline; may be empty.
+    /// Name of the instrument, such as a baseline; may be empty.
     pub by: String,
 }
 
 /// Fluxes in the order of their times.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightCurve {
-    /// What was measured.
+    /// Measurements.
     pub samples: Vec<Sample>,
 }
 
@@ -40,7 +40,7 @@ const SITE_M: f64 = 10e3;
 const SITE_WAVELENGTHS: f64 = 8e6;
 
 impl LightCurve {
-    /// What the baselines within a site (ALMA–APEX, JCMT–SMA) have measured of a source that they do not resolve: the
+    /// Returns the light curve of the baselines within a site (ALMA–APEX, JCMT–SMA) for a source that they do not resolve: the
     /// real parts of I = (RR + LL)/2, Q = (RL + LR)/2, U = (RL − LR)/2i and V = (RR − LL)/2, row by row.
     pub fn of_sites(observation: &Observation) -> Self {
         let near = |row: &&Row| is_within_site(observation, row);
@@ -57,8 +57,8 @@ impl LightCurve {
         Self { samples }
     }
 
-    /// What part of the power of I on the baselines within a site is imaginary: next to nothing of an unresolved source in
-    /// the middle of the field, a half where phases are not calibrated. None if there is no such baseline.
+    /// Returns the imaginary part of the power of I on the baselines within a site, as a share of all: next to nothing for an
+    /// unresolved source in the middle of the field, a half where phases are not calibrated. None if there is no such baseline.
     pub fn imaginary_part(observation: &Observation) -> Option<f64> {
         let near = observation.stokes_i().filter(|(row, _)| is_within_site(observation, row));
         let (imaginary, all) = near.fold((0.0, 0.0), |(imaginary, all), (_, i)| {
@@ -155,7 +155,7 @@ impl LightCurve {
         self
     }
 
-    /// Whether all samples have a parameter.
+    /// Returns whether all samples have a parameter.
     pub fn has(&self, parameter: StokesParameter) -> bool {
         self.samples.iter().all(|sample| sample.stokes[parameter.index()].is_some())
     }

@@ -8,7 +8,7 @@ use crate::Error;
 use kerrlight_common::memory::{self};
 use kerrlight_common::units::SPEED_OF_LIGHT;
 
-/// What hours are hours of.
+/// Clock of the hours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Clock {
     /// Coordinated Universal Time.
@@ -23,7 +23,7 @@ pub enum Clock {
 pub struct Schedule {
     /// Modified Julian date whose 0 h UTC hours count from.
     pub mjd: i32,
-    /// What the hours are.
+    /// Clock of the hours.
     pub clock: Clock,
     /// First scan, in hours.
     pub start_h: f64,
@@ -33,7 +33,7 @@ pub struct Schedule {
     pub scans: u32,
 }
 
-/// What decides a simulated observation besides array, source and schedule.
+/// Setup of a simulated observation besides array, source and schedule.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setup {
     /// Observing frequency in Hz.

@@ -114,7 +114,7 @@ fn shares(observation: &Observation, frames: usize, times_h: &[f64]) -> Result<V
     Ok(shares)
 }
 
-/// What the rows see of images, image after image.
+/// Returns the visibilities of images at the rows, image after image.
 fn seen<'p>(
     observation: &Observation,
     shares: &[Shares],
@@ -130,7 +130,7 @@ fn seen<'p>(
     Ok((operator, visibilities))
 }
 
-/// What every row sees of a movie, and how it was transformed.
+/// Returns the visibilities of a movie at every row, and how it was transformed.
 fn all_seen(
     observation: &Observation,
     grid: ImageGrid,

@@ -144,7 +144,7 @@ mod tests {
     use super::super::write_array;
     use super::*;
 
-    /// What is written piece by piece is what is written at once.
+    /// Arrays written piece by piece have the bytes of arrays written at once.
     #[test]
     fn exact_arrays_in_pieces() {
         let values: Vec<f32> = (0..6000).map(|k| (k as f32).sin()).collect();

@@ -11,15 +11,15 @@ pub use array::{Headed, Stream, open, read_array, write_array};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NumpyError {
-    /// What is wrong with them.
+    /// The array is damaged or of another type; the text says how.
     #[error("{0}")]
     Content(String),
-    /// What is wrong with a member of an archive.
+    /// A member of an archive is damaged.
     #[error("{member}: {error}")]
     Member {
         /// The member.
         member: String,
-        /// What is wrong with it.
+        /// Cause of the failure.
         error: Box<dyn core::error::Error + Send + Sync>,
     },
 }

@@ -47,7 +47,7 @@ impl Float for f64 {
     }
 }
 
-/// What the elementary functions of [`math`](super::math) need to know of a number.
+/// Constants of a floating-point type that the elementary functions of [`math`](super::math) need.
 pub trait Coefficients: Sized + 'static {
     /// (sin √z/√z − 1)/z on 0 ≤ z ≤ (π/4)².
     const SIN: &'static [Self];

@@ -1,5 +1,5 @@
-//! What kernels on SIMD lanes share: the layer of the geodesic crate, its numbers, and elementary
-//! functions.
+//! Support for kernels on SIMD lanes: the lanes of the geodesic crate, their numbers, and
+//! elementary functions.
 
 mod float;
 pub mod math;

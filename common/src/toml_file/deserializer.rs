@@ -85,7 +85,7 @@ impl<'a> Value<'a> {
         Ok(Variant { name: name.get_ref(), value: Some(Value(value)), span: name.span() })
     }
 
-    /// What is said where another type is needed.
+    /// Returns the error for a value of another type.
     fn refused(self, expected: &dyn Expected) -> ReadError {
         let text;
         let found = match self.0.get_ref() {
@@ -254,7 +254,7 @@ impl<'de> Deserializer<'de> for Root<'_> {
     }
 }
 
-/// What is left of a table.
+/// Remaining entries of a table.
 struct Entries<'a> {
     rest: std::vec::IntoIter<Entry<'a>>,
     value: Option<Entry<'a>>,
@@ -297,7 +297,7 @@ fn name(text: &str) -> StrDeserializer<'_, ReadError> {
     text.into_deserializer()
 }
 
-/// What is left of an array.
+/// Remaining elements of an array.
 struct Elements<'a> {
     rest: std::iter::Enumerate<std::slice::Iter<'a, Spanned<DeValue<'a>>>>,
 }
@@ -329,7 +329,7 @@ struct Variant<'a> {
 }
 
 impl<'a> Variant<'a> {
-    /// What the kind holds.
+    /// Returns the value that the kind holds.
     fn held(&self) -> Result<Value<'a>, ReadError> {
         self.value.ok_or_else(|| {
             ReadError::custom(format_args!("`{}` needs values: a table of this key", self.name))

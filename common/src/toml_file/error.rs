@@ -1,4 +1,4 @@
-//! What is wrong with a TOML text.
+//! Errors in TOML texts.
 
 use serde::de;
 use std::fmt::Display;
@@ -53,7 +53,7 @@ impl ReadError {
         ReadError { message, keys: Vec::new(), span: None, line: None }
     }
 
-    /// What the parser says, which shows the line.
+    /// Wraps the parser's message, which shows the line.
     pub fn syntax(error: &dyn Display) -> Self {
         let text = error.to_string();
         let is_long = |line: &str| line.len() > LINE;

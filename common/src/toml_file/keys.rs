@@ -30,7 +30,7 @@ pub struct Keys(Value);
 pub struct Key {
     /// Its name in its table.
     pub name: String,
-    /// What it may be: `number`, `"edges"` or `"centers"`, …
+    /// Type of the value: `number`, `"edges"` or `"centers"`, …
     pub kind: String,
     /// Documentation of its field.
     pub meaning: String,
@@ -38,11 +38,11 @@ pub struct Key {
     pub choices: Vec<(String, String)>,
     /// Its range, if it is a number or numbers.
     pub range: Option<Range>,
-    /// What stands for it where it is left out, as TOML; `None` if nothing does.
+    /// Default value, as TOML; `None` if there is none.
     pub default: Option<String>,
     /// A value to begin with where nothing stands for it, as TOML.
     pub example: Option<String>,
-    /// Whether its table needs it.
+    /// True if its table needs it.
     pub is_required: bool,
 }
 
@@ -57,7 +57,7 @@ impl Key {
         format!("{meaning}{}{}", range.unwrap_or_default(), words.unwrap_or_default())
     }
 
-    /// Whether it stands as a table of its own.
+    /// Returns whether it stands as a table of its own.
     pub fn is_table(&self) -> bool {
         matches!(&*self.kind, "table" | "list of table")
     }
@@ -81,12 +81,12 @@ pub struct OutOfRange {
     pub key: String,
     /// The number.
     pub value: f64,
-    /// What is allowed.
+    /// Range of allowed values.
     pub range: Range,
 }
 
 impl OutOfRange {
-    /// What is allowed, in words.
+    /// Returns the allowed values, in words.
     pub fn allowed(&self) -> String {
         self.range.words()
     }
@@ -99,7 +99,7 @@ impl Range {
                 || (self.least.is_some() && self.most.is_none() && !number.is_nan()))
     }
 
-    /// Whether it says more than that a count is not negative.
+    /// Returns whether it says more than that a count is not negative.
     pub fn is_given(&self) -> bool {
         self.most.is_some() || self.least.is_some_and(|least| least != 0.0)
     }
@@ -205,7 +205,7 @@ impl Keys {
         own.or_else(of_type).unwrap_or_default()
     }
 
-    /// What a value at a dotted path may be; of a list, its elements.
+    /// Returns the types that a value at a dotted path may have; of a list, those of its elements.
     fn tables_at<'a>(&'a self, path: &str) -> Vec<Part<'a>> {
         let names = path.split('.').filter(|name| !name.is_empty());
         let parts = names.fold(self.root(), |parts, name| self.below(&parts, name));
@@ -237,7 +237,7 @@ impl Keys {
         parts
     }
 
-    /// What the value of a name in a table, or of a number in a list, may be.
+    /// Returns the types that the value of a name in a table, or of a number in a list, may have.
     fn below<'a>(&'a self, parts: &[Part<'a>], name: &str) -> Vec<Part<'a>> {
         let of = |part: &Part<'a>| -> Option<Vec<Part<'a>>> {
             let items = part.schema.get("items");
@@ -326,7 +326,7 @@ impl Keys {
         if all.len() > 1 { all } else { Vec::new() }
     }
 
-    /// What values are, in a word or two.
+    /// Names the type of values, in a word or two.
     fn kind(&self, parts: &[Part<'_>]) -> String {
         let mut kinds: Vec<String> = Vec::new();
         for part in parts {

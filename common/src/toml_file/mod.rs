@@ -60,7 +60,7 @@ pub fn write<T: Serialize>(value: &T) -> Result<String, ReadError> {
     document(value).map(|document| document.to_string())
 }
 
-/// What would be written for a value, as a table.
+/// Returns the table that would be written for a value.
 ///
 /// # Errors
 /// Those of [`write()`].
@@ -217,7 +217,7 @@ mod tests {
         assert!(read::<File>("title = \"\"\nseed = ").unwrap_err().to_string().contains("line 2"));
     }
 
-    /// What is long is cut, and what would end the line is escaped.
+    /// Long text is cut, and line ends are escaped.
     #[test]
     fn regress_errors_are_short_and_in_a_line() {
         let long = "x".repeat(300);

@@ -9,7 +9,7 @@ use serde::ser::{
 };
 use toml_edit::{Array, ArrayOfTables, Item, Table, Value};
 
-/// What a value is in TOML; nothing for `None`.
+/// A value in TOML; nothing for `None`.
 type Written = Result<Option<Item>, ReadError>;
 
 /// Where a value is written.

@@ -44,9 +44,9 @@ pub struct CriticalPoint {
     spin: f64,
 }
 
-/// What half an orbit (from one polar turning point to the other) on or next to a
-/// spherical photon orbit does: it multiplies the distance from the orbit by e^γ, turns
-/// by δ and takes the time τ.
+/// Change of a ray over half an orbit (from one polar turning point to the other) on or next to a
+/// spherical photon orbit: the distance from the orbit grows by e^γ, the azimuth by δ, and Mino
+/// time by τ.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HalfOrbit {
     /// Lyapunov exponent γ: successive images are demagnified by e^−γ.

@@ -1,5 +1,5 @@
-//! What is known of a hole's lensing in closed form, by elliptic functions and root finding
-//! alone: none of it shares an integration with the [`Tracer`](crate::Tracer).
+//! Lensing in closed form, by elliptic functions and root finding alone: none of it shares an
+//! integration with the [`Tracer`](crate::Tracer).
 //!
 //! - [`CriticalCurve`]: the edge of the shadow, with what half an orbit next to it does.
 //! - [`ClosedForm`]: radius at any Mino time, and the n-th equatorial crossing.

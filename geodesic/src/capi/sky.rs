@@ -1,4 +1,4 @@
-//! What a shader of the sky takes: cameras, directions of escape, frequency shifts, and the critical curve.
+//! Data for a shader of the sky: cameras, directions of escape, frequency shifts, and the critical curve.
 
 use super::{Failure, NULL_POINTER, Scene, guarded, integrator, many, one, placed_observer, put};
 use crate::analytic::CriticalCurve;

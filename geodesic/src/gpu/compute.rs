@@ -27,7 +27,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 #[derive(Debug)]
 pub struct Compute {
     device: Device,
-    /// What kernels took, while they are timed.
+    /// Times of kernels, while they are measured.
     times: Mutex<Option<Vec<KernelTime>>>,
     /// Memory through which buffers have been read, to be used again.
     readers: Mutex<Vec<wgpu::Buffer>>,
@@ -288,7 +288,7 @@ impl Compute {
         Ok(())
     }
 
-    /// What kernels took since [`start_timing`](Self::start_timing), in their order; they are timed no longer.
+    /// Returns the times of kernels since [`start_timing`](Self::start_timing), in their order, and stops measuring.
     pub fn times(&self) -> Vec<KernelTime> {
         self.times.lock().unwrap_or_else(PoisonError::into_inner).take().unwrap_or_default()
     }
@@ -301,7 +301,7 @@ impl Compute {
         self.read_as(buffers, <[u8]>::to_vec)
     }
 
-    /// What is made of the bytes of buffers once all commands are done.
+    /// Reads the bytes of buffers once all commands are done.
     ///
     /// # Errors
     /// If the device fails.

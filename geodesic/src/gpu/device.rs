@@ -54,7 +54,7 @@ impl Adapter {
         &self.info.name
     }
 
-    /// What it is: `discrete`, `integrated`, `virtual`, `software` or `other`.
+    /// Returns the kind of device: `discrete`, `integrated`, `virtual`, `software` or `other`.
     pub fn kind(&self) -> &'static str {
         match self.info.device_type {
             wgpu::DeviceType::DiscreteGpu => "discrete",
@@ -101,7 +101,7 @@ impl Adapter {
     }
 }
 
-/// What became of a buffer that was to be mapped.
+/// Outcome of mapping a buffer.
 pub(super) type Mapped = Result<(), wgpu::BufferAsyncError>;
 
 /// A device that is open.
@@ -112,11 +112,11 @@ pub(super) struct Device {
     pub name: String,
     /// Bytes of the largest buffer.
     pub largest: u64,
-    /// What it has reported by itself: it is of no use after that.
+    /// First error that the device reported by itself: it is of no use after that.
     trouble: Arc<Mutex<Option<GpuError>>>,
 }
 
-/// What shaders ask of a device; every device that runs the tracer has the default.
+/// Limits that shaders ask of a device; every device that runs the tracer has the default.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Needs {
     /// Invocations of a workgroup.
@@ -262,12 +262,12 @@ fn noted(trouble: &Arc<Mutex<Option<GpuError>>>) -> impl Fn(GpuError) + Send + S
 }
 
 thread_local! {
-    /// Whether a panic of this thread is one that is expected.
+    /// True while a panic of this thread is expected.
     static EXPECTED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What wgpu does where a driver reports, while one waits for it, that a card is lost is panic: here it is an error, of
-/// which nothing is printed. Its words.
+/// Runs work in which wgpu panics if a driver reports a lost card, and returns the words of the panic as an error,
+/// unprinted.
 fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

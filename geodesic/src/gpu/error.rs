@@ -1,4 +1,4 @@
-//! What can go wrong with a graphics card.
+//! Errors of graphics devices.
 
 use core::fmt;
 
@@ -10,7 +10,7 @@ pub enum GpuError {
     NoAdapter,
     /// No adapter has this number or a name with these letters.
     NoSuchAdapter {
-        /// What was asked for.
+        /// Device that was asked for.
         wanted: String,
         /// The names of those that there are.
         present: Vec<String>,
@@ -30,7 +30,7 @@ pub enum GpuError {
     Failed(String),
 }
 
-/// What to do where there is none.
+/// Advice for machines without a device.
 const HOW: &str = "install the driver of your card, or Mesa's software device (Debian and Ubuntu: \
                    apt install mesa-vulkan-drivers; Fedora: dnf install mesa-vulkan-drivers)";
 

@@ -7,14 +7,14 @@ use crate::spacetime::kerr::Kerr;
 use crate::wgsl::Task;
 use std::borrow::Cow;
 
-/// What a binding is.
+/// A buffer bound to a kernel.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Binding<'a> {
     /// The uniform.
     Uniform(&'a [u8]),
-    /// What the shader reads.
+    /// Bytes that the shader reads.
     Input(&'a [u8]),
-    /// What it writes and reads: so many bytes, zero at first.
+    /// Bytes that it writes and reads: so many, zero at first.
     Output(u64),
 }
 
@@ -25,7 +25,7 @@ pub(super) struct Program {
     entries: Vec<wgpu::ComputePipeline>,
 }
 
-/// What is checked in shaders whose loops end by themselves.
+/// Returns the run-time checks of shaders whose loops end by themselves.
 fn loops_that_end() -> wgpu::ShaderRuntimeChecks {
     wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..wgpu::ShaderRuntimeChecks::checked() }
 }
@@ -232,7 +232,7 @@ pub(super) fn copy(
     mapped(came, buffer, <[u8]>::to_vec)
 }
 
-/// What is made of the bytes of a buffer, once it is mapped.
+/// Reads the bytes of a buffer, once it is mapped.
 pub(super) fn mapped<T>(
     came: &std::sync::mpsc::Receiver<Mapped>,
     buffer: &wgpu::Buffer,

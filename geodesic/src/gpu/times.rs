@@ -5,7 +5,7 @@ use super::error::GpuError;
 use super::kernel::{copy, readable};
 use std::sync::Arc;
 
-/// What a kernel took.
+/// Time that a kernel took.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KernelTime {
     /// Its entry point.
@@ -79,7 +79,7 @@ impl Stopwatch {
         }
     }
 
-    /// What the kernels took, once they are done.
+    /// Returns the times of the kernels, once they are done.
     pub fn read(self, device: &Device) -> Result<Vec<KernelTime>, GpuError> {
         let to = device.attempt(self.resolved.size(), || {
             let to = readable(device, self.resolved.size());

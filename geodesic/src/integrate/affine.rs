@@ -56,7 +56,7 @@ fn quintic(h: f64, start: [f64; 3], end: [f64; 3]) -> [f64; 6] {
     out
 }
 
-/// What the solver is told: the equations and when to stop.
+/// Equations of motion, and when to stop, for the solver.
 struct Motion {
     hole: Kerr,
     outer: f64,
@@ -196,7 +196,7 @@ impl AffinePath {
         self.end = hi;
     }
 
-    /// What became of the ray; `Escaped` means back at the observer's radius.
+    /// Returns the outcome of the ray; `Escaped` means back at the observer's radius.
     pub fn outcome(&self) -> Outcome {
         self.outcome
     }

@@ -22,7 +22,8 @@ pub struct TaylorStep {
     pub length: f64,
     /// +1 on a step that starts inwards, −1 on one that starts outwards.
     pub leg: f64,
-    /// What the first coefficient of b/r lacks: rays next to a photon orbit are followed in their distance from it.
+    /// Centre of the expansion, missing from the first coefficient of b/r: rays next to a photon orbit are followed in
+    /// their distance from it.
     pub centre: f64,
     /// Taylor coefficients, lowest power first, of b/r; cos θ, sin θ cos φ and sin θ sin φ without frame dragging and
     /// without the observer's azimuth; and the integrals of the regular parts of dφ/d(bτ) and of d(delay/b)/d(bτ), as
@@ -93,7 +94,8 @@ impl Path {
         [2, 3].map(|row| self.polynomial(k, row).0).map(|series| [series[0], series[1]])
     }
 
-    /// Whether the ray is above the equatorial plane, or is about to be, at the start of step `k` or the end of the last.
+    /// Returns whether the ray is above the equatorial plane, or is about to be, at the start of step `k` or the end of
+    /// the last.
     fn is_above(&self, k: usize) -> bool {
         let last = k == self.segments.len();
         let (u, rate) = self.polynomial(k - usize::from(last), 1).both(f64::from(last));

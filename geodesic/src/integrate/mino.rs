@@ -54,12 +54,12 @@ pub(crate) mod index {
     pub const AZIMUTH: usize = 8;
 }
 
-/// Whether a state of `N` variables holds the azimuth.
+/// Returns whether a state of `N` variables holds the azimuth.
 pub(crate) const fn has_azimuth(n: usize) -> bool {
     n >= 9
 }
 
-/// Whether a state of `N` variables holds the time; it is then the last one (I_t/b).
+/// Returns whether a state of `N` variables holds the time; it is then the last one (I_t/b).
 pub(crate) const fn has_time(n: usize) -> bool {
     n == 5 || n == 10
 }

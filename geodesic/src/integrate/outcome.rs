@@ -1,6 +1,6 @@
-//! What becomes of a ray.
+//! Outcomes of rays.
 
-/// What became of a ray followed backward from the observer.
+/// Outcome of a ray followed backward from the observer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// It reaches the outer horizon.
@@ -33,7 +33,7 @@ impl Default for Outcome {
 }
 
 impl Outcome {
-    /// Whether the ray was given up.
+    /// Returns whether the ray was given up.
     pub fn is_unresolved(self) -> bool {
         matches!(self, Outcome::Unresolved(_))
     }

@@ -24,7 +24,7 @@ pub(crate) struct Segment<T> {
     pub constants: [T; 2],
     /// Unwrapped atan2(y, x) where it starts.
     pub turned: T,
-    /// What the errors of all steps up to its end amount to.
+    /// Sum of the errors of all steps up to its end.
     pub budget: Budget,
 }
 
@@ -50,7 +50,7 @@ pub struct Path<T = f64> {
     pub(crate) has_azimuth: bool,
     pub(crate) has_time: bool,
     pub(crate) lambda: f64,
-    /// What the errors at the start amount to.
+    /// Error budget at the start.
     pub(crate) start: Budget,
 }
 
@@ -110,7 +110,7 @@ impl<T: Elementary> Path<T> {
         self.rows = rows(N);
     }
 
-    /// What became of the ray.
+    /// Returns the outcome of the ray.
     pub fn outcome(&self) -> Outcome {
         self.outcome
     }

@@ -87,7 +87,7 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         self.path.outcome = Outcome::Unresolved(Unresolved::StepLimit);
     }
 
-    /// What becomes of a ray that no longer moves in radius within rounding.
+    /// Returns the outcome of a ray that no longer moves in radius within rounding.
     fn stalled(&self, h: f64) -> Option<Outcome> {
         let (w, rate) = (self.state.y[index::W].value(), self.state.y[index::DW].value());
         let [a, b, c] = self.state.system.radial().map(T::value);
@@ -270,7 +270,7 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         None
     }
 
-    /// Whether the potential lets the ray reach the horizon.
+    /// Returns whether the potential lets the ray reach the horizon.
     fn may_fall(&self) -> bool {
         let potential = &self.state.ray.potential;
         let outside = |w: f64| self.state.ray.inverse_radius < w;
@@ -315,8 +315,8 @@ fn start_error<T: Elementary>(ray: &Ray<T>) -> f64 {
     ROUNDINGS * T::EPSILON * w * w * (quad + w * (cubic + w * quartic))
 }
 
-/// What an error of W at the start, one of dw/dτ = √W, amounts to: the ray is early or late, by the
-/// more the closer it starts to its turning point.
+/// Returns the effect of an error of W at the start, one of dw/dτ = √W: the ray is early or late, by the more the
+/// closer it starts to its turning point.
 fn start_budget<T: Elementary, const N: usize>(
     y: &[T; N],
     system: &System<T>,

@@ -95,7 +95,7 @@ const DORMAND_PRINCE_8: Tableau<13> = Tableau {
     second_error: Some([-0.189_800_754_072_407_62, 0.0, 0.0, 0.0, 0.0, 4.450_312_892_752_409, 1.891_517_899_314_500_3, -5.801_203_960_010_585, -0.422_682_321_323_791_97, -0.152_160_949_662_516_1, 0.201_365_400_804_030_34, 0.022_651_792_198_360_825, 0.0]),
 };
 
-/// What a step arrives at.
+/// Result of a trial step.
 pub(crate) struct Trial<const N: usize> {
     /// State at the end.
     pub y: [f64; N],

@@ -235,7 +235,7 @@ mod tests {
         assert_eq!(intervals.len(), 1);
     }
 
-    /// What is requested beside it does not change r and θ.
+    /// Requests for other quantities do not change r and θ.
     #[test]
     fn exact_same_positions_whatever_is_wanted() {
         let hole = Kerr::new(0.94).unwrap();

@@ -1,4 +1,4 @@
-//! What the errors of a path amount to.
+//! Error estimates of a path.
 //!
 //! The radial motion obeys dw/dτ = ±√W, and every step is put back on it, so that an error of
 //! w is an error of phase: the ray is where it should have been a little earlier or later.
@@ -105,7 +105,7 @@ impl Budget {
         }
     }
 
-    /// What it means at a point of the path.
+    /// Returns the errors at a point of the path.
     pub fn at<T: Elementary>(
         &self,
         hole: &Kerr<T>,
@@ -147,7 +147,8 @@ impl Budget {
         self.phase + ROUNDINGS * self.rounding.sqrt()
     }
 
-    /// What it means where the path has a given radius: it is there earlier or later, elsewhere on the sphere.
+    /// Returns the errors where the path has a given radius: it is there earlier or later, elsewhere on the
+    /// sphere.
     pub fn at_inverse_radius<T: Elementary>(
         &self,
         hole: &Kerr<T>,
@@ -160,8 +161,8 @@ impl Budget {
         Budget { direction, ..*self }.at(hole, lambda, scale, point)
     }
 
-    /// What it means where the path crosses the equatorial plane: there θ is known, but an error
-    /// of cos θ makes the ray cross earlier or later, at another radius, azimuth and time.
+    /// Returns the errors where the path crosses the equatorial plane: there θ is known, but an error of cos θ
+    /// makes the ray cross earlier or later, at another radius, azimuth and time.
     pub fn at_crossing<T: Elementary>(
         &self,
         hole: &Kerr<T>,

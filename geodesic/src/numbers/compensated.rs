@@ -12,7 +12,7 @@ use crate::numbers::scalar::{Elementary, Scalar};
 pub struct Double {
     /// The nearest double.
     pub hi: f64,
-    /// What it leaves out.
+    /// Low part: the rounding error of the high part.
     pub lo: f64,
 }
 

@@ -22,7 +22,7 @@ pub trait Scalar:
 /// A real number with the elementary functions that positions in Boyer–Lindquist coordinates
 /// need: [`f64`], [`Double`](crate::Double) and [`Dual`](crate::Dual) numbers of either.
 pub trait Elementary: Scalar + PartialEq + core::fmt::Debug + Send + Sync {
-    /// Whether it is nothing but a double.
+    /// True if it is nothing but a double.
     const IS_PLAIN: bool = false;
 
     /// The rounding of its arithmetic: the distance from 1 to the next number.

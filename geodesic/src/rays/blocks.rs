@@ -34,7 +34,7 @@ pub(crate) fn in_blocks<T: Send>(
     }
 }
 
-/// Whether there is a β for every α.
+/// Checks that there is a β for every α.
 pub(crate) fn check_columns(alpha: &[f64], beta: &[f64]) -> Result<(), Error> {
     let same = alpha.len() == beta.len();
     check("number of beta", beta.len() as f64, same, "as many as of alpha")?;

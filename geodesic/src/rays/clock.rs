@@ -1,4 +1,4 @@
-//! What is known of the errors of rays in closed form.
+//! Error estimates of rays in closed form.
 
 use crate::integrate::uncertainty::Uncertainty;
 use crate::screen::observer::Ray;
@@ -18,7 +18,7 @@ pub(crate) fn widen(worst: &mut Uncertainty, error: f64, azimuth: f64, delay: f6
 /// repository).
 const QUADRATURE: f64 = 2e-10;
 
-/// What the error of a ray's delay depends on.
+/// Quantities that decide the error of a ray's delay.
 pub(crate) struct Clock {
     spin: f64,
     lambda: f64,

@@ -49,7 +49,7 @@ impl Points {
         self.radius.len()
     }
 
-    /// Whether there is no point at all.
+    /// Returns whether there is no point at all.
     pub fn is_empty(&self) -> bool {
         self.radius.is_empty()
     }
@@ -143,7 +143,7 @@ impl Points {
 /// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RayTable {
-    /// What became of each ray.
+    /// Outcome of each ray.
     pub outcome: Vec<Outcome>,
     /// Mino time of each whole ray in M⁻¹: to the horizon, to infinity, or back to a finite
     /// observer's radius; of cameras' rays to infinity. NaN where unresolved.
@@ -170,7 +170,7 @@ impl RayTable {
         self.outcome.len()
     }
 
-    /// Whether there is no ray.
+    /// Returns whether there is no ray.
     pub fn is_empty(&self) -> bool {
         self.outcome.is_empty()
     }

@@ -16,7 +16,7 @@ use crate::screen::observer::{Observer, Ray};
 use crate::simd::RaySamples;
 use crate::spacetime::kerr::Kerr;
 
-/// What blocks of rays are traced for, if the closed form has all that is requested: it has no
+/// Returns the request of blocks of rays, if the closed form has all that is requested: it has no
 /// momenta, and no samples placed otherwise than by Mino time.
 pub(crate) fn in_closed_form(request: &Request) -> Option<BlockRequest> {
     let samples = match request.samples {

@@ -1,5 +1,6 @@
-//! What a small patch of the screen covers of the sky and of the equatorial plane: the beam of a
-//! pixel, for a renderer that filters its textures or wants magnifications.
+//! Footprints: the patch of the sky and of the equatorial plane that a small patch of the screen
+//! covers, such as the beam of a pixel, for a renderer that filters its textures or wants
+//! magnifications.
 //!
 //! The Jacobians are exact: dual numbers with the two screen coordinates as parameters follow the
 //! same equations as the rays themselves.
@@ -159,7 +160,7 @@ impl Disc {
 /// The beams of many rays.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Beams {
-    /// What became of each ray.
+    /// Outcome of each ray.
     pub outcome: Vec<Outcome>,
     /// Where each ray ends on the sky, if it does.
     pub sky: Vec<Option<Sky>>,

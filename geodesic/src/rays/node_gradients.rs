@@ -41,7 +41,7 @@ use crate::spacetime::point::PathPoint;
 
 type Number = Dual<f64, 4>;
 
-/// What is known at a node: numbers, or their derivatives.
+/// State at a node: numbers, or their derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NodeState<N> {
     /// The point r n (x, y and z, M).
@@ -137,7 +137,7 @@ pub fn trace(
     Ok(whole)
 }
 
-/// What the rays of a block share.
+/// Quantities common to the rays of a block.
 struct DualRays<'a> {
     hole: Kerr<Number>,
     observer: Observer<Number>,

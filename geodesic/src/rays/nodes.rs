@@ -65,7 +65,7 @@ impl NodeColumns {
         self.radius.len()
     }
 
-    /// Whether there is no node.
+    /// Returns whether there is no node.
     pub fn is_empty(&self) -> bool {
         self.radius.is_empty()
     }
@@ -178,7 +178,7 @@ impl NodeColumns {
 pub struct Leg {
     /// Where it starts and ends, in Mino time (M⁻¹) or another parameter of the ray.
     pub ends: [f64; 2],
-    /// Whether it ends at the horizon: its last panel is followed at a pace that falls to zero.
+    /// True if it ends at the horizon: its last panel is followed at a pace that falls to zero.
     pub falls: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What is computed along rays. Quantities that are not requested are not integrated.
+//! Requests for quantities along rays. Quantities that are not requested are not integrated.
 
 use crate::error::{Error, check};
 use crate::spacetime::quantities::Quantities;
@@ -34,7 +34,7 @@ pub enum Placement {
     },
 }
 
-/// What is wanted of every ray. r, θ and Mino time come with every point.
+/// Quantities wanted of every ray. r, θ and Mino time come with every point.
 ///
 /// ```
 /// use kerrlight_geodesic::{Placement, Request};

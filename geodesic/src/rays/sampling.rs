@@ -27,7 +27,7 @@ pub(crate) trait Trajectory<T> {
     fn within(&self, lo: f64, hi: f64, pieces: &mut Vec<[T; 2]>);
 }
 
-/// What is known about a ray as a whole.
+/// Properties of a ray as a whole.
 pub(crate) struct Summary<T> {
     pub outcome: Outcome,
     /// `None` where unresolved.
@@ -62,7 +62,7 @@ pub(crate) struct Sampler<'a, T, S> {
     at_infinity: [bool; 2],
     rule: &'a [(f64, f64)],
     pub sink: S,
-    /// Whether the direction in which rays escape is wanted.
+    /// True if the direction in which rays escape is wanted.
     pub exit: bool,
     times: Vec<T>,
     pieces: Vec<[T; 2]>,
@@ -78,7 +78,7 @@ pub(crate) fn rule(request: &Request) -> Vec<(f64, f64)> {
     }
 }
 
-/// Whether a ray has reached the horizon, where azimuth and delay have no limit, and no error.
+/// Returns whether a ray has reached the horizon, where azimuth and delay have no limit, and no error.
 fn at_horizon<T: Elementary>(ray: &impl Trajectory<T>, mino_time: T) -> bool {
     ray.outcome() == Outcome::Captured && mino_time.value() >= ray.total().value()
 }

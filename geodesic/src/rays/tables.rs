@@ -19,7 +19,7 @@ use crate::screen::view::View;
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::quantities::Quantities;
 
-/// What all rays have in common.
+/// Input that all rays have in common.
 #[derive(Clone, Copy)]
 struct Job<'a> {
     hole: &'a Kerr,
@@ -27,7 +27,7 @@ struct Job<'a> {
     tolerance: f64,
     request: &'a Request,
     rule: &'a [(f64, f64)],
-    /// Whether directions of escape are wanted.
+    /// True if directions of escape are wanted.
     exit: bool,
 }
 
@@ -120,7 +120,7 @@ impl Integrator {
         Ok(RayTable::joined(pieces, request))
     }
 
-    /// What traces rays in closed form and what for, if that is how they are traced.
+    /// Returns the tracer and the request of rays in closed form, if that is how they are traced.
     fn closed_form(self, job: Job<'_>) -> Result<Option<(BlockTracer, BlockRequest)>, Error> {
         if self != Integrator::Elliptic {
             return Ok(None);

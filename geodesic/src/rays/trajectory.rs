@@ -16,7 +16,7 @@ pub(crate) struct MinoPath<'a, T> {
     path: &'a Path<T>,
     pub ray: &'a Ray<T>,
     total: T,
-    /// Whether it ends where it is back at the observer's radius.
+    /// True if it ends where it is back at the observer's radius.
     returns: bool,
     /// w = 1/r at the end, where the Mino time does not tell.
     end: Option<T>,

@@ -183,7 +183,7 @@ impl<T: Elementary> Observer<T> {
         self.azimuth
     }
 
-    /// Whether the observer is infinitely far away.
+    /// Returns whether the observer is infinitely far away.
     pub fn is_at_infinity(&self) -> bool {
         self.inverse_radius == 0.0
     }
@@ -274,9 +274,9 @@ pub struct Ray<T = f64> {
     pub azimuth: f64,
     /// 1/r of the starting point, M⁻¹.
     pub inverse_radius: f64,
-    /// Whether the backward ray starts towards the hole.
+    /// True if the backward ray starts towards the hole.
     pub inward: bool,
-    /// Whether the photon has no positive energy at infinity, which there is inside the ergosphere alone: it comes from
+    /// True if the photon has no positive energy at infinity, which there is inside the ergosphere alone: it comes from
     /// the horizon. Its path is [captured](crate::Outcome::Captured) where it starts, and not followed through the
     /// ergosphere; the constants above are those for unit energy in the frame of zero angular momentum.
     pub is_from_horizon: bool,

@@ -31,11 +31,11 @@ pub(super) struct Target<'a> {
     pub rays: Whole<'a>,
 }
 
-/// What is known about each ray as a whole.
+/// Results of each ray as a whole.
 pub(super) struct Whole<'a> {
     /// Mino time of the ray.
     pub duration: &'a mut [f64],
-    /// Whether it returns to the observer's radius (1) or is captured (0).
+    /// True if it returns to the observer's radius (1) or is captured (0).
     pub escapes: &'a mut [f64],
     /// How many times it crosses the plane.
     pub count: &'a mut [f64],
@@ -137,7 +137,7 @@ fn arrange<V: Lanes<f64>>(
     order
 }
 
-/// What rays in a block have in `source`, the last one repeated.
+/// Gathers the values of the rays of a block from `source`, the last one repeated.
 #[inline(always)]
 fn gather<V: Lanes<f64>>(source: &[f64], block: &[Item]) -> V {
     let mut lanes = [0.0; MAX_LANES];

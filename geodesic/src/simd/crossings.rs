@@ -27,12 +27,12 @@ pub struct Crossings {
     rays: [Column; 4],
 }
 
-/// What is known about a ray as a whole.
+/// Properties of a ray as a whole.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayEnds {
     /// Mino time of the whole ray, M⁻¹.
     pub mino_total: f64,
-    /// Whether it returns to the observer's radius, be that infinite; else it is captured.
+    /// True if it returns to the observer's radius, be that infinite; else it is captured.
     pub escapes: bool,
     /// How many times it crosses the plane, requested or not.
     pub crossings: u32,

@@ -1,4 +1,4 @@
-//! What rounding and quadrature leave of a ray's digits.
+//! Rounding and quadrature errors of rays.
 //!
 //! A ray's Mino time and radial phase are known to `δτ = ε (c₁ κ + c₂)/b`, where κ is the
 //! reciprocal distance from the critical curve ([`condition`](super::motion::Journey::condition))

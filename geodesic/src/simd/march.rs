@@ -21,7 +21,7 @@ pub(super) const COLUMNS: usize = 8;
 /// Legs and panels of rays that are marched together.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Key {
-    /// Whether the last leg is the panel before the horizon.
+    /// True if the last leg is the panel before the horizon.
     pub falls: bool,
     /// Panels of the approach to the sphere.
     pub approach: u32,
@@ -93,7 +93,7 @@ impl<V: Lanes<f64>> Jump<V> {
 struct Panels<V> {
     /// Mino time of each.
     length: V,
-    /// Whether the pace falls to zero at the end.
+    /// True if the pace falls to zero at the end.
     falls: bool,
 }
 
@@ -140,7 +140,7 @@ pub(super) struct March<'a, V> {
 /// Where each lane's next node goes, and the columns.
 type Target<'a, 'b> = (&'a mut [usize; MAX_LANES], &'a mut [&'b mut [f64]; COLUMNS]);
 
-/// What is known at the nodes of a panel.
+/// Values at the nodes of a panel.
 struct Known<V> {
     rates: [[V; 2]; MAX_ORDER],
     angles: [V; MAX_ORDER],
@@ -148,7 +148,7 @@ struct Known<V> {
 }
 
 impl<V: Lanes<f64>> March<'_, V> {
-    /// Whether more than the polar angle is needed of the direction.
+    /// Returns whether more than the polar angle is needed of the direction.
     #[inline(always)]
     fn turns(&self) -> bool {
         self.wanted.azimuth || self.wanted.time

@@ -135,7 +135,7 @@ impl<'a> ScreenRays<'a> {
         ScreenRays { camera: self.camera, azimuth: self.azimuth, alpha, beta }
     }
 
-    /// Whether the observer is at infinity.
+    /// Returns whether the observer is at infinity.
     pub fn is_at_infinity(&self) -> bool {
         self.camera.w_obs == 0.0
     }

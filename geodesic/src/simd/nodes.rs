@@ -23,7 +23,7 @@ pub struct NodeRequest {
     /// Into how many panels each of the coarsest division is cut. Those are at most
     /// 0.4/√max(1, η + λ²) of Mino time: a tenth of a half-turn about the hole or so.
     pub split: u32,
-    /// What is computed at them.
+    /// Quantities computed at the nodes.
     pub quantities: Quantities,
 }
 
@@ -174,7 +174,7 @@ impl Nodes {
     }
 }
 
-/// What is asked.
+/// Rays to be traced.
 struct Rays<'a> {
     camera: Camera,
     alpha: &'a [f64],

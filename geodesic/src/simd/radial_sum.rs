@@ -91,8 +91,8 @@ impl<V: Lanes<f64>> RadialSum<V> {
     }
 }
 
-/// What time and azimuth gain over the Mino time `rest`, in `steps`, from `from`, where the closed forms are `closed`,
-/// to the turning point; and w there.
+/// Returns the gain of time and azimuth over the Mino time `rest`, in `steps`, from `from`, where the closed forms are
+/// `closed`, to the turning point; and w there.
 #[inline(always)]
 pub fn to_turning_point<V: Lanes<f64>>(
     (camera, motion): (&Camera, &Motion<V>),

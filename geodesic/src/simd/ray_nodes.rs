@@ -1,4 +1,4 @@
-//! What is known at the nodes of one ray.
+//! Values at the nodes of one ray.
 
 /// The nodes of one ray.
 #[derive(Clone, Copy, Debug)]

@@ -16,7 +16,7 @@ pub(super) struct Target<'a> {
     pub azimuth: &'a mut [f64],
     /// Mino time of each whole ray.
     pub duration: &'a mut [f64],
-    /// Whether each ray returns to the observer's radius (1) or is captured (0).
+    /// True if each ray returns to the observer's radius (1) or is captured (0).
     pub escapes: &'a mut [f64],
     /// First the condition of each ray, then an estimate of the error of its positions.
     pub error: &'a mut [f64],
@@ -279,7 +279,7 @@ struct Turn<V> {
     theta: V,
     /// The angle in φ, or its tangent.
     phi: V,
-    /// Whether they are sine and tangent, all of them small.
+    /// True if they are sine and tangent, all of them small.
     small: bool,
 }
 
@@ -366,7 +366,7 @@ struct Parts<'a, V> {
     radial: &'a [Radial<V>],
     /// Sums of the parts at mirrored samples.
     mirror: (V, V),
-    /// Whether there is an outward leg.
+    /// True if there is an outward leg.
     outward: bool,
 }
 

@@ -36,8 +36,8 @@ pub struct RaySamples<'a> {
     pub azimuth: &'a [f64],
     /// Mino time of the whole ray, M⁻¹.
     pub mino_total: f64,
-    /// Whether the ray returns to the observer's radius, be that infinite; else it is captured,
-    /// and its last sample lies a relative 1e-8 outside the horizon.
+    /// True if the ray returns to the observer's radius, be that infinite; else it is captured, and its last sample lies a
+    /// relative 1e-8 outside the horizon.
     pub escapes: bool,
     /// An estimate, rarely exceeded, of the largest error of the positions by rounding and
     /// quadrature: relative in the radius, absolute in θ and azimuth, at equal Mino time. It is

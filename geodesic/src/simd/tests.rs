@@ -122,9 +122,9 @@ fn exact_same_samples_at_every_width() {
     }
 }
 
-/// What [`Crossings`] and the tracer at its tightest make of the same rays: the largest misses of
-/// Mino time and radius (relative), azimuth (whole turns count) and delay (relative to
-/// max(1, ·)), and of the radius in closed form.
+/// Compares [`Crossings`] and the tracer at its tightest on the same rays: the largest differences
+/// of Mino time and radius (relative), azimuth (whole turns count) and delay (relative to max(1,
+/// ·)), and of the radius in closed form.
 fn compare_crossings(hole: &Kerr, observer: &Observer, rays: (&[f64], &[f64])) -> [f64; 5] {
     const COUNT: usize = 4;
     let mut crossings = Crossings::default();

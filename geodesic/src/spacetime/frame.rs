@@ -171,7 +171,7 @@ pub struct ScreenPoint {
     nu: f64,
     /// β² + ν²: Carter's constant 𝒦 = Q + (L − aE)² over E².
     carter: f64,
-    /// Whether the ray is a principal null one, on which κ vanishes.
+    /// True if the ray is a principal null one, on which κ vanishes.
     principal: bool,
 }
 

@@ -1,6 +1,7 @@
 //! Which quantities are computed at the points of a ray.
 
-/// What is computed at the points of a ray besides r, θ and Mino time. What is off costs nothing.
+/// Quantities computed at the points of a ray besides r, θ and Mino time. Those that are off cost
+/// nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Quantities {
     /// Azimuth.
@@ -17,7 +18,7 @@ impl Quantities {
     /// Everything.
     pub const ALL: Quantities = Quantities { azimuth: true, time: true, velocity: true };
 
-    /// What one or the other wants.
+    /// Returns the union of two requests.
     pub fn or(self, other: Self) -> Self {
         Quantities {
             azimuth: self.azimuth || other.azimuth,

@@ -93,7 +93,7 @@ impl<T: Elementary> RadialPotential<T> {
         w * (two * a + w * (three * b + w * four * c))
     }
 
-    /// Whether a ray from far away falls into the hole: W has no root outside the horizon.
+    /// Returns whether a ray from far away falls into the hole: W has no root outside the horizon.
     pub fn captures(&self) -> bool {
         self.barrier.is_none_or(|barrier| barrier.height.value() >= 0.0)
     }

@@ -168,7 +168,7 @@ pub fn two_floats(x: f64) -> [f32; 2] {
     [high, (x - f64::from(high)) as f32]
 }
 
-/// What is traced, as the uniform of the kernels holds it.
+/// Task of the kernels, as their uniform holds it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Task {
     /// The hole.
@@ -183,7 +183,7 @@ pub struct Task {
     pub samples: u32,
     /// Invocations in a row of the grid: a multiple of 64.
     pub row: u32,
-    /// Whether azimuths, delays and directions of escape are wanted.
+    /// True if azimuths, delays and directions of escape are wanted.
     pub quadratures: bool,
     /// 1/r in M⁻¹ at which rays that escape end: 0 for infinity.
     pub end: f64,
@@ -242,7 +242,7 @@ impl Task {
         }
     }
 
-    /// What is added to a delay of the shader, in M: the tortoise coordinate of the observer, 0 at infinity.
+    /// Offset of a delay of the shader, in M: the tortoise coordinate of the observer, 0 at infinity.
     pub fn delay_start(&self) -> f64 {
         let w = self.inverse_radius();
         if w > 0.0 { self.hole.tortoise(w) } else { 0.0 }

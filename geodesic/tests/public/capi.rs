@@ -260,7 +260,7 @@ fn library() -> PathBuf {
     target.join("debug/libkerrlight_geodesic.a")
 }
 
-/// What examples/c/shadow.c prints, from Rust.
+/// Returns the output of examples/c/shadow.c, from Rust.
 fn expected_picture() -> (String, Vec<[f64; 3]>) {
     let hole = Kerr::new(0.998).unwrap();
     let observer = |degrees| Observer::at_infinity(Inclination::from_degrees(degrees).unwrap());
@@ -311,7 +311,8 @@ fn exact_c_example_prints_what_rust_finds() {
     }
 }
 
-/// What examples/c/sky.c prints: the picture, the shift ahead, the width of the shadow, and the redshift of an orbit.
+/// Returns the output of examples/c/sky.c: the picture, the shift ahead, the width of the shadow, and the redshift of
+/// an orbit.
 fn expected_sky() -> (String, [f64; 3]) {
     let hole = Kerr::new(0.9).unwrap();
     let place = Inclination::from_degrees(85.0).unwrap();

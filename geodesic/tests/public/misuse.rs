@@ -1,4 +1,4 @@
-//! What was not traced, or not for this hole, is no number; and errors name what is wrong.
+//! Rays that were not traced, or not for this hole, are not numbers, and errors name what is wrong.
 
 use kerrlight_geodesic::analytic::ClosedForm;
 use kerrlight_geodesic::{

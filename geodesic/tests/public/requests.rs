@@ -1,5 +1,5 @@
-//! What a request brings: weights that integrate, equidistant samples, momenta that are null, and
-//! nothing that was not requested.
+//! Requests bring weights that integrate, equidistant samples, momenta that are null, and nothing
+//! that was not requested.
 
 use kerrlight_geodesic::{
     Error, Inclination, Integrator, Kerr, Observer, Outcome, Placement, Points, RayTable, Request,
@@ -361,8 +361,8 @@ fn code_all_integrators_agree() {
     }
 }
 
-/// What the closed form does not serve is traced as with the default integrator, to the bit; and a
-/// ray next to the critical curve has its digits.
+/// Requests that the closed form does not serve are traced as with the default integrator, to the
+/// bit; and a ray next to the critical curve has its digits.
 #[test]
 fn code_elliptic_serves_every_request() {
     let hole = Kerr::new(0.94).unwrap();

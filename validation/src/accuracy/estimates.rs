@@ -1,5 +1,5 @@
-//! Whether estimates bound errors: integrator × tolerance × class of rays × kind of point, each
-//! of r, θ, φ and delay on its own.
+//! Test of error estimates: integrator × tolerance × class of rays × kind of point, each of r, θ, φ
+//! and delay on its own.
 //!
 //! Errors of samples are taken at equal Mino time. A crossing is judged as it is used, against
 //! the true crossing, so that an error of when the ray crosses counts as one of where.
@@ -185,7 +185,7 @@ pub struct Held {
     pub error: f64,
 }
 
-/// What was found for one class, kind of point and setting.
+/// Result for one class, kind of point and setting.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// Class of rays.
@@ -223,8 +223,8 @@ impl Row {
         text
     }
 
-    /// Whether the estimates of r, θ, φ and delay bound the errors of 99 % of the rays, each; of
-    /// fewer than a hundred rays one may be beyond.
+    /// Returns whether the estimates of r, θ, φ and delay bound the errors of 99 % of the rays,
+    /// each; of fewer than a hundred rays one may be beyond.
     pub fn holds(&self) -> bool {
         self.held.iter().all(|held| 100 * held.beyond <= self.rays.max(100))
     }
@@ -329,7 +329,7 @@ pub fn run(
     Ok(rows)
 }
 
-/// What pairs of error and estimate come to.
+/// Counts the errors that their estimates bound.
 fn held(pairs: impl Iterator<Item = (f64, f64)>) -> Held {
     let mut held = Held::default();
     let mut over = Vec::new();

@@ -11,7 +11,7 @@ use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// What kind of trouble a ray looks for.
+/// Kind of difficulty that rays are chosen for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Impact parameters of the hole's size.
@@ -39,7 +39,7 @@ impl Kind {
     }
 }
 
-/// What became of the rays of one kind.
+/// Counts of the outcomes of the rays of one kind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tally {
     /// The kind.
@@ -98,7 +98,7 @@ impl Tally {
         self
     }
 
-    /// Whether no ray went wrong and the worst error is within ten times its estimate.
+    /// Returns whether no ray went wrong and the worst error is within ten times its estimate.
     pub fn passes(&self) -> bool {
         let wrong = self.wrong_fates + self.wrong_crossings + self.not_finite + self.unresolved[1];
         wrong == 0 && self.worst.is_none_or(|(ratio, _)| ratio <= 10.0)
@@ -246,8 +246,8 @@ fn judge(
 /// Crossings that are looked at.
 const MOST_CROSSINGS: usize = 64;
 
-/// Whether a ray has as many crossings as the oracle's, up to its end. Those closer to the horizon
-/// than 64 roundings of its radius do not count: no double tells on which side they are.
+/// Returns whether a ray has as many crossings as the oracle's, up to its end. Those closer to the
+/// horizon than 64 roundings of its radius do not count: no double tells on which side they are.
 fn same_crossings(hole: &Kerr, table: &RayTable, oracle: &Oracle) -> bool {
     let outside = |r: f64| r > hole.horizon() * (1.0 + 64.0 * f64::EPSILON);
     let found = table.crossings.radius.iter().filter(|r| outside(**r)).count();

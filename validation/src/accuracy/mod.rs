@@ -1,5 +1,5 @@
-//! What a digit costs: errors and times of every integrator, over tolerances, spins and
-//! classes of rays, hard ones included.
+//! Cost of a digit: errors and times of every integrator, over tolerances, spins and classes of
+//! rays, hard ones included.
 //!
 //! The oracle is the Taylor series in numbers of twice the precision ([`trace_series`] with
 //! [`Double`]), which agrees with itself to 1e-24 from one order to another and with the

@@ -55,7 +55,7 @@ impl Oracle {
         trace_series(TOLERANCE, &hole, &ray, Quantities::ALL, &mut self.path)
     }
 
-    /// What becomes of the ray.
+    /// Returns the outcome of the ray.
     pub fn outcome(&self) -> Outcome {
         self.path.outcome()
     }

@@ -8,7 +8,7 @@ use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
 
-/// What is swept.
+/// Values that are swept.
 #[derive(Debug, Clone)]
 pub struct Sweep {
     /// Integrators and their tolerances.
@@ -41,7 +41,7 @@ impl Sweep {
     }
 }
 
-/// What was found for one setting, spin and class.
+/// Result for one setting, spin and class.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// Integrator.
@@ -76,7 +76,7 @@ fn points(class: Class) -> usize {
     if class == Class::NearHorizon { 100 } else { 20 }
 }
 
-/// Whether a point counts.
+/// Returns whether a point counts.
 fn counts(class: Class, spin: f64, radius: f64) -> bool {
     let horizon = 1.0 + (1.0 - spin * spin).max(0.0).sqrt();
     // Azimuth and delay diverge at the horizon itself.

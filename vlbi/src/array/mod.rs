@@ -19,7 +19,7 @@ pub enum ArrayError {
     Line {
         /// Counted from 1.
         line: usize,
-        /// What is wrong with it.
+        /// Reason for the refusal.
         message: String,
     },
     /// Fewer than two stations.
@@ -36,7 +36,7 @@ pub enum ArrayError {
     Unfit {
         /// Its name.
         name: String,
-        /// What is wrong with it.
+        /// Reason for the refusal.
         message: String,
     },
 }

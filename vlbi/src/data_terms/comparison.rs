@@ -1,9 +1,10 @@
-//! What terms compare, for those who compute their χ² on another device.
+//! Comparisons of data terms, for callers who compute their χ² on another device.
 
 use crate::products::ClosureKind;
 use num_complex::Complex32;
 
-/// What a [`DataTerm`](super::DataTerm) compares with the visibilities of a model, in their order and in single precision.
+/// Data that a [`DataTerm`](super::DataTerm) compares with the visibilities of a model, in their order and in single
+/// precision.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Comparison {
     /// Complex visibilities (Jy) and 1/σ² of their parts.
@@ -26,7 +27,7 @@ pub enum Comparison {
 pub struct ClosureScan {
     /// Visibilities and signs of each quantity.
     pub legs: Vec<Vec<(usize, f32)>>,
-    /// What was measured of each (rad, or without a unit).
+    /// Measured values (rad, or without a unit).
     pub data: Vec<f32>,
     /// The inverse of the covariance, row after row.
     pub precision: Vec<f32>,

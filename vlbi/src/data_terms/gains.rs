@@ -82,7 +82,7 @@ impl GainTerm {
         (gains, errors)
     }
 
-    /// What the gains act upon: visibilities of the model, or their amplitudes.
+    /// Returns the quantities that gains act upon: visibilities of the model, or their amplitudes.
     fn seen<T: Float>(&self, model: &[Complex<T>]) -> Vec<Complex64> {
         assert_eq!(model.len(), self.data.len());
         let of = |v: &Complex<T>| Complex64::new(v.re.double(), v.im.double());

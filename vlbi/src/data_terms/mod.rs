@@ -82,13 +82,13 @@ pub trait DataTerm<T: Float>: Sync {
     /// How many real data it compares with: χ² of the true model has this mean.
     fn degrees_of_freedom(&self) -> usize;
 
-    /// Whether χ² stays the same when all visibilities are multiplied by one positive number: such data do not
+    /// Returns whether χ² stays the same when all visibilities are multiplied by one positive number: such data do not
     /// know the flux.
     fn is_scale_free(&self) -> bool {
         false
     }
 
-    /// What is compared, for those who compute χ² on another device; none where only this processor computes it.
+    /// Returns the comparison, for callers who compute χ² on another device; none where only this processor computes it.
     fn comparison(&self) -> Option<Comparison> {
         None
     }

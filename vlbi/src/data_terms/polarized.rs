@@ -41,7 +41,7 @@ impl Compared {
     }
 }
 
-/// What 1 Jy of I, of Q and of U gives in a product.
+/// Response of a product to 1 Jy of I, of Q and of U.
 type Response = [Complex64; MODELLED];
 
 impl PolarizedTerm {
@@ -86,7 +86,7 @@ impl PolarizedTerm {
         Products::of(observation).rows.iter().map(|row| row.uv).collect()
     }
 
-    /// What the model's parameters give in each product.
+    /// Returns the responses of each product to the model's parameters.
     fn responses(&self) -> Vec<Response> {
         let leakage = self.leakage.as_ref().map(SharedLeakage::get);
         let of_row = |row: usize| {

@@ -20,7 +20,7 @@ pub struct RatioTerm {
     baselines: Vec<Baseline>,
 }
 
-/// What was measured on a baseline.
+/// Measurement on a baseline.
 struct Baseline {
     i: Measured,
     /// P with i of Q + iU, or −i of Q − iU: one or two.

@@ -102,7 +102,7 @@ impl View {
         }
     }
 
-    /// What an observer sees who moves with this velocity (c = 1, its square neglected): the three
+    /// Returns the view of an observer who moves with this velocity (c = 1, its square neglected): the three
     /// directions turned together, along the great circle towards the motion.
     fn seen_at(self, velocity: [f64; 3]) -> Self {
         let part = |axis| dot(axis, velocity);

@@ -1,5 +1,5 @@
-//! What kerrlight's CSV says in lines that start with `#`: `key: value`, one a line. Lines of other
-//! keys are passed over.
+//! Comments of kerrlight's CSV, in lines that start with `#`: `key: value`, one a line. Lines of
+//! other keys are passed over.
 
 use super::{Names, number};
 use crate::array;

@@ -1,4 +1,4 @@
-//! What the header of an image in FITS says of its pixels: where they are on the sky, and which Stokes parameters.
+//! Axes of FITS images: where pixels are on the sky, and which Stokes parameters they hold.
 
 use super::FileError;
 use super::fits::Header;
@@ -11,7 +11,7 @@ pub const STOKES: [&str; 4] = ["I", "Q", "U", "V"];
 pub struct Place {
     /// The grid, its middle being the phase centre.
     pub grid: ImageGrid,
-    /// Whether columns run from east to west.
+    /// True if columns run from east to west.
     pub east_to_west: bool,
     /// Which of [`STOKES`] each plane is; none where the header does not say.
     pub stokes: Option<Vec<usize>>,
@@ -115,7 +115,7 @@ fn centred(header: &Header<'_>, sizes: [usize; 2]) -> Result<(), FileError> {
     Ok(())
 }
 
-/// Whether columns run from east to west, and the side of a pixel in radians.
+/// Returns whether columns run from east to west, and the side of a pixel in radians.
 fn pixel(header: &Header<'_>) -> Result<(bool, f64), FileError> {
     let step = |keyword| header.number(keyword).map(|step| step.unwrap_or(0.0));
     let (east, north) = (step("CDELT1")?, step("CDELT2")?);

@@ -57,7 +57,7 @@ pub fn read(bytes: &[u8]) -> Result<StokesMovie, Error> {
     Ok(StokesMovie { i: Movie { grid: place.grid, pixels: i }, polarized: [q, u, v] })
 }
 
-/// Whether an extension is an image with pixels, rather than a table.
+/// Returns whether an extension is an image with pixels, rather than a table.
 fn is_image(header: &Header<'_>) -> bool {
     let is_image = header.text("XTENSION").is_some_and(|kind| kind.trim() == "IMAGE");
     is_image && header.axes().is_ok_and(|axes| axes.len() >= 2)

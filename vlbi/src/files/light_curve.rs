@@ -20,7 +20,7 @@ const MOST_COLUMNS: usize = 64;
 #[derive(Clone, Copy)]
 struct TimeColumn {
     at: usize,
-    /// Whether they are days.
+    /// True if they are days.
     days: bool,
 }
 
@@ -156,8 +156,8 @@ fn names(line: &str) -> (Vec<String>, Vec<String>) {
     cells(&text).into_iter().map(inside_and_out).unzip()
 }
 
-/// Whether the first line that is no comment, or the last comment above it, names columns as those of a light curve: then
-/// it is meant to be one.
+/// Returns whether the first line that is no comment, or the last comment above it, names columns as those of a light curve:
+/// then it is meant to be one.
 pub fn is_light_curve(text: &str) -> bool {
     let mut comment = Vec::new();
     for line in text.lines().filter(|line| !line.trim().is_empty()) {

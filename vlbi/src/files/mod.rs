@@ -42,7 +42,7 @@ pub enum FileError {
     Line {
         /// Counted from 1.
         line: usize,
-        /// What is wrong.
+        /// Reason for the refusal.
         message: String,
     },
     /// At a byte of a binary file.
@@ -50,7 +50,7 @@ pub enum FileError {
     Byte {
         /// Counted from 0.
         offset: usize,
-        /// What is wrong.
+        /// Reason for the refusal.
         message: String,
     },
     /// With the file as a whole.

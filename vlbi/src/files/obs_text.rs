@@ -15,7 +15,7 @@ const COLUMNS: usize = 20;
 /// Opacity of a sky through which nothing comes.
 const MOST_OPACITY: f64 = 1e6;
 
-/// Whether a text begins as these do.
+/// Returns whether a text begins as these do.
 pub(super) fn is_obs_text(text: &str) -> bool {
     let mut words = text.split_whitespace();
     words.next() == Some("#") && words.next() == Some("SRC:") && text.contains("\n# RA:")

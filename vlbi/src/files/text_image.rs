@@ -3,7 +3,7 @@
 use super::images::Pixels;
 use super::{FileError, number};
 
-/// Whether bytes begin like such an image.
+/// Returns whether bytes begin like such an image.
 pub fn is_text_image(bytes: &[u8]) -> bool {
     let heading = &bytes[..bytes.len().min(4096)];
     bytes.starts_with(b"# SRC:") && heading.windows(7).any(|word| word == b"# FOVX:")

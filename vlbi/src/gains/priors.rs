@@ -1,4 +1,4 @@
-//! What is known of gains before any data are seen.
+//! Priors of gains.
 
 /// Names of the tables that come with the program.
 pub const TABLES: [&str; 2] = ["EHT2017", "ngEHT"];
@@ -6,10 +6,10 @@ pub const TABLES: [&str; 2] = ["EHT2017", "ngEHT"];
 /// The stations of both tables, with their source.
 const STATIONS: &str = include_str!("stations.csv");
 
-/// What is known of the gains of an observation's stations.
+/// Priors of the gains of an observation's stations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GainPriors {
-    /// Whether phases are free in every scan; they are 0 otherwise.
+    /// True if phases are free in every scan; they are 0 otherwise.
     pub free_phases: bool,
     /// Standard deviation of ln|g| of each station in a scan; 0: the amplitude is known to be 1.
     pub amplitude_sigma: Vec<f64>,
@@ -35,8 +35,8 @@ pub fn table(name: &str, station: &str) -> Option<f64> {
     })
 }
 
-/// Whether two names are those of one station: the same, or the code of published files (`AA`) and the name of the
-/// arrays (`ALMA`); upper and lower case count the same.
+/// Returns whether two names are those of one station: the same, or the code of published files (`AA`) and the name
+/// of the arrays (`ALMA`); upper and lower case count the same.
 pub fn is_same_station(a: &str, b: &str) -> bool {
     a.eq_ignore_ascii_case(b) || rows().any(|[names, ..]| has(names, a) && has(names, b))
 }

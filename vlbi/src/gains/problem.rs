@@ -107,12 +107,12 @@ impl GainProblem {
         &self.pairs
     }
 
-    /// Whether ln|g| of a station is free, with its 1/s².
+    /// Returns whether ln|g| of a station is free, with its 1/s².
     pub fn precision(&self, station: usize) -> Option<f64> {
         (!self.is_fixed[station]).then(|| self.precision[station])
     }
 
-    /// Whether arg g of a station is free.
+    /// Returns whether arg g of a station is free.
     pub fn has_phase(&self, station: usize) -> bool {
         !self.is_fixed[self.stations() + station]
     }

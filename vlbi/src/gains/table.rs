@@ -133,7 +133,7 @@ impl GainTable {
 mod tests {
     use super::*;
 
-    /// What no data know does not count; what they know does.
+    /// Scale and common phase, which no data constrain, do not count; the rest does.
     #[test]
     fn exact_distances_leave_scale_and_common_phases_out() {
         let gain = |time_h: f64, station: &str, gain: Complex64| StationGain {

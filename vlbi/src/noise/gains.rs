@@ -21,7 +21,7 @@ pub struct GainErrors {
     /// Standard deviation of ln |g|, one draw a station and scan.
     #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a standard deviation of ln |g|"))]
     pub scan_amplitude: f64,
-    /// Whether phases are uniform, drawn again for every scan.
+    /// True if phases are uniform, drawn again for every scan.
     pub random_phases: bool,
     /// Stations whose `scan_amplitude` differs, such as `{ LMT = 0.6 }`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]

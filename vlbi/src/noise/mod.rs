@@ -1,5 +1,5 @@
-//! What happens to visibilities on their way: scattering, leakage, station gains, thermal noise. Each is
-//! its own step and nothing is done unless called.
+//! Corruptions of visibilities: scattering, leakage, station gains, thermal noise. Each is its own step
+//! and nothing is done unless called.
 //!
 //! Random numbers come from PCG-64 (MCG, O'Neill 2014) seeded with a 64-bit number, and a stream
 //! of its own for each step: the same seed makes the same data on every machine.

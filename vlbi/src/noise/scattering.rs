@@ -161,7 +161,7 @@ pub fn unscatter(observation: &mut Observation, kernel: &ScatteringKernel) -> Re
     Ok(())
 }
 
-/// What scattering must leave of a point's visibility for errors to be divided by it: their squares are finite.
+/// Least visibility of a point after scattering for errors to be divided by it: their squares are finite.
 const LEAST: f64 = 1e-100;
 
 /// A kernel's transform on every row.

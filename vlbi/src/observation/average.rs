@@ -10,10 +10,10 @@ use std::collections::BTreeMap;
 pub struct Averaging {
     /// Length of an interval in seconds; with `in_scans` it may be infinite: whole scans.
     pub seconds: f64,
-    /// Whether intervals count from the start of each scan and end with it. Otherwise they start at multiples of their
+    /// True if intervals count from the start of each scan and end with it. Otherwise they start at multiples of their
     /// length since 0 h UTC.
     pub in_scans: bool,
-    /// Whether products count by 1/σ². Otherwise means are plain, as in eht-imaging.
+    /// True if products count by 1/σ². Otherwise means are plain, as in eht-imaging.
     pub weighted: bool,
 }
 
@@ -28,7 +28,7 @@ impl Averaging {
         (SHORTEST_S..=1e9).contains(&self.seconds) || self.in_scans && self.seconds == f64::INFINITY
     }
 
-    /// What it did, in a line.
+    /// Describes what it did, in a line.
     fn told(&self) -> String {
         let length = match self.seconds.is_finite() {
             true => format!(" over {} s", self.seconds),

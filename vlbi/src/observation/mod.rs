@@ -13,7 +13,7 @@ use super::Complex64;
 use super::array::Station;
 use super::earth::SourcePosition;
 
-/// What the four products of a row are.
+/// Basis of the four products of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Basis {
     /// Correlations of circular feeds: RR, LL, RL, LR.
@@ -63,8 +63,8 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Whether it stands for a product that was not measured: exactly 0 with an error of 0, which
-    /// eht-imaging writes for the cross hands of Stokes I alone.
+    /// Returns whether it stands for a product that was not measured: exactly 0 with an error of 0,
+    /// which eht-imaging writes for the cross hands of Stokes I alone.
     pub fn is_unmeasured(&self) -> bool {
         self.noise_sigma == 0.0 && self.visibility == Complex64::new(0.0, 0.0)
     }
@@ -133,8 +133,8 @@ impl Row {
     }
 }
 
-/// What an array has measured of a source. Text tables of visibilities do not hold everything:
-/// what is not known is `None`.
+/// Measurements of a source by an array. Text tables of visibilities do not hold everything: what is
+/// not known is `None`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observation {
     /// Name of the source.
@@ -150,7 +150,7 @@ pub struct Observation {
     /// Spectral channels that rows belong to, each with (u, v) of its own frequency; none where all
     /// rows are of `frequency_hz`.
     pub channels: Vec<Channel>,
-    /// What the rows' products are.
+    /// Basis of the rows' products.
     pub basis: Basis,
     /// The stations that rows point to.
     pub stations: Vec<Station>,
@@ -210,7 +210,7 @@ impl Observation {
         self.rows.sort_by(|a, b| a.time_h.total_cmp(&b.time_h).then(place(a).cmp(&place(b))));
     }
 
-    /// Whether more than total intensity was measured: RL and LR, or Q, U or V.
+    /// Returns whether more than total intensity was measured: RL and LR, or Q, U or V.
     pub fn is_polarized(&self) -> bool {
         let measured = |row: &Row, k: usize| row.product(k).is_some_and(|p| !p.is_unmeasured());
         self.rows.iter().any(|row| match self.basis {

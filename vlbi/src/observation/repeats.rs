@@ -14,7 +14,7 @@ pub struct Repeats {
     pub copies: usize,
 }
 
-/// What rows that belong together have in common.
+/// Key that rows which belong together have in common.
 type Place = (u64, [u16; 2], u16);
 
 impl Observation {
@@ -74,7 +74,7 @@ fn distinct(rows: &[Row]) -> Vec<Row> {
     kept
 }
 
-/// Whether two rows have the same products and errors, where these are there.
+/// Returns whether two rows have the same products and errors, where these are there.
 fn is_copy(a: &Row, b: &Row) -> bool {
     (0..4).all(|k| a.product(k) == b.product(k))
 }

@@ -1,8 +1,8 @@
-//! What to keep of an observation.
+//! Selections of an observation.
 
 use super::{Observation, Row};
 
-/// What is thrown away.
+/// Data to throw away.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Flags {
     /// Stations by name, of which no baseline is kept.
@@ -16,7 +16,7 @@ pub struct Flags {
     pub longer_than: Option<f64>,
 }
 
-/// What was kept.
+/// Rows that were kept.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Selection {
     /// The rest.
@@ -53,7 +53,7 @@ impl Flags {
     }
 }
 
-/// Whether an hour is in an interval of [`Flags::times_h`].
+/// Returns whether an hour is in an interval of [`Flags::times_h`].
 fn is_within(time_h: f64, [from, to]: [f64; 2]) -> bool {
     if from <= to {
         return (from..=to).contains(&time_h);

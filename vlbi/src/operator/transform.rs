@@ -82,8 +82,8 @@ const DIRECT_NS: f64 = 0.6;
 const FAST_NS: f64 = 5.0;
 const CELL_NS: f64 = 4.0;
 
-/// Whether the fast transform is expected to take less time than the direct one whose exponentials
-/// are kept.
+/// Returns whether the fast transform is expected to take less time than the direct one whose exponentials are
+/// kept.
 fn is_fast_cheaper(grid: ImageGrid, frames: &[Vec<[f64; 2]>], accuracy: f64) -> bool {
     let width = width_of(accuracy);
     let [across, rows] = [grid.width, grid.height].map(|pixels| cells(pixels, width) as f64);

@@ -1,5 +1,5 @@
-//! What leakage does: V = J₁ ρ J₂†, with the coherencies ρ = [[I + V, Q + iU], [Q − iU, I − V]] of the sky and
-//! J = [[1, d_R e^{2iφ}], [d_L e^{−2iφ}, 1]]: data whose rotation of feeds has been taken out.
+//! Leakage: V = J₁ ρ J₂†, with the coherencies ρ = [[I + V, Q + iU], [Q − iU, I − V]] of the sky and J = [[1, d_R
+//! e^{2iφ}], [d_L e^{−2iφ}, 1]]: data whose rotation of feeds has been taken out.
 
 use crate::Complex64;
 use crate::observation::Basis;
@@ -53,7 +53,7 @@ pub fn leaked(coherency: &Matrix, first: &Matrix, second: &Matrix) -> [Complex64
     })
 }
 
-/// What 1 Jy of I, of Q and of U gives in each product of a row.
+/// Returns the response of each product of a row to 1 Jy of I, of Q and of U.
 pub fn response(
     basis: Basis,
     first: &Matrix,

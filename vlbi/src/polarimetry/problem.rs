@@ -16,7 +16,7 @@ pub struct LeakageDatum {
     pub turns: [Complex64; 2],
     /// Which of RR, LL, RL, LR.
     pub product: usize,
-    /// What was measured, Jy.
+    /// Measured value, Jy.
     pub value: Complex64,
     /// 1/σ² of real and imaginary part.
     pub weight: f64,

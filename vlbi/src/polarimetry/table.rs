@@ -160,7 +160,7 @@ mod tests {
         observation
     }
 
-    /// What is put on is taken out; errors grow by the squares of the leakage.
+    /// Leakage that is put on is taken out; errors grow by its squares.
     #[test]
     fn exact_leakage_is_taken_out() {
         let before = observation();

@@ -5,7 +5,7 @@ use super::layers::Layers;
 use crate::observation::{Measured, Observation};
 use std::collections::HashMap;
 
-/// What kind of closure quantity.
+/// Kind of closure quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ClosureKind {

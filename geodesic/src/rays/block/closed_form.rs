@@ -52,7 +52,7 @@ impl<'a> Located<'a> {
     }
 }
 
-/// What takes a ray's radial potential to know.
+/// Cost and result of inspecting a ray's radial potential.
 struct Inspected {
     eta: f64,
     until: f64,
@@ -142,7 +142,7 @@ impl BlockTracer {
         Ok(())
     }
 
-    /// What takes a ray's radial potential.
+    /// Inspects a ray's radial potential.
     #[inline(never)]
     fn inspect<V: RayVisitor>(
         &self,
@@ -181,7 +181,7 @@ impl BlockTracer {
         Ok(())
     }
 
-    /// Whether the closed form has an error above the tolerance, or no end.
+    /// Returns whether the closed form has an error above the tolerance, or no end.
     #[inline]
     fn loses_digits(&self, ends: &RayEnds) -> bool {
         let known = ends.error <= self.tracer.tolerance().max(FINEST);

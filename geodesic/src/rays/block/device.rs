@@ -10,10 +10,10 @@ use crate::spacetime::kerr::Kerr;
 use core::fmt;
 use core::ops::Range;
 
-/// What traces rays in place of this processor: a graphics device (`gpu::GpuTracer`, feature `wgpu`), or one of your own.
+/// A tracer of rays in place of this processor: a graphics device (`gpu::GpuTracer`, feature `wgpu`), or one of your own.
 /// [`BlockTracer::with_device`](crate::BlockTracer::with_device) takes it.
 pub trait RayDevice: fmt::Debug + Send + Sync {
-    /// What it is called.
+    /// Returns its name.
     fn name(&self) -> &str;
 
     /// Traces the rays that arrive at the points (`x[k]`, `y[k]`) of `view`: (α, β) in M of an observer, tangents of angles
@@ -62,14 +62,14 @@ pub trait RayDevice: fmt::Debug + Send + Sync {
     fn failure(&self) -> Option<String>;
 }
 
-/// What a device traces of each ray, beside outcome and number of crossings.
+/// Quantities that a device traces for each ray, beside outcome and number of crossings.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DeviceRequest {
     /// How many crossings of the equatorial plane are located.
     pub crossings: usize,
     /// Samples equidistant in Mino time along the whole ray, both ends included but for those at infinity.
     pub samples: usize,
-    /// Whether azimuths, delays and directions of escape are computed.
+    /// True if azimuths, delays and directions of escape are computed.
     pub quadratures: bool,
     /// 1/r in M⁻¹ at which rays that escape end: 0 for infinity.
     pub end: f64,
@@ -82,9 +82,9 @@ pub struct DeviceRequest {
 pub struct DeviceEnd {
     /// Unit vector of the direction in which it escapes, if it does; needs `quadratures`.
     pub exit: [f64; 3],
-    /// What becomes of it; unresolved where the device cannot tell.
+    /// Outcome; unresolved where the device cannot tell.
     pub outcome: Outcome,
-    /// Whether the device vouches for it; if not, trace it again in doubles.
+    /// True if the device vouches for it; if not, trace it again in doubles.
     pub is_trusted: bool,
     /// Crossings of the equatorial plane along the whole ray.
     pub crossings: u32,
@@ -129,7 +129,7 @@ pub struct DeviceSample {
     pub delay: f64,
 }
 
-/// What a device found of some rays; memory is reused.
+/// Results of a device for some rays; memory is reused.
 #[derive(Debug, Default)]
 pub struct DeviceRays {
     ends: Vec<DeviceEnd>,

@@ -54,7 +54,7 @@ impl DevicePaths {
         self.rays.len()
     }
 
-    /// Whether there is none.
+    /// Returns whether there is none.
     pub fn is_empty(&self) -> bool {
         self.rays.is_empty()
     }

@@ -49,7 +49,7 @@ impl BlockTracer {
         Ok(())
     }
 
-    /// What is known of ray `k` from the device, and whether it has to be traced step by step.
+    /// Judges ray `k` by the device's results, and whether it has to be traced step by step.
     fn judge<V: RayVisitor>(
         &self,
         k: usize,

@@ -1,26 +1,26 @@
-//! What is traced of a block of rays.
+//! Requests for blocks of rays.
 
 use crate::simd::NodeRequest;
 
-/// What is to be found about the rays of a block.
+/// Quantities to be found for the rays of a block.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BlockRequest {
     /// How many crossings of the equatorial plane are located. 0: they are counted, not located.
     pub crossings: usize,
-    /// Whether a ray with more crossings, the first of which are not opaque, is traced step by step
-    /// and has them all.
+    /// True if a ray with more crossings, the first of which are not opaque, is traced step by step and has them
+    /// all.
     pub all_crossings: bool,
     /// The rates dw/dτ and d cos θ/dτ at crossings, and η.
     pub rates: bool,
     /// The direction in which rays escape.
     pub exit: bool,
-    /// Whether [`RayVisitor::take_beam`](crate::RayVisitor::take_beam) is given the beams of rays that escape; takes
+    /// True if [`RayVisitor::take_beam`](crate::RayVisitor::take_beam) is given the beams of rays that escape; takes
     /// `exit`.
     pub beams: bool,
     /// The number of half-orbits after which rays are cut off: half-way between crossing number
     /// `half_orbits` (from 0) and the next.
     pub half_orbits: Option<u32>,
-    /// Whether [`RayVisitor::needs_path`](crate::RayVisitor::needs_path) decides of which rays the path is traced.
+    /// True if [`RayVisitor::needs_path`](crate::RayVisitor::needs_path) decides of which rays the path is traced.
     pub paths: bool,
     /// Coarse nodes by which [`RayVisitor::needs_path_at`](crate::RayVisitor::needs_path_at) decides it too.
     pub probes: Option<NodeRequest>,

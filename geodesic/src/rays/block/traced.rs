@@ -1,4 +1,4 @@
-//! What is known of a traced ray.
+//! Traced rays.
 
 use crate::integrate::outcome::{Outcome, Unresolved};
 use crate::integrate::path::Path;
@@ -37,14 +37,14 @@ impl From<&PathPoint> for PlaneCrossing {
     }
 }
 
-/// What is known of a ray as a whole.
+/// Properties of a ray as a whole.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TracedRay {
     /// λ = L/E, in M.
     pub lambda: f64,
     /// η = Q/E², in M²; NaN unless rates are requested or the ray was traced step by step.
     pub eta: f64,
-    /// What becomes of it if no surface ends it.
+    /// Outcome if no surface ends it.
     pub outcome: Outcome,
     /// How many times it crosses the equatorial plane outside the horizon, along its whole length.
     pub crossing_count: u32,
@@ -59,9 +59,9 @@ pub struct TracedRay {
     pub surface: Option<f64>,
     /// Unit vector of the direction in which it escapes, if it does and that is requested.
     pub exit: Option<[f64; 3]>,
-    /// Whether it was traced step by step.
+    /// True if it was traced step by step.
     pub stepped: bool,
-    /// Whether its path is traced beside the closed form.
+    /// True if its path is traced beside the closed form.
     pub with_path: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What a block of rays is traced for.
+//! Visitors of blocks of rays.
 
 use super::traced::{PathOfRay, PlaneCrossing, TracedRay};
 use crate::error::Error;
@@ -6,21 +6,21 @@ use crate::rays::footprint::Sky;
 use crate::screen::observer::Ray;
 use crate::simd::{RayNodes, RaySamples};
 
-/// What a block of rays is traced for: it decides where rays end and takes what is found.
+/// A consumer of a block of rays: it decides where rays end and takes the results.
 pub trait RayVisitor {
-    /// Whether a surface in the equatorial plane hides what is behind a crossing.
+    /// Returns whether a surface in the equatorial plane hides what is behind a crossing.
     fn is_opaque_at(&self, crossing: &PlaneCrossing) -> bool {
         let _ = crossing;
         false
     }
 
-    /// Whether the path of a ray is needed, and what for.
+    /// Returns whether the path of a ray is needed, and its use.
     fn needs_path(&self, ray: &Ray) -> PathUse {
         let _ = ray;
         PathUse::None
     }
 
-    /// Whether the path of a ray is needed, and what for, from coarse nodes along it: see
+    /// Returns whether the path of a ray is needed, and its use, from coarse nodes along it: see
     /// [`BlockRequest::probes`](crate::BlockRequest::probes).
     fn needs_path_at(&self, ray: &TracedRay, nodes: &RayNodes<'_>) -> PathUse {
         let _ = (ray, nodes);
@@ -77,7 +77,7 @@ pub trait RayVisitor {
     }
 }
 
-/// What the path of a ray is needed for.
+/// Use of the path of a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PathUse {
     /// Nothing.
@@ -89,7 +89,7 @@ pub enum PathUse {
     Instead,
 }
 
-/// What a block is worked on for.
+/// Purpose of work on a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Work {
     /// Outcomes, crossings, samples and paths.

@@ -19,7 +19,8 @@ pub enum InstructionSet {
     /// One number at a time: what [`Portable`](Self::Portable) is without SSE2.
     #[cfg(test)]
     Scalar,
-    /// What every machine of the target has: SSE2 on x86-64, without fused multiply-add.
+    /// The instruction set that every machine of the target has: SSE2 on x86-64, without fused
+    /// multiply-add.
     Portable,
     /// AVX2 and FMA.
     Avx2,
@@ -31,7 +32,7 @@ impl InstructionSet {
     /// All of them, the widest last.
     pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
 
-    /// Whether this machine supports it.
+    /// Returns whether this machine supports it.
     pub fn available(self) -> bool {
         match self {
             #[cfg(test)]
@@ -164,10 +165,10 @@ pub trait Lanes<T: Element>:
     /// Both masks.
     fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
 
-    /// Whether the mask holds in some lane.
+    /// Returns whether the mask holds in some lane.
     fn any(mask: Self::Mask) -> bool;
 
-    /// Whether the mask holds in all lanes.
+    /// Returns whether the mask holds in all lanes.
     fn all(mask: Self::Mask) -> bool;
 
     /// For positive normal numbers: `(m, k)` with `self = m · 2^k`, `√½ ≤ m < √2`, `k` integer.

@@ -40,7 +40,7 @@ impl Number for f64 {
     }
 }
 
-/// What every operation makes of two registers of numbers.
+/// Results of every operation on two registers of numbers.
 struct Operations<T>([T; MAX_LANES], [T; MAX_LANES]);
 
 impl<T: Number> Task<T> for Operations<T> {

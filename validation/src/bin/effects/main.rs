@@ -12,7 +12,7 @@ use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
-/// What is timed: a disc, gas, a hot spot and stars.
+/// Scene that is timed: a disc, gas, a hot spot and stars.
 const SCENE: &str = include_str!("scene.toml");
 
 /// The text around the table.

@@ -1,4 +1,4 @@
-//! What effects cost that are off: rays of a disc through the library, which has every effect, and
+//! Cost of effects that are off: rays of a disc through the library, which has every effect, and
 //! through a loop over the same traced rays that knows none.
 
 use kerrlight_geodesic::simd::Crossings;
@@ -17,7 +17,7 @@ const BLOCK: usize = 1024;
 /// Crossings that the library asks for.
 const CROSSINGS: usize = 4;
 
-/// What a ray sees where there are no effects.
+/// Light of a ray where there are no effects.
 #[derive(Debug, Clone, Copy)]
 struct Seen {
     intensity: f64,
@@ -131,7 +131,7 @@ impl Off {
         seen
     }
 
-    /// Whether both see the same.
+    /// Returns whether both see the same.
     pub fn agree(&self) -> bool {
         let same = |(seen, result): (&Seen, &RayResult)| {
             let unmet = seen.outcome.is_unresolved();

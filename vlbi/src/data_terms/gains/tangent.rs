@@ -23,8 +23,8 @@ pub struct TangentTerm {
     inverse: DMatrix<f64>,
 }
 
-/// What is added to the second derivatives along gains, in parts of their mean: a baseline that a model does not shine on
-/// says nothing about its stations.
+/// Least second derivative along gains, in parts of their mean: a baseline that a model does not shine on says nothing about
+/// its stations.
 const AT_LEAST: f64 = 1e-10;
 
 impl GainTerm {

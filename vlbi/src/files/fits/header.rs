@@ -70,7 +70,7 @@ impl<'a> Header<'a> {
         Some(text)
     }
 
-    /// What stands before the comment, for values other than text.
+    /// Returns the text before the comment, for values other than text.
     fn plain(&self, keyword: &str) -> Option<&'a str> {
         let value = self.values.get(keyword)?.split('/').next()?.trim();
         (!value.is_empty()).then_some(value)
@@ -107,7 +107,7 @@ impl<'a> Header<'a> {
         }
     }
 
-    /// Whether a logical value is T.
+    /// Returns whether a logical value is T.
     pub fn is_true(&self, keyword: &str) -> bool {
         self.plain(keyword) == Some("T")
     }

@@ -1,6 +1,6 @@
-//! What UVFITS needs of the FITS standard (version 4.0, Pence et al. 2010 and the IAU FITS
-//! Working Group): headers, and binary tables. Written for files that may be damaged: every size
-//! is checked against the bytes that there are before anything is done with it.
+//! Parts of the FITS standard that UVFITS needs (version 4.0, Pence et al. 2010 and the IAU FITS
+//! Working Group): headers, and binary tables. Written for files that may be damaged: every size is
+//! checked against the bytes that there are before anything is done with it.
 
 mod header;
 mod table;

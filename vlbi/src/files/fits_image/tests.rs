@@ -24,7 +24,7 @@ fn file(east_step: f64) -> Vec<u8> {
     image(east_step, 1, true, |_| {})
 }
 
-/// What a file with these cards is refused for.
+/// Returns the message with which a file with these cards is refused.
 fn refused(more: impl Fn(&mut Cards)) -> String {
     read(&image(-1e-9, 1, true, more)).expect_err("a card that is not read").to_string()
 }

@@ -101,9 +101,9 @@ mod tests {
         write(&observed(frame, [10.0, 11.0], 1)).unwrap()
     }
 
-    /// What pyuvdata 3.2 complains of, what Difmap's reader asks for, and what was found wrong in other writers for it: no frame,
-    /// times without TIMSYS (taken for TAI), an equinox that is no number, repeat counts that are not the numbers that the
-    /// header states, mounts of 0 everywhere.
+    /// The file has what pyuvdata 3.2 complains of, what Difmap's reader asks for, and what was found wrong in other writers
+    /// for it: no frame, times without TIMSYS (taken for TAI), an equinox that is no number, repeat counts that are not the
+    /// numbers that the header states, mounts of 0 everywhere.
     #[test]
     fn code_readers_find_what_they_ask_for() {
         let bytes = file(Frame::Catalogue);

@@ -4,7 +4,7 @@ use super::super::FileError;
 use super::super::fits::{Table, Unit};
 use super::layout::Place;
 
-/// What a flag is compared with of a group.
+/// Properties of a group that a flag is compared with.
 #[derive(Debug, Clone, Copy)]
 pub struct Group {
     /// Parameters SOURCE and FREQSEL, where there are any.
@@ -30,7 +30,7 @@ pub struct Flag {
 }
 
 impl Flag {
-    /// Whether it is about some data of a group.
+    /// Returns whether it is about some data of a group.
     pub fn is_about(&self, group: &Group) -> bool {
         let is = |wanted: Option<i64>, found: Option<i64>| wanted.is_none() || wanted == found;
         let [first, second] = self.antennas;
@@ -43,7 +43,7 @@ impl Flag {
             && (self.mjd[0]..=self.mjd[1]).contains(&group.mjd)
     }
 
-    /// Whether it is about a product of a channel of such a group.
+    /// Returns whether it is about a product of a channel of such a group.
     pub fn covers(&self, place: &Place, product: usize) -> bool {
         let within = |[first, last]: [usize; 2], at: usize| (first..=last).contains(&at);
         within(self.bands, place.band)

@@ -21,7 +21,7 @@ pub struct Parameter {
     zero: f64,
 }
 
-/// What tells the stations of a baseline.
+/// Parameters that name the stations of a baseline.
 #[derive(Debug, Clone, Copy)]
 pub enum Antennas {
     /// 256·first + second + (subarray − 1)/100, or 65536 + 2048·first + second.
@@ -55,7 +55,7 @@ pub struct Layout {
     blank: Option<i64>,
     /// Distance in numbers between real part, imaginary part and weight.
     complex_stride: usize,
-    /// Whether there are weights.
+    /// True if there are weights.
     pub weighted: bool,
     /// For each of the four products, where it is; `None` where there is none.
     pub products: [Option<usize>; 4],
@@ -185,7 +185,7 @@ impl Layout {
         start / self.product_stride
     }
 
-    /// Whether any product of any channel was measured.
+    /// Returns whether any product of any channel was measured.
     pub fn has_datum(&self, group: &[u8]) -> bool {
         let starts = || self.products.iter().flatten();
         self.channels
@@ -194,7 +194,7 @@ impl Layout {
     }
 }
 
-/// Whether real part, imaginary part and weight are those of a datum.
+/// Returns whether real part, imaginary part and weight are those of a datum.
 pub fn is_measured([re, im, weight]: [f64; 3]) -> bool {
     re.is_finite() && im.is_finite() && weight > 0.0
 }
@@ -339,7 +339,7 @@ impl<'a, 'b> Parameters<'a, 'b> {
 }
 
 impl Parameter {
-    /// What is added to every stored value.
+    /// Returns the offset of every stored value.
     pub fn zero(self) -> f64 {
         self.zero
     }

@@ -9,7 +9,7 @@ use crate::polarimetry::{feed_rotation, published_rotation};
 const CODES: [(i32, [f64; 2]); 4] =
     [(0, [1.0, 0.0]), (1, [0.0, 0.0]), (4, [1.0, 1.0]), (5, [1.0, -1.0])];
 
-/// What the antenna table says of the feeds of a station.
+/// Mount and feeds of a station, from the antenna table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mount {
     /// `MNTSTA`.
@@ -48,7 +48,7 @@ pub fn rotation(name: &str, mount: Mount) -> Option<FeedRotation> {
     (Some(told) != published && Some(told) != without_angle).then_some(told)
 }
 
-/// Whether a code stands for a mount whose feeds turn in a way that is known.
+/// Returns whether a code stands for a mount whose feeds turn in a way that is known.
 pub fn is_known(code: i32) -> bool {
     CODES.iter().any(|(known, _)| *known == code)
 }

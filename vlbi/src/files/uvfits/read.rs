@@ -304,7 +304,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// What all channels of a group have in common, unless it is of a station with itself.
+    /// Returns the properties that all channels of a group have in common, unless it is of a station with itself.
     fn empty_row(&self, group: &[u8], day: f64) -> Result<Option<Row>, String> {
         let layout = self.layout;
         let stations = self.stations(group)?;

@@ -1,4 +1,4 @@
-//! What a file says of its data and is not read: refused, with its name and value.
+//! Files whose settings are not supported are refused, with name and value.
 
 use super::super::fits::{Cards, ColumnData, binary_table, padded};
 use super::tests::small;
@@ -11,7 +11,7 @@ struct Made {
     parameters: Vec<(&'static str, [f32; 2])>,
     /// Lines of the header that replace or follow others.
     header: Vec<(&'static str, String)>,
-    /// What PTYPE1 is.
+    /// Value of PTYPE1.
     u: &'static str,
     /// (u, v) in seconds.
     seconds: f32,

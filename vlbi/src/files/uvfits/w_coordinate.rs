@@ -19,7 +19,7 @@ pub fn w_seconds<'a>(observation: &Observation, rows: impl Iterator<Item = &'a R
         .unwrap_or_else(|| vec![0.0; rows.len()])
 }
 
-/// What (u, v, w) come from.
+/// Sources of (u, v, w).
 struct Baselines<'a> {
     observation: &'a Observation,
     source: SourcePosition,

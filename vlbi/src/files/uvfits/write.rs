@@ -11,7 +11,7 @@ use std::borrow::Cow;
 const PARAMETERS: [&str; 9] =
     ["UU---SIN", "VV---SIN", "WW---SIN", "BASELINE", "DATE", "DATE", "INTTIM", "TAU1", "TAU2"];
 
-/// What the format needs.
+/// Facts that the format needs.
 struct Facts {
     position: SourcePosition,
     mjd: i32,
@@ -113,8 +113,8 @@ fn check_precision(observation: &Observation) -> Result<(), FileError> {
     Ok(())
 }
 
-/// Whether (u, v) came from single precision numbers in wavelengths, as some files have them: then
-/// they are kept to the bit.
+/// Returns whether (u, v) came from single precision numbers in wavelengths, as some files have
+/// them: then they are kept to the bit.
 fn is_single_in_wavelengths(row: &Row) -> bool {
     row.uv.iter().all(|x| (f64::from(*x as f32) - x).abs() <= 1e-12 * x.abs())
 }

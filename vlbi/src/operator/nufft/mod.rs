@@ -32,7 +32,7 @@ struct Site {
     weights: [[f64; MOST_CELLS]; 2],
     /// Pixel pulse and the phase of the image's centre.
     factor: Complex<f64>,
-    /// Whether the visibility is the conjugate of the sum.
+    /// True if the visibility is the conjugate of the sum.
     conjugate: bool,
     /// Where it is among the data.
     datum: usize,
@@ -48,7 +48,7 @@ pub struct Nufft {
     rows: usize,
     columns: usize,
     margin: usize,
-    /// What image columns and rows are multiplied with.
+    /// Factors of image columns and rows.
     correction: [Vec<f64>; 2],
     /// Along a row and along a column, there and back.
     along_row: [Arc<dyn Fft<f64>>; 2],
