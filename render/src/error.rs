@@ -98,7 +98,7 @@ impl Error {
         self.parts().1
     }
 
-    /// What would be allowed, in words.
+    /// Returns the allowed values, in words.
     pub fn allowed(&self) -> Option<&str> {
         self.parts().2
     }

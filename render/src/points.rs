@@ -43,7 +43,7 @@ impl<'a, T> Coordinates<'a, T> {
         self.columns[0].len()
     }
 
-    /// Whether there is no point.
+    /// Returns whether there is no point.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -99,7 +99,7 @@ impl<'a, T> CoordinatesMut<'a, T> {
         self.columns[0].len()
     }
 
-    /// Whether there is no point.
+    /// Returns whether there is no point.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -147,8 +147,8 @@ impl AngularVelocity {
         WayBack { axis: axis.vector(), point, speed }
     }
 
-    /// What a point at radius r (M) is stretched by, and turned by about the axis (radians, right-handed), to where its
-    /// matter was `elapsed` (M) before.
+    /// Returns the factor by which a point at radius r (M) is stretched, and the angle by which it is turned about the
+    /// axis (radians, right-handed), to where its matter was `elapsed` (M) before.
     pub fn step_back(&self, r: f64, elapsed: f64) -> [f64; 2] {
         match self.falling() {
             None => [1.0, -self.rate(r) * elapsed],
@@ -239,7 +239,7 @@ pub struct Injection {
 }
 
 impl Injection {
-    /// Whether a point shines at its time (M).
+    /// Returns whether a point shines at its time (M).
     pub fn shines(self, time: f64) -> bool {
         time >= self.time
     }

@@ -118,8 +118,8 @@ impl<N> Velocity<N> {
 }
 
 impl Velocity {
-    /// What it is about a hole whose spin as the flow sees it is `drag` (M); perturbations without a seed are drawn from
-    /// `seed`.
+    /// Returns the angular velocity about a hole whose spin as the flow sees it is `drag` (M); perturbations without a
+    /// seed are drawn from `seed`.
     ///
     /// # Errors
     /// Names the number that is out of its range, or says that what falls cannot be perturbed.
@@ -159,7 +159,7 @@ impl Velocity {
         .checked()
     }
 
-    /// Whether matter changes its radius.
+    /// Returns whether matter changes its radius.
     pub fn falls(&self) -> bool {
         match self {
             Velocity::Infall { .. } => true,
@@ -192,7 +192,7 @@ impl Velocity {
         self
     }
 
-    /// Whether all perturbations have seeds.
+    /// Returns whether all perturbations have seeds.
     pub fn has_seeds(&self) -> bool {
         match self {
             Velocity::Perturbed(by) => by.seed.is_some() && by.of.has_seeds(),

@@ -49,8 +49,9 @@ impl Perturbation {
         (0..self.rows).map(|k| first + step * k as f64).collect()
     }
 
-    /// What is added to the velocity at each radius. The square root of the covariance comes from its
-    /// eigenvectors: a process that is smooth on the scale of the table has hardly any of full rank.
+    /// Draws the perturbation of the velocity at each radius. The square root of the covariance comes
+    /// from its eigenvectors: a process that is smooth on the scale of the table has hardly any of
+    /// full rank.
     fn draw(&self, radii: &[f64], seed: u64) -> Vec<f64> {
         let covariance = |i: usize, k: usize| {
             let apart = (radii[i] - radii[k]) / self.correlation_length;

@@ -16,7 +16,7 @@ pub struct DiscModel {
     scale: f64,
     inner: f64,
     outer: f64,
-    /// Whether it hides what is behind it.
+    /// True if it hides what is behind it.
     pub opaque: bool,
     color: [f32; 3],
     /// Temperature (K) where the intensity is 1, and colours, of a disc that shines like a black
@@ -33,7 +33,7 @@ pub struct Photon {
     pub lambda: f64,
     /// η = Q/E² in M².
     pub eta: f64,
-    /// Whether light moves outward: where the backward ray falls inward.
+    /// True if light moves outward: where the backward ray falls inward.
     pub outward: bool,
 }
 
@@ -58,7 +58,7 @@ impl DiscModel {
         }
     }
 
-    /// Whether there is disc at radius r (M).
+    /// Returns whether there is disc at radius r (M).
     pub fn covers(&self, r: f64) -> bool {
         (self.inner..=self.outer).contains(&r)
     }
@@ -68,7 +68,7 @@ impl DiscModel {
         [self.inner, self.outer]
     }
 
-    /// Whether some of its matter plunges.
+    /// Returns whether some of its matter plunges.
     pub fn plunges(&self) -> bool {
         self.plunging.is_some()
     }
@@ -78,7 +78,7 @@ impl DiscModel {
         self.plunging.as_ref().filter(|(flow, _)| r < flow.isco())
     }
 
-    /// Whether the matter at radius r (M) plunges.
+    /// Returns whether the matter at radius r (M) plunges.
     pub fn plunges_at(&self, r: f64) -> bool {
         self.plunge_at(r).is_some()
     }

@@ -24,7 +24,7 @@ pub struct GasModel {
     color: [f32; 3],
 }
 
-/// What the flows need of the metric at a point.
+/// Metric at a point, as far as the flows need it.
 struct Metric {
     sin2: f64,
     delta: f64,
@@ -41,12 +41,12 @@ struct Metric {
     big_r: f64,
 }
 
-/// What effects ask of a medium.
+/// Effects on the light of a medium.
 #[derive(Debug, Clone, Copy)]
 pub struct GasEffects {
     /// Spectral index α, if redshift is simulated.
     pub spectral_index: Option<f64>,
-    /// Whether it absorbs.
+    /// True if it absorbs.
     pub absorption: bool,
 }
 

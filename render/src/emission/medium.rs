@@ -1,10 +1,10 @@
-//! What fills space and shines: the interface between sources of volume emission and the sum of
+//! Media that fill space and shine: the interface between sources of volume emission and the sum of
 //! light along a ray.
 
 use kerrlight_geodesic::Quantities;
 use kerrlight_geodesic::simd::RayNodes;
 
-/// What work is done for.
+/// Purpose of work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Part {
@@ -46,14 +46,14 @@ pub trait Medium: core::fmt::Debug + Send + Sync {
     fn part(&self) -> Part;
     /// Radius in M of the sphere outside of which there is nothing.
     fn sphere(&self) -> f64;
-    /// What it is made of, if its light is not smooth along panels of any length.
+    /// Returns the size of its cells, if its light is not smooth along panels of any length.
     fn cell_size(&self) -> Option<CellSize>;
     /// Size of its finest features by their radius, at most about 1: structure of cells is some of them
     /// wide.
     fn relative_size(&self) -> f64 {
         self.cell_size().map_or(1.0, |cell| 2.0 * cell.size / self.sphere())
     }
-    /// What it has to be told of its nodes besides r and cos θ.
+    /// Returns the quantities that it needs at its nodes besides r and cos θ.
     fn quantities(&self) -> Quantities;
     /// Linear colour.
     fn color(&self) -> [f32; 3];
@@ -62,14 +62,14 @@ pub trait Medium: core::fmt::Debug + Send + Sync {
     /// Contravariant Boyer–Lindquist four-velocity of its matter, for polarised light; `None` where
     /// there is none. The azimuth is 0 where it is not among its needs.
     fn four_velocity(&self, r: f64, cos_theta: f64, azimuth: f64) -> Option<[f64; 4]>;
-    /// Whether it looks different at different times.
+    /// Returns whether it looks different at different times.
     fn changes(&self) -> bool;
     /// `false` only if it is dark all along a segment of a ray.
     fn may_shine(&self, segment: &PathSegment, moment: Moment) -> bool {
         let _ = (segment, moment);
         true
     }
-    /// Whether [`fill`](Self::fill) gives absorption.
+    /// Returns whether [`fill`](Self::fill) gives absorption.
     fn absorbs(&self) -> bool;
     /// Appends emission and absorption at the nodes of a ray with angular momentum `lambda`.
     fn fill(&self, nodes: &RayNodes<'_>, lambda: f64, moment: Moment, out: &mut Emission);
@@ -115,7 +115,7 @@ impl CellSize {
 pub struct Moment {
     /// Time of observation, in M.
     pub observed: f64,
-    /// Whether light takes its time.
+    /// True if light takes its time.
     pub slow_light: bool,
 }
 

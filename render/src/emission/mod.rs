@@ -1,4 +1,4 @@
-//! What shines. A source knows its light in the gas frame and how its gas moves; how light
+//! Sources of light. A source knows its light in the gas frame and how its gas moves; how light
 //! adds up along a ray is the business of [`transport`](crate::transport).
 
 pub mod black_body;

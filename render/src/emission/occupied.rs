@@ -131,7 +131,7 @@ impl Occupied {
         }
     }
 
-    /// Whether a brick shines in a range of radius, height and azimuth.
+    /// Returns whether a brick shines in a range of radius, height and azimuth.
     fn shines(&self, extent: &Extent) -> bool {
         let Some([radii, heights]) = self.flat(extent) else { return false };
         let [_, nh, np] = self.count;
@@ -144,8 +144,8 @@ impl Occupied {
         self.around(extent[2]).iter().any(some)
     }
 
-    /// Whether there may be light along a segment of a ray: `turned(radii)` is the range of angles
-    /// by which matter between two radii has turned by the time.
+    /// Returns whether there may be light along a segment of a ray: `turned(radii)` is the range of angles by which
+    /// matter between two radii has turned by the time.
     pub fn may_shine(
         &self,
         segment: &PathSegment,
@@ -165,8 +165,8 @@ impl Occupied {
         self.shines(&[segment.radii, heights, azimuths])
     }
 
-    /// Whether there may be light along a segment of a ray whose matter has come from other radii, the least and the
-    /// largest of which these are.
+    /// Returns whether there may be light along a segment of a ray whose matter has come from other radii, the least
+    /// and the largest of which these are.
     pub fn may_shine_from(&self, segment: &PathSegment, labels: [f64; 2]) -> bool {
         let missed = labels[1] < self.radii[0] || labels[0] > self.radii[1];
         if self.sums.is_empty() || missed {
@@ -206,7 +206,7 @@ impl Occupied {
     }
 }
 
-/// What rounding may do to an angle, and, times its distance, to a length.
+/// Largest effect of rounding on an angle, and, times its distance, on a length.
 const ROUNDING: f64 = 1e-9;
 
 fn unit(x: [f64; 3]) -> [f64; 3] {

@@ -91,7 +91,7 @@ impl SpotModel {
         distance(ends[0], ends[1]) + reach[0].max(reach[1]) * wound
     }
 
-    /// What differential rotation adds to the length (M) of a piece of path in comoving coordinates. The
+    /// Returns the length (M) that differential rotation adds to a piece of path in comoving coordinates. The
     /// angles by which time and by which radius make matter turn do not cancel.
     pub fn sheared_length(&self, [a, b]: [MatterPoint; 2]) -> f64 {
         let by_time = (a.rate * (a.time - b.time)).abs();
@@ -186,8 +186,8 @@ impl SpotModel {
         (self.start, self.axis, self.orbit)
     }
 
-    /// Whether a piece of path with these ends and this length, all in comoving
-    /// coordinates, misses the spot.
+    /// Returns whether a piece of path with these ends and this length, all in comoving coordinates, misses the
+    /// spot.
     pub fn is_missed(&self, carried: [&Comoving; 2], length: f64) -> bool {
         let [a, b] = carried.map(|c| c.position);
         let middle = core::array::from_fn(|k| 0.5 * (a[k] + b[k]));

@@ -108,7 +108,7 @@ impl SpotModel {
         [extremes.map(|[low, _]| low - reach), extremes.map(|[_, high]| high + reach)]
     }
 
-    /// Whether the spot can shine from a part of it at some moment between two times.
+    /// Returns whether the spot can shine from a part of it at some moment between two times.
     pub fn shines_from(&self, part: &SpotPart, [from, to]: [f64; 2]) -> bool {
         let since = self.sheared_since().unwrap_or(f64::NEG_INFINITY);
         if to < since {
@@ -125,8 +125,8 @@ impl SpotModel {
             || (a - c).rem_euclid(TAU) <= own
     }
 
-    /// Whether it can come within `epsilon` of a chord between two times: a rigid spot's ball and
-    /// the way that its centre makes. (Of a sheared one its parts say all.)
+    /// Returns whether it can come within `epsilon` of a chord between two times: a rigid spot's
+    /// ball and the way that its centre makes. (Of a sheared one its parts say all.)
     pub fn comes_near(&self, [a, b]: [[f64; 3]; 2], epsilon: f64, [from, to]: [f64; 2]) -> bool {
         if self.sheared_since().is_some() {
             return true;

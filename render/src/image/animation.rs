@@ -21,7 +21,7 @@ pub enum AnimationError {
 pub struct Palette {
     /// R, G, B of each colour.
     colors: Vec<u8>,
-    /// What finds the nearest of many; few are all there.
+    /// Index of the nearest of many colours; few are all there.
     quantizer: Option<NeuQuant>,
     known: HashMap<[u8; 3], u8>,
 }

@@ -42,7 +42,7 @@ pub(crate) fn linear_colors(bytes: &[u8]) -> Result<Colors, ImageError> {
     Ok(Colors { width, height, pixels })
 }
 
-/// What the header of a Radiance HDR has multiplied red, green and blue by.
+/// Returns the factors by which the header of a Radiance HDR has multiplied red, green and blue.
 fn exposure(bytes: &[u8]) -> Result<[f32; 3], ImageError> {
     let header = HdrDecoder::new(Cursor::new(bytes))?.metadata();
     let (r, g, b) = header.color_correction.unwrap_or((1.0, 1.0, 1.0));

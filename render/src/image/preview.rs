@@ -5,7 +5,7 @@ use super::colormap::Colormap;
 use crate::Error;
 use std::io::Cursor;
 
-/// What a preview shows.
+/// Choice of the values that a preview shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Look {
     /// The intensity through a colour map.

@@ -1,4 +1,4 @@
-//! What pictures say of their colours, where these are not those of sRGB (IEC 61966-2-1), as which they are taken.
+//! Colour profiles of pictures that are not sRGB (IEC 61966-2-1), the default.
 
 use super::decode::reader;
 use image::codecs::hdr::HdrDecoder;

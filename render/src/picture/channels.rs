@@ -1,5 +1,4 @@
-//! What a picture can hold: the one list of channels that rendering, `inspect` and the
-//! documents share.
+//! Channels of pictures: the one list that rendering, `inspect` and the documents share.
 
 use super::pixels::Pixel;
 use crate::scene::DEFAULT_CHANNELS;
@@ -7,7 +6,7 @@ use crate::transport::Layers;
 use crate::transport::PreparedScene;
 use kerrlight_geodesic::Outcome;
 
-/// Whether a scene has a channel, with pixels refined or not.
+/// Tests whether a scene has a channel, with pixels refined or not.
 pub(super) type Present = fn(&PreparedScene, bool) -> bool;
 
 pub(super) fn always(_: &PreparedScene, _: bool) -> bool {
@@ -20,15 +19,15 @@ pub struct ChannelKind {
     pub name: &'static str,
     /// Unit, empty for a number without one.
     pub unit: &'static str,
-    /// What it holds.
+    /// Meaning of its values.
     pub meaning: &'static str,
-    /// Whether a scene has it, with pixels refined or not.
+    /// Tests whether a scene has it, with pixels refined or not.
     pub(super) present: Present,
     /// How it is taken from a pixel.
     value: Value,
-    /// Whether pictures have it only where `screen.channels` names it or its layer.
+    /// True if pictures have it only where `screen.channels` names it or its layer.
     pub on_request: bool,
-    /// Whether it is in the unit of intensity.
+    /// True if it is in the unit of intensity.
     pub(super) scales: bool,
 }
 
@@ -58,7 +57,7 @@ impl ChannelKind {
         }
     }
 
-    /// Whether a name in `screen.channels` means it.
+    /// Returns whether a name in `screen.channels` means it.
     pub(super) fn is_meant(&self, name: &str) -> bool {
         let default = name == DEFAULT_CHANNELS && !self.on_request;
         name == self.name || name == self.layer() || default

@@ -35,7 +35,7 @@ pub(super) fn chosen(
     }
 }
 
-/// What the channels of a picture hold, for whoever opens its file.
+/// Describes the channels of a picture, for whoever opens its file.
 pub(super) fn legend(channels: &[&ChannelKind]) -> String {
     let line = |kind: &&ChannelKind| {
         let unit = if kind.unit.is_empty() { String::new() } else { format!(" ({})", kind.unit) };

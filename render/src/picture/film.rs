@@ -58,8 +58,8 @@ impl Film {
         (MOST_VALUES / (pixels * self.names().len().max(1))).clamp(1, MOST_FRAMES)
     }
 
-    /// Whether rays have to be traced anew for every frame: the camera moves, or pixels are refined
-    /// where the light is.
+    /// Returns whether rays have to be traced anew for every frame: the camera moves, or pixels are
+    /// refined where the light is.
     fn one_by_one(&self) -> bool {
         self.camera_moves() || self.raster.scene().screen.image_error.is_some()
     }
@@ -68,7 +68,7 @@ impl Film {
         self.raster.scene().camera.as_ref().is_some_and(|camera| !camera.key.is_empty())
     }
 
-    /// Whether anything in the scene changes with time.
+    /// Returns whether anything in the scene changes with time.
     pub fn changes(&self) -> bool {
         self.camera_moves() || self.raster.scene().changes()
     }
@@ -84,7 +84,7 @@ impl Film {
         self.raster.device()
     }
 
-    /// What of the scene is traced on this processor even so.
+    /// Returns the parts of the scene that are traced on this processor even so.
     pub fn beside_device(&self) -> Vec<&'static str> {
         self.raster.beside_device()
     }
@@ -94,7 +94,7 @@ impl Film {
         self.raster.names()
     }
 
-    /// What the channels hold.
+    /// Describes the channels.
     pub fn legend(&self) -> String {
         self.raster.legend()
     }
@@ -107,7 +107,7 @@ impl Film {
         self.raster.camera_at(frame.time)
     }
 
-    /// What the numbers in the channel `id` stand for: see [`Raster::identifiers`].
+    /// Describes the numbers in the channel `id`: see [`Raster::identifiers`].
     pub fn identifiers(&self) -> Option<String> {
         self.raster.identifiers()
     }

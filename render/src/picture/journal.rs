@@ -1,6 +1,6 @@
-//! What is rendered so far, band by band, in a file that survives a kill: a head that says
-//! which picture it is of, then one record a band with its compressed values and sums. A record
-//! counts only with its checksum, so that a torn one is rendered again.
+//! Journal of the bands that are rendered, in a file that survives a kill: a head that says which
+//! picture it is of, then one record a band with its compressed values and sums. A record counts
+//! only with its checksum, so that a torn one is rendered again.
 
 use super::tally::Tally;
 use kerrlight_common::memory::Scratch;
@@ -33,7 +33,7 @@ struct Record {
     tally: Tally,
 }
 
-/// What a file held before.
+/// Contents of a file before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Found {
     /// Nothing.

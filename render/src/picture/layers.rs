@@ -1,4 +1,4 @@
-//! What is kept of pixels besides their light.
+//! Layers of pixels besides their light.
 
 use super::grid::Grid;
 use crate::Error;

@@ -102,7 +102,7 @@ const TILE: usize = 64;
 /// The same for devices, which take many rays at a time.
 const DEVICE_TILE: usize = 2048;
 
-/// What resolves photon rings, if the scene has them resolved.
+/// Returns the resolver of photon rings, if the scene has them resolved.
 fn resolver(scene: &Scene, prepared: &PreparedScene) -> Option<Resolver> {
     match scene.screen.rings {
         Rings::Resolved => Resolver::new(prepared, &Grid::new(scene), scene.screen.image_error),
@@ -145,7 +145,7 @@ impl Raster {
         self.prepared.tracer().device()
     }
 
-    /// What of the scene is traced on this processor even so.
+    /// Returns the parts of the scene that are traced on this processor even so.
     pub fn beside_device(&self) -> Vec<&'static str> {
         self.prepared.beside_device()
     }
@@ -214,12 +214,12 @@ impl Raster {
         self.channels.iter().map(|kind| kind.name).collect()
     }
 
-    /// What the channels hold.
+    /// Describes the channels.
     pub fn legend(&self) -> String {
         choice::legend(&self.channels)
     }
 
-    /// What the numbers in the channel `id` stand for, a line for each; nothing without that channel.
+    /// Describes the numbers in the channel `id`, a line for each; nothing without that channel.
     pub fn identifiers(&self) -> Option<String> {
         self.names().contains(&"id").then_some(())?;
         let names = names(&self.scene).into_iter().enumerate();

@@ -30,7 +30,7 @@ pub(super) struct Pixel {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Pixels {
     pub pixels: Vec<Pixel>,
-    /// What is kept of them besides: as many, or none.
+    /// Their other layers: as many, or none.
     pub layers: Vec<Layers>,
 }
 

@@ -8,7 +8,7 @@ use crate::transport::{FAR, view};
 use kerrlight_geodesic::vector::dot;
 use kerrlight_geodesic::{Camera, Observer, View};
 
-/// What a camera sees lies between these distances, in M.
+/// Range of distances of a camera's view, in M.
 const DEPTHS: [f64; 2] = [0.1, 1e5];
 
 /// Where a view is in flat space: its place (M), and its axes to the right, up and back.

@@ -1,4 +1,4 @@
-//! What a prepared scene computes, and what it leaves out.
+//! Plan of a prepared scene: what is computed, and what is left out.
 
 use super::Raster;
 use crate::emission::medium::{Medium, Part};
@@ -11,13 +11,13 @@ use kerrlight_geodesic::Method;
 pub struct Step {
     /// Whose cost it is part of.
     pub part: Part,
-    /// What is computed, or what is not.
+    /// Effect or quantity that is computed, or not.
     pub what: String,
-    /// Whether it is computed.
+    /// True if it is computed.
     pub done: bool,
 }
 
-/// What is computed for a picture.
+/// Plan of a picture.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Plan {
     /// All steps, those that are left out too.
@@ -25,7 +25,7 @@ pub struct Plan {
 }
 
 impl Raster {
-    /// What is computed for the picture.
+    /// Returns the plan of the picture.
     pub fn plan(&self) -> Plan {
         Plan::of(&self.prepared)
     }
@@ -66,7 +66,7 @@ impl Plan {
         self.either(Part::Rays, prepared.polarization()[0], [carried, none]);
     }
 
-    /// What channels on request need.
+    /// Adds the needs of channels on request.
     fn layers(&mut self, prepared: &PreparedScene) {
         let wanted = prepared.wanted();
         for (done, what) in [

@@ -98,7 +98,7 @@ impl Raster {
         Ok(())
     }
 
-    /// What is rendered.
+    /// Returns the rendered scene.
     pub(crate) fn scene(&self) -> &Scene {
         &self.scene
     }

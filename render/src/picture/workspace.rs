@@ -15,7 +15,7 @@ pub(super) struct Workspace {
     pub beta: Vec<f64>,
     pub squares: Vec<Square>,
     pub seen: Vec<RayResult>,
-    /// What is kept of the rays besides, if anything is wanted.
+    /// Other layers of the rays, if any are wanted.
     pub layers: Vec<Layers>,
 }
 
@@ -45,7 +45,7 @@ impl Workspace {
         &self.squares
     }
 
-    /// What all rays see, in their order.
+    /// Returns the results of all rays, in their order.
     pub fn observe(&mut self, prepared: &PreparedScene) -> Result<&[RayResult], Error> {
         self.seen.clear();
         self.seen.resize(self.alpha.len(), RayResult::default());
@@ -61,7 +61,8 @@ impl Workspace {
         self.alpha.len()
     }
 
-    /// What a block of rays sees at each of `times`: ray k at time j is `[j · rays + k]`.
+    /// Returns the results of a block of rays at each of `times`: ray k at time j is `[j · rays +
+    /// k]`.
     pub fn observe_at(
         &mut self,
         prepared: &PreparedScene,

@@ -6,7 +6,7 @@ use kerrlight_geodesic::{ScreenPoint, ZamoFrame};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What the components of a field are along.
+/// Directions of a field's components.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Components {
@@ -20,7 +20,7 @@ pub enum Components {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FieldFrame {
-    /// What the gas measures; orthonormal only.
+    /// Frame of the gas; orthonormal only.
     Gas,
     /// Bⁱ of ideal magnetohydrodynamics: bᵗ = Bⁱ u_i, bⁱ = (Bⁱ + bᵗ uⁱ)/uᵗ.
     Ideal,
@@ -28,7 +28,7 @@ pub enum FieldFrame {
     Lowered,
 }
 
-/// What the strength of the field is measured in.
+/// Unit of the field's strength.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Normalisation {
@@ -63,7 +63,7 @@ pub struct MixedField {
 pub struct PolarizationLaw {
     /// B^r = radial sinⁿθ + vertical cos θ, B^θ = −vertical sin θ, B^φ = toroidal, with n = radial_sine_power.
     pub field: MixedField,
-    /// What the components are along.
+    /// Directions of the components.
     pub components: Components,
     /// Whose components they are.
     pub frame: FieldFrame,
@@ -79,7 +79,7 @@ pub struct PolarizationLaw {
     /// Linearly polarised part of the light.
     #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "a part of the light"))]
     pub fraction: f64,
-    /// What |b| is measured in.
+    /// Unit of |b|.
     pub normalisation: Normalisation,
     /// Added to all position angles on the sky, degrees east of north.
     #[schemars(range(min = -360.0, max = 360.0), extend("unit" = "degrees east of north"))]
@@ -147,7 +147,7 @@ impl PolarizationLaw {
         measured.iter().all(|component| component.is_finite()).then_some(measured)
     }
 
-    /// What a ray sees of gas; `None` where the gas is dark.
+    /// Returns the view of gas along a ray; `None` where the gas is dark.
     pub fn view(
         &self,
         frame: &ZamoFrame,

@@ -80,8 +80,8 @@ impl PowerLaw {
         Stokes { i, q: p * view.direction[0], u: p * view.direction[1], v }
     }
 
-    /// What a thin layer parallel to the equatorial plane adds per thickness:
-    /// g^{3+α} (ℓ_p/H) j (Narayan et al. 2021, eqs. 18 and 19). `None` where the ray runs along the layer.
+    /// Returns the light per thickness of a thin layer parallel to the equatorial plane: g^{3+α} (ℓ_p/H) j
+    /// (Narayan et al. 2021, eqs. 18 and 19). `None` where the ray runs along the layer.
     pub fn of_layer(&self, view: &SynchrotronView) -> Option<Stokes> {
         let depth = power(view.redshift, 3.0 + self.index) * view.slant;
         depth.is_finite().then(|| self.emissivity(view) * depth)

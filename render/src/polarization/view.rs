@@ -1,4 +1,4 @@
-//! What a ray sees of the field in moving gas.
+//! View of the field in moving gas along a ray.
 
 use super::{Gas, MagneticField};
 use kerrlight_geodesic::{Kerr, ScreenPoint, ZamoFrame};

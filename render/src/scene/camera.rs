@@ -242,7 +242,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), Invalid> {
     Ok(())
 }
 
-/// What a camera takes the place of must not be given.
+/// Refuses keys whose place a camera takes.
 fn check_rivals(scene: &Scene) -> Result<(), Invalid> {
     let (observer, screen) = (&scene.observer, &scene.screen);
     let rivals = [

@@ -1,4 +1,4 @@
-//! What values of sources need of each other: gas, discs, spots, meshes and the sky.
+//! Checks of sources whose values depend on each other: gas, discs, spots, meshes and the sky.
 
 use super::invalid::{Invalid, number, positive};
 use super::{Disc, Gas, Mesh, Sky, Spot};

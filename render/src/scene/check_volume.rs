@@ -1,4 +1,4 @@
-//! What values of a volume need of each other.
+//! Checks of volumes whose values depend on each other.
 
 use super::invalid::{Invalid, number, positive};
 use super::{Rotation, Scene, VolumeRegion, VolumeSource, rotation};

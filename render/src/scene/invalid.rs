@@ -21,7 +21,7 @@ pub enum SceneError {
         key: String,
         /// The value that was given.
         value: String,
-        /// What would be allowed.
+        /// Allowed values.
         allowed: String,
     },
     /// A key that this scene needs.
@@ -77,7 +77,7 @@ impl Invalid {
         Invalid { key: key.into(), value: Some(value.to_string()), allowed: allowed.into() }
     }
 
-    /// What the number of a part refuses, with the key of that part.
+    /// Returns the refusal of a number of a part, with the key of that part.
     pub(super) fn of(part: &str, error: &Error) -> Self {
         let key = format!("{part}{}", error.field().unwrap_or_default());
         let allowed = error.allowed().map_or_else(|| error.to_string(), str::to_owned);

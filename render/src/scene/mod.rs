@@ -97,7 +97,7 @@ pub struct Scene {
     /// Surfaces given as triangles.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub mesh: Vec<Mesh>,
-    /// What the rays that escape see: one of four. It adds to R, G, B only.
+    /// Sky that rays which escape see: one of four. It adds to R, G, B only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sky: Option<Sky>,
 }
@@ -173,7 +173,7 @@ impl Default for ObserverConfig {
     }
 }
 
-/// What part of the sky is rendered. Exactly one of the two fields of view must be given.
+/// Part of the sky that is rendered. Exactly one of the two fields of view must be given.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Screen {
@@ -212,7 +212,7 @@ pub struct Screen {
     pub channels: Option<Vec<String>>,
 }
 
-/// What `screen.channels` calls the channels that are kept without it.
+/// Name in `screen.channels` of the channels that are kept without it.
 pub const DEFAULT_CHANNELS: &str = "default";
 
 fn one() -> u32 {
@@ -249,10 +249,10 @@ pub struct Effects {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -8.0, max = 12.0), extend("unit" = "an exponent"))]
     pub redshift_power: Option<f64>,
-    /// Whether emission is evaluated at the time when the light passed.
+    /// True if emission is evaluated at the time when the light passed.
     #[serde(default)]
     pub slow_light: bool,
-    /// Whether gas absorbs what is behind it.
+    /// True if gas absorbs what is behind it.
     #[serde(default)]
     pub absorption: bool,
     /// Order of the last lensed image to include; 0: the direct image only; all without it.
@@ -319,13 +319,13 @@ impl Screen {
         self.height.unwrap_or(self.width)
     }
 
-    /// Whether the picture keeps a channel that is kept unless others are requested.
+    /// Returns whether the picture keeps a channel that is kept unless others are requested.
     pub fn keeps(&self, channel: &str) -> bool {
         let all = |names: &Vec<String>| names.iter().any(|name| name == DEFAULT_CHANNELS);
         self.channels.as_ref().is_none_or(all) || self.asks(channel)
     }
 
-    /// Whether a channel is requested, by its name or with its layer.
+    /// Returns whether a channel is requested, by its name or with its layer.
     pub fn asks(&self, channel: &str) -> bool {
         let layer = channel.split_once('.').map(|(layer, _)| layer);
         let named = |name: &String| name == channel || layer.is_some_and(|layer| name == layer);
@@ -352,7 +352,7 @@ impl Scene {
         &KEYS
     }
 
-    /// Whether it has a source whose light counts for `intensity`: any but a sky.
+    /// Returns whether it has a source whose light counts for `intensity`: any but a sky.
     pub fn has_emission(&self) -> bool {
         let lists = [self.spot.is_empty(), self.volume.is_empty(), self.mesh.is_empty()];
         self.disc.is_some() || self.gas.is_some() || lists.contains(&false)
@@ -371,7 +371,7 @@ impl Scene {
         toml_file::write(&scene).expect("plain tables always serialise") // no maps with odd keys
     }
 
-    /// Whether what shines changes with time.
+    /// Returns whether what shines changes with time.
     pub fn changes(&self) -> bool {
         let moves = |volume: &VolumeSource| {
             volume.rotation != Rotation::None || volume.injection_time.is_some()

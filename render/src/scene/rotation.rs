@@ -31,7 +31,7 @@ pub(super) enum Word {
     Keplerian,
 }
 
-/// What stands in a file.
+/// Keys of a rotation in a file.
 #[derive(JsonSchema)]
 #[schemars(untagged)]
 #[expect(dead_code, reason = "its schema is all that is needed of it")]

@@ -1,4 +1,4 @@
-//! What shines: gas, disc, hot spots, meshes and skies.
+//! Sources of light: gas, disc, hot spots, meshes and skies.
 
 use super::rotation::Rotation;
 use schemars::JsonSchema;
@@ -82,7 +82,7 @@ pub struct Disc {
     /// wherever the inner edge is.
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "scene units"))]
     pub peak_intensity: f64,
-    /// Whether it hides what is behind it.
+    /// True if it hides what is behind it.
     pub opaque: bool,
     /// Temperature at the flux peak, K: black-body colours; with redshift only with `spectral_index = 1`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -172,7 +172,7 @@ pub struct Mesh {
     #[serde(default)]
     #[schemars(range(min = -3600.0, max = 3600.0), extend("unit" = "degrees"))]
     pub rotation_deg: f64,
-    /// Whether it hides what is behind it.
+    /// True if it hides what is behind it.
     pub opaque: bool,
     /// Intensity in the frame of the surface where its colour is 1; 0: black.
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "scene units"))]
@@ -267,13 +267,13 @@ pub struct VolumeRegion {
 }
 
 impl VolumeRegion {
-    /// Whether a point at height z and radius r (both in M) lies in it.
+    /// Returns whether a point at height z and radius r (both in M) lies in it.
     pub fn holds(&self, z: f64, r: f64) -> bool {
         r >= self.r_min && r < self.r_max && self.z_width.is_none_or(|width| z.abs() <= width)
     }
 }
 
-/// What the rays that escape see: `[sky.checker]`, `[sky.stars]`, `[sky.catalogue]` or `[sky.image]`.
+/// Sky that rays which escape see: `[sky.checker]`, `[sky.stars]`, `[sky.catalogue]` or `[sky.image]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
 #[non_exhaustive]

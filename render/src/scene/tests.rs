@@ -205,7 +205,7 @@ fn exact_a_screen_is_square_without_a_height() {
     assert!(error("height = 64", "height = 0").contains("`screen.height` = 0"));
 }
 
-/// What is in M needs neither mass nor distance; what is not says what to write.
+/// Scenes in M need neither mass nor distance; others are refused with what to write.
 #[test]
 fn exact_mass_and_distance_are_needed_where_they_matter() {
     let bare = SCENE.replacen("mass_msun = 4.154e6\ndistance_kpc = 8.178\n", "", 1);
@@ -271,7 +271,7 @@ fn exact_volumes_turn_as_fits_let_them() {
     assert_ne!(drawn(3), drawn(4));
 }
 
-/// What is wrong with the numbers of a law.
+/// Bad numbers of a law are named.
 #[test]
 fn bad_laws_of_volumes_are_named() {
     for (law, says) in [

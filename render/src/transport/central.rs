@@ -1,5 +1,5 @@
-//! What is known of the central ray of a pixel besides its light, on request: path length, motion on the picture, and what
-//! the pixel covers of the sky. These rays are traced once more, step by step.
+//! Central rays of pixels besides their light, on request: path length, motion on the picture, and the part of the sky that
+//! the pixel covers. These rays are traced once more, step by step.
 
 use super::layers::{Kind, Layers, Origin};
 use super::optics::in_cartesian;

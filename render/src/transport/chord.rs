@@ -40,7 +40,7 @@ pub struct ChordBound {
     quartic: f64,
     /// Mino time and w of the radial turning point.
     turning: Option<[f64; 2]>,
-    /// What the tracer's own error adds: times r (1 + r/b).
+    /// Largest contribution of the tracer's own error: times r (1 + r/b).
     slack: f64,
     /// 1/b.
     inverse_impact: f64,
@@ -92,12 +92,12 @@ impl ChordBound {
         0.125 * self.curvature(most) * step * step
     }
 
-    /// What the tracer's own error may amount to at radius r.
+    /// Returns the largest contribution of the tracer's own error at radius r.
     pub fn error(&self, r: f64) -> f64 {
         self.slack * r * (1.0 + r * self.inverse_impact)
     }
 
-    /// Whether part of the piece is so close to the horizon that chords say nothing.
+    /// Returns whether part of the piece is so close to the horizon that chords say nothing.
     pub fn winds(&self, ends: [&PathPoint; 2]) -> bool {
         self.spin > 0.0 && self.gap(self.extent(ends)[1]) < NEXT_TO_HORIZON
     }

@@ -1,5 +1,5 @@
-//! What is known of a ray besides its light, on request: opacity, the sky apart from emission, lensed images apart, and
-//! where its brightest contribution comes from.
+//! Layers of a ray besides its light, on request: opacity, the sky apart from emission, lensed images apart, and where
+//! its brightest contribution comes from.
 
 use crate::scene::Scene;
 use kerrlight_geodesic::{Outcome, TracedRay};
@@ -7,7 +7,7 @@ use kerrlight_geodesic::{Outcome, TracedRay};
 /// Images that are kept apart: n = 0, n = 1, and all from n = 2 on.
 pub(crate) const ORDERS: usize = 3;
 
-/// What is kept of rays besides their light.
+/// Selection of layers of rays besides their light.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Wanted {
     /// Anything at all.
@@ -20,12 +20,12 @@ pub(crate) struct Wanted {
     pub depth: bool,
     /// Motion of the brightest contribution to the central ray.
     pub motion: bool,
-    /// What the pixel covers of the sky.
+    /// True if the part of the sky that the pixel covers is wanted.
     pub footprint: bool,
 }
 
 impl Wanted {
-    /// What the channels of a scene need.
+    /// Returns the layers that the channels of a scene need.
     pub fn new(scene: &Scene) -> Self {
         let asks = |names: &[&str]| names.iter().any(|name| scene.screen.asks(name));
         let colors = |layer: &str| ["R", "G", "B"].iter().any(|c| asks(&[&format!("{layer}.{c}")]));
@@ -37,13 +37,13 @@ impl Wanted {
         Wanted { any, orders, exit, depth, motion, footprint }
     }
 
-    /// Whether central rays are traced once more.
+    /// Returns whether central rays are traced once more.
     pub fn central(&self) -> bool {
         self.depth || self.motion || self.footprint
     }
 }
 
-/// What is averaged over the rays of a pixel.
+/// Quantities averaged over the rays of a pixel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Mixed {
     /// Share of the light from behind everything that is held up: 1 at the horizon and at opaque surfaces, 1 − e^−D in
@@ -89,10 +89,10 @@ pub(crate) struct Origin {
     pub mino_time: f64,
 }
 
-/// What is known of a ray besides its light.
+/// Layers of a ray besides its light.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Layers {
-    /// What is averaged.
+    /// Averaged quantities.
     pub mixed: Mixed,
     /// The brightest contribution, or else the surface that it ends at.
     pub origin: Option<Origin>,
@@ -131,7 +131,7 @@ impl Layers {
     }
 }
 
-/// What is gathered along one ray.
+/// Record gathered along one ray.
 #[derive(Debug, Clone)]
 pub(super) struct Record {
     /// Mino times in M⁻¹ from which on light is of the next image.
@@ -188,7 +188,7 @@ impl Numbering {
         Numbering { disc, media, spots, meshes, end: meshes + scene.mesh.len() as u32 }
     }
 
-    /// What a source is.
+    /// Returns the kind of a source.
     pub fn kind(&self, source: u32) -> Kind {
         let from =
             |first: u32| (first..self.end).contains(&source).then(|| (source - first) as usize);

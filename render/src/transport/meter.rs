@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 pub struct Meter {
     on: bool,
     spent: [Duration; 6],
-    /// What is worked on, and since when.
+    /// Current part of the work, and its start.
     current: Option<(Part, Instant)>,
 }
 

@@ -1,4 +1,4 @@
-//! What every source of light needs to know of the scene besides itself.
+//! Optics: properties of the scene that every source of light needs.
 
 use super::layers::{Numbering, Wanted};
 use super::polarized::{Polarization, PolarizedRay};
@@ -14,16 +14,16 @@ pub(super) struct Optics {
     pub tolerance: f64,
     /// Spectral index α, if redshift is simulated.
     pub spectral_index: Option<f64>,
-    /// Whether light is seen as it was when it passed, not as it is at the time of observation.
+    /// True if light is seen as it was when it passed, not as it is at the time of observation.
     pub slow_light: bool,
-    /// Whether rays are bent.
+    /// True if rays are bent.
     pub lensing: bool,
-    /// Whether every spot and every triangle is asked along every ray, without a hierarchy.
+    /// True if every spot and every triangle is asked along every ray, without a hierarchy.
     pub one_by_one: bool,
-    /// What is recorded of the brightest contribution to a pixel.
+    /// Quantities recorded of the brightest contribution to a pixel.
     pub recorded: Quantities,
     pub polarization: Option<Polarization>,
-    /// What is kept of rays besides their light.
+    /// Layers of rays besides their light.
     pub wanted: Wanted,
     pub numbering: Numbering,
 }
@@ -34,7 +34,7 @@ impl Optics {
         if self.slow_light { time - point.delay } else { time }
     }
 
-    /// What is computed at the nodes in a medium besides r and cos θ.
+    /// Returns the quantities computed at the nodes in a medium besides r and cos θ.
     pub fn quantities_of(&self, medium: &dyn Medium) -> Quantities {
         let velocity = self.polarization.is_some();
         let polarized = Quantities { velocity, ..Quantities::default() };
@@ -51,7 +51,7 @@ impl Optics {
         Some(PolarizedRay { hole: &self.hole, polarization, screen, lambda })
     }
 
-    /// What a camera's motion does to frequencies at (x, y), if redshift is simulated.
+    /// Returns the frequency shift by a camera's motion at (x, y), if redshift is simulated.
     #[inline]
     pub fn blueshift(&self, x: f64, y: f64) -> Option<f64> {
         self.spectral_index.and_then(|_| self.view.blueshift(x, y))

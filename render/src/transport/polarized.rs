@@ -29,7 +29,7 @@ impl Polarization {
         Ok(Some(Polarization { law, circular, field }))
     }
 
-    /// Whether V is computed.
+    /// Returns whether V is computed.
     pub fn is_circular(&self) -> bool {
         self.circular
     }

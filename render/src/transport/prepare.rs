@@ -153,7 +153,7 @@ impl PreparedScene {
         Ok(prepared)
     }
 
-    /// What is needed of each ray.
+    /// Returns the quantities needed of each ray.
     fn needs(&self, half_orbits: Option<u32>) -> BlockRequest {
         BlockRequest {
             crossings: self.disc.as_ref().map_or(0, Disc::crossings),
@@ -198,7 +198,7 @@ impl PreparedScene {
         PreparedScene { tracer: self.tracer.with_device(device), ..self }
     }
 
-    /// What is traced on this processor where rays are traced on a device.
+    /// Returns the parts that are traced on this processor where rays are traced on a device.
     pub fn beside_device(&self) -> Vec<&'static str> {
         if !self.optics.lensing {
             return vec!["everything (lensing is off)"];
@@ -235,47 +235,47 @@ impl PreparedScene {
         self.time
     }
 
-    /// What traces its rays.
+    /// Returns the tracer of its rays.
     pub fn tracer(&self) -> &BlockTracer {
         &self.tracer
     }
 
-    /// What is traced of each ray.
+    /// Returns the request of each ray.
     pub fn request(&self) -> &BlockRequest {
         &self.request
     }
 
-    /// Whether rays are bent.
+    /// Returns whether rays are bent.
     pub fn has_lensing(&self) -> bool {
         self.optics.lensing
     }
 
-    /// Whether light is seen as it was when it passed, not as it is at the time of observation.
+    /// Returns whether light is seen as it was when it passed, not as it is at the time of observation.
     pub fn has_slow_light(&self) -> bool {
         self.optics.slow_light
     }
 
-    /// What fills space: gas and volumes.
+    /// Returns the media that fill space: gas and volumes.
     pub fn media(&self) -> impl Iterator<Item = &dyn Medium> {
         self.media.iter()
     }
 
-    /// What is computed at the nodes in a medium besides r and cos θ.
+    /// Returns the quantities computed at the nodes in a medium besides r and cos θ.
     pub fn quantities_of(&self, medium: &dyn Medium) -> Quantities {
         self.optics.quantities_of(medium)
     }
 
-    /// Whether there is a disc.
+    /// Returns whether there is a disc.
     pub fn has_disc(&self) -> bool {
         self.disc.is_some()
     }
 
-    /// Whether there is a disc some of whose matter plunges.
+    /// Returns whether there is a disc some of whose matter plunges.
     pub fn has_plunging_disc(&self) -> bool {
         self.disc.as_ref().is_some_and(Disc::plunges)
     }
 
-    /// Whether there are triangle meshes.
+    /// Returns whether there are triangle meshes.
     pub fn has_meshes(&self) -> bool {
         self.meshes.is_some()
     }
@@ -301,39 +301,39 @@ impl PreparedScene {
         self.sky.as_ref().map(Sky::model)
     }
 
-    /// Whether the sky is averaged over the beams of rays.
+    /// Returns whether the sky is averaged over the beams of rays.
     pub fn averages_sky(&self) -> bool {
         self.sky.as_ref().is_some_and(Sky::is_averaged)
     }
 
-    /// Whether g is computed.
+    /// Returns whether g is computed.
     pub fn has_redshift(&self) -> bool {
         self.optics.spectral_index.is_some()
     }
 
-    /// Whether light is polarised, and whether circularly too.
+    /// Returns whether light is polarised, and whether circularly too.
     pub fn polarization(&self) -> [bool; 2] {
         let circular = self.optics.polarization.as_ref().map(Polarization::is_circular);
         [circular.is_some(), circular == Some(true)]
     }
 
-    /// What is kept of rays besides their light.
+    /// Returns the layers of rays besides their light.
     pub(crate) fn wanted(&self) -> Wanted {
         self.optics.wanted
     }
 
-    /// Whether anything shines or is opaque but the hole.
+    /// Returns whether anything shines or is opaque but the hole.
     pub fn has_sources(&self) -> bool {
         let solid = self.disc.is_some() || self.meshes.is_some();
         solid || self.media.len() > 0 || !self.spots.is_empty()
     }
 
-    /// Whether anything absorbs.
+    /// Returns whether anything absorbs.
     pub fn absorbs(&self) -> bool {
         self.media.absorb()
     }
 
-    /// Whether there is a disc that hides what is behind it.
+    /// Returns whether there is a disc that hides what is behind it.
     pub fn has_opaque_disc(&self) -> bool {
         self.disc.as_ref().is_some_and(Disc::is_opaque)
     }

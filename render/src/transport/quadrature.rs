@@ -46,8 +46,8 @@ impl Quadrature {
         rest * x * x.sqrt()
     }
 
-    /// What of a panel's light, with these gains at these Mino times, comes from behind the Mino time `cut`: the
-    /// integral of the polynomial through the nodes, by its Legendre series.
+    /// Returns the part of a panel's light, with these gains at these Mino times, from behind the Mino time `cut`:
+    /// the integral of the polynomial through the nodes, by its Legendre series.
     fn rest(&self, times: &[f64], gains: &[f64], cut: f64) -> f64 {
         let whole: f64 = gains.iter().sum();
         let place = self.place(times, cut);
@@ -90,7 +90,7 @@ impl Quadrature {
     }
 }
 
-/// What is known of single nodes and panels of a sum.
+/// Sums of single nodes and panels.
 #[derive(Debug, Default)]
 pub(super) struct Sums {
     /// Optical depth at each node; empty without absorption.
@@ -186,10 +186,9 @@ fn shade(
 /// Optical depth of a panel beyond which e^{−D} is no polynomial over it.
 const OPAQUE: f64 = 2.0;
 
-/// What is seen of a panel that is optically thick: each node stands for a cell with a constant
-/// source function S = j/κ, of which S (1 − e^{−ΔD}) is seen. `gains` are those without
-/// absorption before and those that are seen after; the error is that of S taken from the
-/// neighbouring cell instead.
+/// Shades a panel that is optically thick: each node stands for a cell with a constant source function S = j/κ, of
+/// which S (1 − e^{−ΔD}) is seen. `gains` are those without absorption before and those that are seen after; the
+/// error is that of S taken from the neighbouring cell instead.
 fn shade_opaque(thick: &[f64], gains: &mut [f64], depth: &mut f64, depths: &mut Vec<f64>) -> f64 {
     let (mut error, mut last) = (0.0, None);
     for (gain, thick) in gains.iter_mut().zip(thick) {

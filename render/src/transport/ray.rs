@@ -42,7 +42,7 @@ pub struct Scratch {
     pub meter: Meter,
 }
 
-/// What each source needs from ray to ray.
+/// Scratch space of each source, from ray to ray.
 #[derive(Debug, Default)]
 pub(super) struct SourceScratch {
     pub media: MediaScratch,
@@ -55,7 +55,7 @@ pub(super) struct SourceScratch {
 }
 
 impl PreparedScene {
-    /// What is seen at (α, β) at the scene's own time.
+    /// Returns the result of the ray at (α, β) at the scene's own time.
     ///
     /// # Errors
     /// If no ray with these coordinates reaches the observer.
@@ -71,8 +71,8 @@ impl PreparedScene {
         Ok(seen)
     }
 
-    /// What is seen at each (`alpha[k]`, `beta[k]`) at each of `times` (of observation, in M):
-    /// ray `k` at time `j` goes to `seen[j · rays + k]`. Rays are traced once for all times.
+    /// Writes the results at each (`alpha[k]`, `beta[k]`) at each of `times` (of observation, in M): ray `k` at time `j`
+    /// goes to `seen[j · rays + k]`. Rays are traced once for all times.
     ///
     /// # Errors
     /// If no ray with these coordinates reaches the observer.
@@ -143,7 +143,7 @@ pub(super) struct Sum<'a> {
     pub block: Block<'a>,
     /// Trees over the spots at each time.
     trees: Vec<Option<Arc<SpotTree>>>,
-    /// Whether it is found from rays' positions which of them may meet spots.
+    /// True if it is found from rays' positions which of them may meet spots.
     sighted: bool,
     pub sources: &'a mut SourceScratch,
     pub meter: &'a mut Meter,
@@ -239,7 +239,7 @@ impl RayVisitor for Sum<'_> {
 }
 
 impl<'a> Sum<'a> {
-    /// What the path of a ray that may meet a spot is needed for.
+    /// Returns the use of the path of a ray that may meet a spot.
     fn path_to_spots(&self) -> PathUse {
         // The depth in front of a spot is that of the last ray whose nodes were taken.
         if self.scene.media.absorb() { PathUse::Instead } else { PathUse::Beside }
@@ -252,7 +252,7 @@ impl<'a> Sum<'a> {
         Accumulator { record, ..Accumulator::new() }
     }
 
-    /// What is kept of ray number `k` besides its light: as long as nothing shines, the surface that ends it.
+    /// Returns the record of ray number `k`: as long as nothing shines, the surface that ends it.
     fn record(&self, k: usize, ray: &TracedRay, crossings: &[PlaneCrossing]) -> Box<Record> {
         let cuts = self.sources.cuts.get(k).copied().unwrap_or([f64::INFINITY; 2]);
         Box::new(Record { origin: self.end(ray, crossings), ..Record::new(cuts) })

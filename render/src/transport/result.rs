@@ -1,10 +1,10 @@
-//! What one ray sees, and how light adds up to it.
+//! Result of one ray, and how light adds up to it.
 
 use super::layers::{Origin, Record};
 use kerrlight_geodesic::simd::RayNodes;
 use kerrlight_geodesic::{Outcome, PathPoint, PlaneCrossing, TracedRay};
 
-/// What one ray sees.
+/// Result of one ray.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RayResult {
     /// Intensity of all emission (the sky left out), in the scene's unit.
@@ -28,7 +28,7 @@ pub struct RayResult {
     pub stokes: [f64; 3],
     /// Optical depth, dimensionless, of the way to the ray's end; 0 where nothing absorbs.
     pub optical_depth: f64,
-    /// What became of the ray.
+    /// Outcome of the ray.
     pub outcome: Outcome,
     /// Where it passes the disc.
     pub(crate) passes: Passes,
@@ -96,7 +96,7 @@ pub(super) struct Accumulator {
     pub stokes: [f64; 3],
     pub disc_images: u32,
     pub passes: [f32; PASSES],
-    /// What is kept besides, if anything is.
+    /// Other layers, if any are kept.
     pub record: Option<Box<Record>>,
 }
 
@@ -154,7 +154,7 @@ impl Accumulator {
         self.mark(light.intensity, light.place, Origin { source, mino_time });
     }
 
-    /// What the ray sees whose light this is.
+    /// Returns the result of the ray whose light this is.
     #[inline(always)]
     pub fn result(&self, ray: &TracedRay) -> RayResult {
         let outcome = if ray.surface.is_some() { Outcome::Surface } else { ray.outcome };
@@ -205,7 +205,7 @@ impl Accumulator {
 /// Light of a medium along a ray.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Light {
-    /// What is seen of it, scene units.
+    /// Observed intensity, scene units.
     pub intensity: f64,
     /// ∫ g dI.
     pub shift: f64,
@@ -217,8 +217,7 @@ pub(super) struct Light {
     pub place: Place,
     /// Mino time of the brightest node, in M⁻¹.
     pub mino_time: f64,
-    /// What of the intensity is of the second image and later ones, and of the third and later ones; 0 unless they are
-    /// kept apart.
+    /// Intensity of the second image and later ones, and of the third and later ones; 0 unless they are kept apart.
     pub later: [f64; 2],
     /// An estimate of the error of the intensity, scene units.
     pub error: f64,

@@ -131,7 +131,7 @@ impl Line {
         }
     }
 
-    /// What is known of it as a whole; `crossing` is that of the plane if it is opaque there.
+    /// Returns its properties as a whole; `crossing` is that of the plane if it is opaque there.
     fn traced(&self, ray: &Ray, crossings: usize, opaque: Option<&PlaneCrossing>) -> TracedRay {
         let captured = self.is_captured();
         TracedRay {

@@ -21,7 +21,7 @@ pub struct Tree {
     sizes: Vec<f64>,
     typical: f64,
     shell: [f64; 2],
-    /// What rounding to 32 bits may do to a distance.
+    /// Largest effect of rounding to 32 bits on a distance.
     rounding: f32,
 }
 
@@ -62,8 +62,8 @@ impl Tree {
         Tree { hierarchy, sizes, typical, shell, rounding }
     }
 
-    /// Whether a ray can come near any leaf at all: whether it enters the shell of radii that
-    /// holds them. Needs neither a path nor a position.
+    /// Returns whether a ray can come near any leaf at all: whether it enters the shell of radii that holds them. Needs neither
+    /// a path nor a position.
     pub fn can_be_met(&self, ray: &Ray) -> bool {
         !self.sizes.is_empty() && enters(ray, self.shell[1])
     }
@@ -130,7 +130,7 @@ impl Tree {
     }
 }
 
-/// Whether a ray comes within a radius; `true` if that is not known.
+/// Returns whether a ray comes within a radius; `true` if that is not known.
 pub fn enters(ray: &Ray, radius: f64) -> bool {
     let outermost = 1.0 / radius;
     if ray.inverse_radius >= outermost || !ray.inward {

@@ -4,7 +4,7 @@ use super::{Volume, VolumeFile};
 use crate::scene::{Rotation, VolumeSource};
 use kerrlight_common::numpy::{Archive, NumpyError, read_array, write_archive, write_array};
 
-/// What a file says of a volume.
+/// Arrays of a volume in a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VolumeArrays {
     nodes: [usize; 3],
@@ -17,7 +17,7 @@ pub struct VolumeArrays {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VolumeFileError {
-    /// What is missing, or does not go with the scene.
+    /// The contents are incomplete, or do not go with the scene.
     #[error("{0}")]
     Content(String),
 }
@@ -184,7 +184,7 @@ impl VolumeArrays {
     }
 }
 
-/// Whether a scene may have such an emission.
+/// Returns whether a scene may have such an emission.
 fn shines(value: f64) -> bool {
     (0.0..=1e12).contains(&value)
 }

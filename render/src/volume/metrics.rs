@@ -33,7 +33,7 @@ impl Mask {
         Ok(Self { r_min, r_max, z_width })
     }
 
-    /// Whether a point in M is inside, edges included.
+    /// Returns whether a point in M is inside, edges included.
     pub fn contains(&self, [x, y, z]: [f64; 3]) -> bool {
         let r = (x * x + y * y + z * z).sqrt();
         (self.r_min..=self.r_max).contains(&r) && z.abs() <= self.z_width
@@ -54,7 +54,7 @@ pub struct Mismatch {
     pub second: [f64; 3],
 }
 
-/// Whether two volumes have the same nodes.
+/// Returns whether two volumes have the same nodes.
 ///
 /// # Errors
 /// Names what differs.

@@ -255,7 +255,7 @@ mod tests {
         assert_eq!(text, "value = NaN of node (1, 1, 0) is not allowed: finite");
     }
 
-    /// What is outside 1.25 M turns from x to y, what is inside stays.
+    /// Matter outside 1.25 M turns from x to y, matter inside stays.
     #[test]
     fn exact_a_quarter_turn_takes_x_to_y() {
         let mut values = vec![0.0; 729];

@@ -31,7 +31,7 @@ const GRAY: Rgb = [150; 3];
 pub(super) struct Panel {
     pub title: String,
     pub drawn: RgbImage,
-    /// What the axes to the right and upward are called.
+    /// Labels of the axes to the right and upward.
     pub axes: [String; 2],
     /// Coordinates of the outer edges of the picture along them, M.
     pub ends: [[f64; 2]; 2],

@@ -27,7 +27,7 @@ impl Through {
         }
     }
 
-    /// What it is called in a caption.
+    /// Returns its name in a caption.
     pub fn name(self) -> &'static str {
         match self {
             Self::Maximum => "brightest node",
@@ -81,7 +81,7 @@ pub fn slice(volume: &Volume, plane: [usize; 3], point: [f64; 3], pixels: usize)
 /// Outlines of where a volume is at least as large as each level.
 #[derive(Clone, Copy, Debug)]
 pub struct Outlines<'a> {
-    /// What the levels are of.
+    /// Volume of the levels.
     pub volume: &'a Volume,
     /// Two levels: the line of the first is white, that of the second blue.
     pub levels: [f32; 2],

@@ -28,7 +28,7 @@ const EXTREMAL: f64 = 1.0 - 1e-12;
 /// Distance of the innermost stable orbit from the horizon, M, below which nothing between them is told apart.
 const NARROW: f64 = 1e-4;
 
-/// What dr/dt and Ω are.
+/// Law that gives dr/dt and Ω.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Law {
     /// The family between circular orbits and free fall ([`Infall`]), about the axis of the flow.
@@ -46,7 +46,7 @@ pub enum Law {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Falling {
     law: Law,
-    /// What angular velocities are multiplied by.
+    /// Factor on angular velocities.
     factor: f64,
     flow: Option<Infall<Along>>,
     table: Trajectory,
@@ -102,7 +102,7 @@ impl Falling {
         Ok(Self { law, factor: 1.0, flow: None, table, circular: f64::INFINITY })
     }
 
-    /// What it follows.
+    /// Returns the law that it follows.
     pub fn law(&self) -> &Law {
         &self.law
     }
@@ -144,8 +144,8 @@ impl Falling {
         }
     }
 
-    /// What a point is stretched by, and turned by about the axis (radians, right-handed), to where its matter was `elapsed`
-    /// (M) before.
+    /// Returns the factor by which a point is stretched, and the angle by which it is turned about the axis (radians,
+    /// right-handed), to where its matter was `elapsed` (M) before.
     #[inline]
     pub fn before(&self, origin: &Origin, elapsed: f64) -> [f64; 2] {
         if origin.time.is_nan() {
@@ -219,7 +219,7 @@ impl Family {
         })
     }
 
-    /// Whether nothing leaves the innermost stable orbit: a plunge from it has begun long ago.
+    /// Returns whether nothing leaves the innermost stable orbit: a plunge from it has begun long ago.
     fn is_eternal(&self) -> bool {
         self.is_still() && self.mixture.xi == 1.0
     }

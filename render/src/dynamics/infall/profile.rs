@@ -46,12 +46,12 @@ impl Profile {
         Ok(Self { radii, angular: [angular, of_angular], radial: [radial, of_radial] })
     }
 
-    /// Whether matter stays at its radius.
+    /// Returns whether matter stays at its radius.
     pub fn is_circular(&self) -> bool {
         !self.falls()
     }
 
-    /// Whether matter changes its radius.
+    /// Returns whether matter changes its radius.
     pub fn falls(&self) -> bool {
         self.radial[0].iter().any(|v| *v != 0.0)
     }

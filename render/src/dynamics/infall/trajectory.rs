@@ -15,7 +15,7 @@ pub(super) struct Way<'a> {
     pub marks: Vec<f64>,
     /// The point at a mark, with its derivative along the way.
     pub at: Box<dyn Fn(Along) -> Point<Along> + 'a>,
-    /// Whether rates have no derivative at the first mark, where dr/dt grows like a root.
+    /// True if rates have no derivative at the first mark, where dr/dt grows like a root.
     pub rough: bool,
 }
 
@@ -172,7 +172,7 @@ impl Way<'_> {
     }
 }
 
-/// What lies between two marks.
+/// Interval between two marks.
 struct Span {
     steps: [f64; 2],
     ends: [Knot; 2],

@@ -9,7 +9,7 @@ pub enum MeshError {
     Line {
         /// Its number, from 1.
         line: usize,
-        /// What is wrong with it.
+        /// Reason for the refusal.
         why: String,
     },
     /// A fault of a file that it refers to.
@@ -28,7 +28,7 @@ pub enum MeshError {
     Resource {
         /// The name as it stands in the file.
         name: String,
-        /// What went wrong.
+        /// Reason for the refusal.
         why: String,
     },
     /// It is no mesh of triangles.

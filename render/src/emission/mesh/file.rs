@@ -1,4 +1,4 @@
-//! What a mesh file holds, whatever its format.
+//! Contents of a mesh file, whatever its format.
 
 use super::MeshError;
 use super::texture::Texture;
@@ -36,10 +36,10 @@ impl Layer {
     }
 }
 
-/// What a surface looks like.
+/// Appearance of a surface.
 #[derive(Debug, Clone, Default)]
 pub struct Material {
-    /// What it gives off: `Ke` of an OBJ file, `emissive…` of a glTF file.
+    /// Light that it emits: `Ke` of an OBJ file, `emissive…` of a glTF file.
     pub emission: Layer,
     /// Its colour under light: `Kd`, `baseColor…`.
     pub base: Layer,
@@ -52,7 +52,7 @@ pub struct MeshFile {
     pub triangles: Vec<RawTriangle>,
     /// Materials.
     pub materials: Vec<Material>,
-    /// What of the file is not shown as it says.
+    /// Parts of the file that are not shown as it says.
     pub warnings: Vec<String>,
 }
 
@@ -75,7 +75,7 @@ impl MeshFile {
         }
     }
 
-    /// Whether its numbers make triangles and colours.
+    /// Checks that its numbers make triangles and colours.
     pub(super) fn check(&self) -> Result<(), MeshError> {
         let fail = |why: String| Err(MeshError::Content(why));
         if self.triangles.is_empty() {

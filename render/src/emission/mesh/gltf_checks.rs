@@ -1,4 +1,4 @@
-//! What the readers of glTF take for granted: sizes, types, sources of pictures, and that nodes are trees.
+//! Checks of what the readers of glTF take for granted: sizes, types, sources of pictures, and that nodes are trees.
 
 use super::MeshError;
 use gltf::accessor::{DataType, Dimensions};
@@ -90,7 +90,7 @@ fn beyond(what: &str, k: usize) -> Result<(), MeshError> {
     fail(format!("{what} {k} (counted from 0) reaches beyond its buffer"))
 }
 
-/// Whether so many items of this size lie in a view.
+/// Returns whether so many items of this size lie in a view.
 fn holds(view: &gltf::buffer::View<'_>, offset: usize, count: usize, size: usize) -> bool {
     let step = view.stride().unwrap_or(size);
     let reach = count.saturating_sub(1).checked_mul(step);

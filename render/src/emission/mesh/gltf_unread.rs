@@ -1,4 +1,4 @@
-//! What of a glTF file is not read: what moves vertices is refused, the rest is told.
+//! Parts of glTF files that are not read: those that move vertices are refused, the rest is told.
 
 use super::MeshError;
 use gltf::material::AlphaMode;
@@ -23,7 +23,7 @@ const HARMLESS: [&str; 15] = [
     "EXT_lights_image_based",
 ];
 
-/// What of a file is not shown as it says.
+/// Returns the parts of a file that are not shown as it says.
 pub(super) fn of(document: &Document) -> Vec<String> {
     let primitives = || document.meshes().flat_map(|mesh| mesh.primitives());
     let clear = document.materials().filter(|m| m.alpha_mode() != AlphaMode::Opaque).count();

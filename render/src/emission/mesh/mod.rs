@@ -63,7 +63,7 @@ impl Triangle {
         dot(self.normal, difference(x, self.corners[0]))
     }
 
-    /// Whether a point of its plane is inside, or outside by at most `margin` (M).
+    /// Returns whether a point of its plane is inside, or outside by at most `margin` (M).
     pub fn holds(&self, x: [f64; 3], margin: f64) -> bool {
         let margin = margin + SEAM * self.size;
         (0..3).all(|k| dot(self.inward[k], difference(x, self.corners[k])) >= -margin)
@@ -101,12 +101,12 @@ impl Triangle {
 pub struct MeshModel {
     /// All triangles with an area.
     pub triangles: Vec<Triangle>,
-    /// Whether it hides what is behind it.
+    /// True if it hides what is behind it.
     pub opaque: bool,
     materials: Vec<Material>,
     brightness: f64,
     color: Option<[f32; 3]>,
-    /// Whether its materials emit; if none does, their base colours are taken for light.
+    /// True if its materials emit; if none does, their base colours are taken for light.
     emits: bool,
     velocity: MeshVelocity,
 }
@@ -148,7 +148,7 @@ impl MeshModel {
         })
     }
 
-    /// Whether it gives off light at all.
+    /// Returns whether it gives off light at all.
     pub fn shines(&self) -> bool {
         self.brightness > 0.0
     }

@@ -23,7 +23,7 @@ impl Materials {
     }
 }
 
-/// What a file says of a material.
+/// Description of a material in a file.
 #[derive(Default)]
 struct Described {
     name: String,
@@ -112,7 +112,8 @@ fn once<T>(line: &Line<'_>, place: &mut Option<T>, said: T) -> Result<(), MeshEr
     }
 }
 
-/// Whether a statement that is not read would show something of the surface that is not there, or hide something.
+/// Returns whether a statement that is not read would show something of the surface that is not there, or hide
+/// something.
 fn changes_light(keyword: &str, line: &Line<'_>) -> bool {
     let number = || line.words().last().and_then(|word| word.parse::<f64>().ok());
     match keyword {

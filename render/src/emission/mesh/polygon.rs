@@ -27,7 +27,7 @@ impl core::fmt::Display for Uncut {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Cut {
     pub triangles: Vec<[usize; 3]>,
-    /// Whether its corners lie in one plane within [`FLAT`] of its size.
+    /// True if its corners lie in one plane within [`FLAT`] of its size.
     pub flat: bool,
 }
 
@@ -115,7 +115,7 @@ fn plane(points: &[Point]) -> Result<Vec<[usize; 3]>, Uncut> {
     ears(points, nothing).ok_or(Uncut::Crosses)
 }
 
-/// Whether two sides cross between their ends.
+/// Returns whether two sides cross between their ends.
 fn crosses(points: &[Point]) -> bool {
     let count = points.len();
     let side = |k: usize| [points[k], points[(k + 1) % count]];

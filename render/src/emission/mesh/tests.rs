@@ -69,7 +69,7 @@ fn gltf(length: usize) -> String {
     )
 }
 
-/// What the crate's readers take for granted is looked at before.
+/// Files that would break the crate's readers are refused first.
 #[test]
 fn exact_gltf_against_its_specification_says_why() {
     let with = |from: &str, to: &str| {
@@ -259,7 +259,8 @@ fn exact_scale_and_offset_of_textures() {
     assert!(shade("-o 0.5 0 0 ", 0.25) > 1.0 - 1e-6);
 }
 
-/// What glTF says of a texture: wrap modes of its sampler, KHR_texture_transform; names with escapes.
+/// Textures of glTF have the wrap modes of their samplers and KHR_texture_transform; names may have
+/// escapes.
 #[test]
 fn exact_textures_of_gltf() {
     let png = columns();

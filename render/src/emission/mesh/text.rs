@@ -17,7 +17,7 @@ impl Line<'_> {
         self.text.split_whitespace().next().unwrap_or_default()
     }
 
-    /// What follows the first word.
+    /// Returns the text after the first word.
     pub fn rest(&self) -> &str {
         self.text.split_once(char::is_whitespace).map_or("", |(_, rest)| rest.trim())
     }

@@ -13,7 +13,7 @@ pub struct Texture {
     placement: Placement,
 }
 
-/// What a picture shows outside of its edges, along one coordinate.
+/// Colour of a picture outside of its edges, along one coordinate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Wrap {
     /// The same again.

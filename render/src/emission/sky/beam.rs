@@ -1,4 +1,4 @@
-//! What a bundle of rays covers of the sky.
+//! Area of the sky that a bundle of rays covers.
 
 use kerrlight_geodesic::footprint::Sky;
 use kerrlight_geodesic::vector::dot;

@@ -55,9 +55,9 @@ pub enum CatalogueError {
         line: usize,
         /// The column.
         column: &'static str,
-        /// What stands there.
+        /// Value in the file.
         value: String,
-        /// What may.
+        /// Values that are allowed.
         allowed: &'static str,
     },
 }

@@ -100,7 +100,7 @@ impl Panorama {
         Ok(Panorama { width, height, pixels, coarser: Vec::new(), warnings })
     }
 
-    /// What of the picture is not shown as it says.
+    /// Returns the properties of the picture that are not shown as it says.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }

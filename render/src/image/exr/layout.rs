@@ -64,7 +64,7 @@ pub struct Style {
 }
 
 impl Style {
-    /// Whether channels lie in the file as in the default style.
+    /// Returns whether channels lie in the file as in the default style.
     pub fn is_plain(&self) -> bool {
         !self.half && !self.multi_part
     }
@@ -109,7 +109,7 @@ fn part_of(name: &str) -> &str {
 /// The part with R, G, B and A.
 const COLORS: &str = "rgba";
 
-/// Whether a channel is a colour or alpha.
+/// Returns whether a channel is a colour or alpha.
 fn is_color(name: &str) -> bool {
     let last = name.rsplit('.').next().unwrap_or(name);
     ["R", "G", "B", "A"].contains(&last)
@@ -215,7 +215,7 @@ impl Layout {
         layers.iter().map(part).collect()
     }
 
-    /// Whether channels lie in the file as in the default style.
+    /// Returns whether channels lie in the file as in the default style.
     pub fn is_plain(&self) -> bool {
         self.style.is_plain()
     }

@@ -103,7 +103,7 @@ pub fn dimensions(bytes: &[u8]) -> Result<(u32, u32), crate::Error> {
     Ok((number(size.0)?, number(size.1)?))
 }
 
-/// Whether the pixels of the first layer fill the display window.
+/// Returns whether the pixels of the first layer fill the display window.
 ///
 /// # Errors
 /// If the bytes are no EXR file.
@@ -115,10 +115,10 @@ pub fn is_whole(bytes: &[u8]) -> Result<bool, crate::Error> {
     }))
 }
 
-/// What the header of the first layer says of the meaning of its pixels.
+/// Header of the first layer: the meaning of its pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
-    /// Whether it is the six faces of a cube.
+    /// True if it is the six faces of a cube.
     pub cube: bool,
     /// Chromaticities of red, green, blue and white, where they are not those of Rec. 709.
     pub foreign_primaries: Option<[[f32; 2]; 4]>,

@@ -1,4 +1,4 @@
-//! What the channels of an EXR file hold, read band by band.
+//! Statistics of the channels of an EXR file, read band by band.
 
 use super::{Attributes, attributes};
 use exr::block::reader::ChunksReader;

@@ -66,7 +66,7 @@ impl Cell {
         Self::places(self.center, self.level).into_iter().zip(&self.quarters)
     }
 
-    /// Whether it touches the pixel's border.
+    /// Returns whether it touches the pixel's border.
     pub(super) fn is_at_border(&self) -> bool {
         let half = 0.5 * 0.5f64.powi(self.level as i32);
         self.center.iter().any(|x| x.abs() + half > 0.5 - 1e-9)

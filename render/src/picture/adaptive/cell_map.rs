@@ -37,10 +37,10 @@ impl CellMap {
         cell.quarters.get(2 * y + x)
     }
 
-    /// What edges may do that pass between the rays of cell number `k` and those of the cells
-    /// next to it. Between a ray and the border lies half of its quarter; the edge may be anywhere
-    /// between this ray and the next cell's, which is taken for a quarter of the quarter.
-    /// Images of the disc, as bright as `disc`, that pass between them lie in one of the two, and count twice.
+    /// Returns the largest error of edges that pass between the rays of cell number `k` and those of the cells
+    /// next to it. Between a ray and the border lies half of its quarter; the edge may be anywhere between
+    /// this ray and the next cell's, which is taken for a quarter of the quarter. Images of the disc, as
+    /// bright as `disc`, that pass between them lie in one of the two, and count twice.
     pub(super) fn seam(&self, cells: &[Cell], k: usize, disc: f64) -> f64 {
         let cell = &cells[k];
         let size = 0.5f64.powi(cell.level as i32);

@@ -18,7 +18,7 @@ pub(super) struct Cut {
     pub(super) cells: Vec<Cell>,
     /// Largest intensity of its rays and its neighbours' first ones.
     pub(super) bright: f64,
-    /// Whether a neighbour's first ray sees another piece of the picture.
+    /// True if a neighbour's first ray sees another piece of the picture.
     pub(super) edge: bool,
     /// The brightest light of the disc, where edges of it are near.
     pub(super) disc: f64,
@@ -63,8 +63,8 @@ impl Cut {
         self.cells.iter().map(|cell| cell.total().powi(2)).sum::<f64>().sqrt()
     }
 
-    /// What an edge that no ray has told of may do: a quarter of what lies between border and
-    /// rays, whose share is 2^−(2 + level).
+    /// Returns the largest error of an edge that no ray has found: a quarter of what lies between border and rays,
+    /// whose share is 2^−(2 + level).
     pub(super) fn border_error(&self) -> f64 {
         HIDDEN * self.contrast * 0.5f64.powi(self.border_level() as i32)
     }

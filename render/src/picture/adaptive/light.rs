@@ -1,10 +1,10 @@
-//! What single rays see, and whether two of them see the same piece of the picture.
+//! Light of single rays, and whether two of them see the same piece of the picture.
 
 use crate::picture::rings::Counted;
 use crate::transport::{Passes, RayResult};
 use kerrlight_geodesic::Outcome;
 
-/// What a ray, or several along photon rings, adds to its cell.
+/// Light that a ray, or several along photon rings, adds to its cell.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Light {
     pub(super) intensity: f64,
@@ -20,32 +20,32 @@ pub(super) struct Light {
     pub(super) passes: Passes,
 }
 
-/// What rays of one smooth piece of the picture have in common.
+/// Properties that rays of one smooth piece of the picture have in common.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Kind {
     /// Lensing band and outcome.
     pub(super) band: (u32, Outcome),
     /// Images of the disc that are seen.
     pub(super) disc_images: u32,
-    /// Whether there is emission.
+    /// True if there is emission.
     pub(super) lit: bool,
     /// On which sides the ray passes the disc.
     pub(super) sides: u8,
 }
 
 impl Light {
-    /// Whether a lensing band or the end of rays lies between two rays.
+    /// Returns whether a lensing band or the end of rays lies between two rays.
     pub(super) fn other_band(&self, other: &Light) -> bool {
         self.kind.band != other.kind.band && self.mean.is_none() && other.mean.is_none()
     }
 
-    /// Whether two rays see different pieces of the picture; a mean over the rays of a photon ring sees
-    /// all of them.
+    /// Returns whether two rays see different pieces of the picture; a mean over the rays of a photon
+    /// ring sees all of them.
     pub(super) fn other_piece(&self, other: &Light) -> bool {
         self.kind != other.kind && self.mean.is_none() && other.mean.is_none()
     }
 
-    /// What a ray sees.
+    /// Returns the light of a ray.
     pub(super) fn of_ray(seen: &RayResult) -> Self {
         let band = (seen.crossings, seen.outcome);
         let (disc_images, lit) = (seen.disc_images, seen.radius > 0.0);
@@ -69,7 +69,7 @@ impl Light {
         self.passes.between(&other.passes)
     }
 
-    /// What a ray sees, or the mean around it.
+    /// Returns the light of a ray, or the mean around it.
     pub(super) fn new((seen, counted): (&RayResult, &Counted)) -> Self {
         let ray = Light::of_ray(seen);
         Light {

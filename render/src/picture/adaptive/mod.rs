@@ -37,11 +37,11 @@ const HIDDEN: f64 = 1.0 / 16.0;
 /// gains less.
 const EDGE: f64 = 8.0;
 
-/// What is seen, through which pixels, and by how much each may be off.
+/// Scene and pixels, with the error that each pixel may have.
 pub(super) struct Adaptive<'a> {
     pub prepared: &'a PreparedScene,
     pub grid: &'a Grid,
-    /// What resolves photon rings, in pixels and in parts of pixels.
+    /// Resolver of photon rings, in pixels and in parts of pixels.
     pub rings: Option<&'a Resolver>,
     pub tolerance: f64,
 }
@@ -79,7 +79,7 @@ impl Adaptive<'_> {
         Ok(pixels)
     }
 
-    /// What the first rays of pixels that are cut see, or the mean where photon rings run through them.
+    /// Returns the light of the first rays of pixels that are cut, or the mean where photon rings run through them.
     fn middles(
         &self,
         pixels: &[Pixel],
@@ -208,14 +208,14 @@ fn push_quarters(work: &mut Workspace, grid: &Grid, cut: &Cut, center: [f64; 2],
     }
 }
 
-/// What a pixel's first ray and those of its neighbours say.
+/// Estimate of a pixel from its first ray and those of its neighbours.
 struct Estimate {
     error: f64,
     /// Range of intensities if a neighbour is of another kind.
     contrast: Option<f64>,
     /// Largest intensity.
     bright: f64,
-    /// Whether an edge of the disc runs through.
+    /// True if an edge of the disc runs through.
     at_disc: bool,
     /// The share of the pixel that images of the disc cover which lie between the rays.
     between: f64,

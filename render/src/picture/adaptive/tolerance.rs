@@ -1,4 +1,4 @@
-//! What single pixels may be off by so that the picture is not off by more than asked.
+//! Error that single pixels may have so that the picture has no larger one than asked.
 
 use super::{Adaptive, EDGE};
 use crate::Error;

@@ -30,7 +30,7 @@ pub struct Stratum {
     pub share: f64,
 }
 
-/// What places rays along photon rings.
+/// Strata along photon rings in which rays are placed.
 #[derive(Debug, Clone)]
 pub struct RingStrata {
     hole: Kerr,
@@ -40,7 +40,7 @@ pub struct RingStrata {
     spacing: f64,
     /// How many times as far apart as `spacing` says rays are, so that they are as few as the picture is small.
     coarseness: f64,
-    /// Whether only squares that the critical curve runs through have strata.
+    /// True if only squares that the critical curve runs through have strata.
     only_on_curve: bool,
 }
 
@@ -51,7 +51,7 @@ const CORE: f64 = 0.02;
 /// Points at which the critical curve is known beforehand.
 const POINTS: u32 = 512;
 
-/// What the curve between these points, or W's own curvature, may be off by, in M.
+/// Largest error of the curve between these points, or of W's own curvature, in M.
 const SLACK: f64 = 0.05;
 
 /// A square is quartered at most this often where W is no plane on it.
@@ -153,8 +153,8 @@ impl RingStrata {
         }
     }
 
-    /// Whether a square has one stratum, without W: images are as wide as their distance from the curve
-    /// times the spacing.
+    /// Returns whether a square has one stratum, without W: images are as wide as their distance from the curve times
+    /// the spacing.
     fn is_far(&self, (x, y): (f64, f64), size: f64) -> bool {
         if self.curve.is_empty() {
             return false;

@@ -1,4 +1,4 @@
-//! What squares of a picture see, with the rays that photon rings need.
+//! Light of squares of a picture, with the rays that photon rings need.
 
 use super::{RingStrata, Stratum};
 use crate::Error;
@@ -13,7 +13,7 @@ use std::ops::Range;
 #[derive(Debug, Clone)]
 pub struct Resolver {
     strata: RingStrata,
-    /// Whether a disc may hide them.
+    /// True if a disc may hide them.
     hides: bool,
 }
 

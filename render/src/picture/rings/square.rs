@@ -33,12 +33,12 @@ impl Plane {
         0.5 * (self.slope[0].abs() + self.slope[1].abs())
     }
 
-    /// Whether the function is no plane, even if it may be `slack` times as far from one as usual.
+    /// Returns whether the function is no plane, even if it may be `slack` times as far from one as usual.
     pub fn is_bent(&self, slack: f64) -> bool {
         self.bend > 0.1 * slack * self.reach()
     }
 
-    /// Whether the function may vanish on the square.
+    /// Returns whether the function may vanish on the square.
     pub fn is_near(&self, corners: [f64; 4]) -> bool {
         let other = corners.iter().any(|value| (*value > 0.0) != (self.middle > 0.0));
         other || self.middle.abs() < self.reach() + self.bend

@@ -31,7 +31,7 @@ pub(in crate::transport) struct DiscRay<'a> {
     /// Optical depth of the gas in front of each crossing; empty without absorption.
     pub depths: &'a [f64],
     pub polarized: Option<PolarizedRay<'a>>,
-    /// What a camera adds to the redshift.
+    /// Factor of the camera's motion in the redshift.
     pub blueshift: Option<f64>,
 }
 
@@ -49,12 +49,12 @@ impl Disc {
         CROSSINGS
     }
 
-    /// Whether it hides what is behind it.
+    /// Returns whether it hides what is behind it.
     pub fn is_opaque(&self) -> bool {
         self.model.opaque
     }
 
-    /// Whether some of its matter plunges.
+    /// Returns whether some of its matter plunges.
     pub fn plunges(&self) -> bool {
         self.model.plunges()
     }
@@ -67,7 +67,7 @@ impl Disc {
         [fall * x / r - turn * y, fall * y / r + turn * x, 0.0]
     }
 
-    /// Whether it hides what is behind a crossing.
+    /// Returns whether it hides what is behind a crossing.
     #[inline]
     pub fn hides_at(&self, crossing: &PlaneCrossing) -> bool {
         self.model.opaque && self.model.covers(crossing.radius)

@@ -19,7 +19,7 @@ pub(in crate::transport) struct Meshes {
     tree: Arc<MeshTree>,
 }
 
-/// What meshes need from ray to ray.
+/// Scratch space of meshes, from ray to ray.
 #[derive(Debug, Default)]
 pub(in crate::transport) struct MeshScratch {
     walk: WalkScratch,
@@ -67,7 +67,7 @@ impl MeshTree {
         }
     }
 
-    /// Whether a ray can meet any triangle at all.
+    /// Returns whether a ray can meet any triangle at all.
     pub fn can_be_met(&self, ray: &Ray) -> bool {
         self.tree.can_be_met(ray)
     }
@@ -236,7 +236,7 @@ impl Meshes {
         Ok(Some(Meshes { tree: Arc::new(tree) }))
     }
 
-    /// Whether the path of a ray is needed.
+    /// Returns whether the path of a ray is needed.
     pub fn need_path(&self, optics: &Optics, ray: &Ray) -> bool {
         optics.one_by_one || self.tree.can_be_met(ray)
     }

@@ -27,12 +27,12 @@ impl Sky {
         self.beams = self.beams.map(|_| ray_spacing(scene));
     }
 
-    /// What it is.
+    /// Returns its model.
     pub fn model(&self) -> &SkyModel {
         &self.model
     }
 
-    /// Whether it is averaged over beams.
+    /// Returns whether it is averaged over beams.
     pub fn is_averaged(&self) -> bool {
         self.beams.is_some()
     }

@@ -1,4 +1,4 @@
-//! What several volumes look like from several sides, with what is around them.
+//! Projections of several volumes from several sides, with what is around them.
 
 use super::super::panels::{self, PANEL, Page, Panel, Shown};
 use super::{Surroundings, View, project};
@@ -42,11 +42,11 @@ pub fn sheet(
 /// A volume of a mosaic.
 #[derive(Clone, Copy, Debug)]
 pub struct Tile<'a> {
-    /// What stands above it.
+    /// Title above it.
     pub title: &'a str,
     /// Its emission.
     pub volume: &'a Volume,
-    /// What is around it.
+    /// Surroundings.
     pub around: Surroundings,
     /// From where it is seen.
     pub view: View,

@@ -27,7 +27,7 @@ pub const VIEWS: [View; 4] = [
     View { azimuth: 0.0, elevation: 90.0 },
 ];
 
-/// What is around the emission, and how much of it is in the picture; lengths in M.
+/// Surroundings of the emission, and how much of them is in the picture; lengths in M.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surroundings {
     /// Radius of the ball in M: that of the outer horizon.
@@ -91,7 +91,7 @@ impl<'a> Marcher<'a> {
         Self { volume, frame: view.frame(), hole_radius, spacing, step }
     }
 
-    /// What is seen at a point of the picture.
+    /// Returns the light at a point of the picture.
     fn light(&self, right: f64, up: f64) -> f32 {
         let [a, b, towards] = self.frame;
         let origin: [f64; 3] = core::array::from_fn(|k| right * a[k] + up * b[k]);

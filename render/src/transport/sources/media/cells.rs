@@ -23,13 +23,13 @@ struct Panel {
     ends: [f64; 2],
     /// In M.
     length: f64,
-    /// Whether it ends at the horizon.
+    /// True if it ends at the horizon.
     falls: bool,
     /// Its number among the panels whose nodes are known, if they are.
     known: Option<usize>,
 }
 
-/// What cells need from ray to ray.
+/// Scratch space of cells, from ray to ray.
 #[derive(Debug, Default)]
 pub(super) struct CellScratch {
     intervals: Vec<[f64; 2]>,

@@ -1,4 +1,4 @@
-//! What fills space: gas and volumes, with as many nodes along each ray as it takes.
+//! Media that fill space: gas and volumes, with as many nodes along each ray as it takes.
 
 mod cells;
 mod depth;
@@ -45,7 +45,7 @@ pub(in crate::transport) struct Media {
     smooth: Vec<usize>,
 }
 
-/// What media need from ray to ray.
+/// Scratch space of media, from ray to ray.
 #[derive(Debug)]
 pub(in crate::transport) struct MediaScratch {
     quadrature: Quadrature,
@@ -193,12 +193,12 @@ impl Media {
         in_cartesian([r, cos, azimuth], rates)
     }
 
-    /// Whether anything absorbs.
+    /// Returns whether anything absorbs.
     pub fn absorb(&self) -> bool {
         self.iter().any(|medium| medium.absorbs())
     }
 
-    /// Whether some are made of cells.
+    /// Returns whether some are made of cells.
     pub fn have_cells(&self) -> bool {
         self.smooth.len() < self.all.len()
     }
@@ -209,7 +209,7 @@ impl Media {
         numbered.filter_map(|(m, medium)| Some((m, medium, medium.cell_size()?)))
     }
 
-    /// Whether the path of a ray is needed: cells are found along it.
+    /// Returns whether the path of a ray is needed: cells are found along it.
     pub fn need_path(&self, ray: &Ray) -> bool {
         self.with_cells().any(|(_, medium, _)| enters(ray, medium.sphere()))
     }
@@ -335,8 +335,7 @@ pub(in crate::transport) fn finest(medium: &dyn Medium) -> u32 {
     if medium.cell_size().is_some() { FINEST_OF_CELLS } else { FINEST }
 }
 
-/// Whether panels are short enough for the cells of a medium, and whether they are as short as they
-/// ever get.
+/// Returns whether panels are short enough for the cells of a medium, and whether they are as short as they ever get.
 fn resolution(medium: &dyn Medium, nodes: &RayNodes<'_>, order: usize) -> (bool, bool) {
     let Some(cell) = medium.cell_size() else { return (true, false) };
     let longest = cell.longest(nodes, order);

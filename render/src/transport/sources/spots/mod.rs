@@ -39,7 +39,7 @@ const MOST_TREES: usize = 256;
 /// A piece is halved at most this often.
 const DEEPEST: u32 = 24;
 
-/// What spots need from ray to ray.
+/// Scratch space of spots, from ray to ray.
 #[derive(Debug, Default)]
 pub(in crate::transport) struct SpotScratch {
     walk: WalkScratch,
@@ -62,7 +62,7 @@ impl Spots {
         self.models.len()
     }
 
-    /// Whether there is none.
+    /// Returns whether there is none.
     pub fn is_empty(&self) -> bool {
         self.models.is_empty()
     }
@@ -104,7 +104,7 @@ impl Spots {
         Some(tree)
     }
 
-    /// Whether the path of a ray is needed.
+    /// Returns whether the path of a ray is needed.
     pub fn need_path(&self, ray: &Ray, trees: &[Option<Arc<SpotTree>>]) -> bool {
         trees.iter().any(|tree| match tree {
             Some(tree) => tree.can_be_met(ray),

@@ -26,15 +26,15 @@ const ORDER: usize = 4;
 /// From the last node of a panel to its end, over the distance of the last two nodes: 0.27.
 const END_GAP: f64 = 0.3;
 
-/// What a piece of path may be longer than its chord, in coordinates that are sheared.
+/// Largest ratio of a piece of path to its chord, in coordinates that are sheared.
 const SLACK: f64 = 1.25;
 
 /// Positions are needed as far outside the spots as the gap at the end of a panel, in M.
 const MARGIN: f64 = 0.5;
 
 impl Spots {
-    /// Whether it is found from rays' positions which of them may meet spots, at so many times of
-    /// observation.
+    /// Returns whether it is found from rays' positions which of them may meet spots, at so many times
+    /// of observation.
     pub fn sight(&self, optics: &Optics, times: usize) -> bool {
         let far = self.models.iter().all(|spot| spot.shell()[0] >= NEAREST);
         far && !optics.one_by_one && (1..=MOST_PAIRS).contains(&(self.models.len() * times))
@@ -51,7 +51,7 @@ impl Spots {
         }
     }
 
-    /// Whether a ray with these nodes may meet a spot at one of `times`.
+    /// Returns whether a ray with these nodes may meet a spot at one of `times`.
     pub fn may_be_met(
         &self,
         optics: &Optics,
@@ -74,7 +74,7 @@ struct Sighting<'a> {
     observed: f64,
     slow_light: bool,
     nodes: RayNodes<'a>,
-    /// Whether the ray ends at the horizon.
+    /// True if the ray ends at the horizon.
     falls: bool,
 }
 
@@ -105,8 +105,8 @@ impl Sighting<'_> {
         false
     }
 
-    /// Whether the spot may shine between two nodes that follow each other, or before the first or
-    /// after the last node of the ray.
+    /// Returns whether the spot may shine between two nodes that follow each other, or before the
+    /// first or after the last node of the ray.
     fn may_meet_between(&self, before: &mut Seen, now: &mut Seen, last: bool) -> bool {
         let [low, high] = self.spot.shell();
         let starts = before.node == 0 && before.at.radius < high;

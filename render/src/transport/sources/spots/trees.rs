@@ -103,7 +103,7 @@ impl SpotTree {
         SpotTree { tree: Tree::new(&boxes, [low, high]), parts }
     }
 
-    /// Whether a ray can meet any spot at all.
+    /// Returns whether a ray can meet any spot at all.
     pub fn can_be_met(&self, ray: &Ray) -> bool {
         self.tree.can_be_met(ray)
     }
