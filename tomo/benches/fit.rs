@@ -1,5 +1,5 @@
-//! What a step of a fit costs and where the time goes: BH-NeRF's network on scene "1" (Levis et al. 2022), with a mask of
-//! what shines, from random pixels and from whole frames; beside the rate of a large matrix product in the same run.
+//! Cost of a step of a fit and of its parts: BH-NeRF's network on scene "1" (Levis et al. 2022), with a mask of what
+//! shines, from random pixels and from whole frames; beside the rate of a large matrix product in the same run.
 //!
 //! Processor time a thread, as in the bench `representation`; threads are as many as `RAYON_NUM_THREADS` says.
 

@@ -1,4 +1,4 @@
-//! What representations cost, forward and with the gradient and a step of Adam, over the size of the
+//! Cost of representations, forward and with the gradient and a step of Adam, over the size of the
 //! batch, beside the rate of a large matrix product in the same run. The gradient is checked first,
 //! so that nothing wrong is timed.
 //!

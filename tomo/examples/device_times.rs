@@ -1,5 +1,5 @@
-//! What a step of a fit takes on a graphics device, kernel by kernel, by the device's own clock: scene "1" of BH-NeRF (Levis
-//! et al. 2022), as many pixels a step as have `points` nodes; beside what the device can do at most.
+//! Time of a step of a fit on a graphics device, kernel by kernel, by the device's own clock: scene "1" of BH-NeRF (Levis et
+//! al. 2022), as many pixels a step as have `points` nodes; beside the device's highest rates.
 //!
 //! `cargo run --release -p kerrlight-tomo --features wgpu --example device_times -- representation=bhnerf`
 //!
@@ -94,7 +94,7 @@ fn multiplied(@builtin(global_invocation_id) at: vec3<u32>) {
 }
 ";
 
-/// What the device multiplies, adds and copies in a second at most.
+/// Measures the device's highest rates of products, sums and copies.
 fn ceilings(adapter: &Adapter) -> Result<(), GpuError> {
     let device = Compute::open(adapter, Needs { invocations: 256, ..Needs::default() })?;
     // SAFETY: there are as many invocations as vectors, and the loop counts up.

@@ -24,7 +24,7 @@ impl Default for Lbfgs {
     }
 }
 
-/// What a step came to.
+/// Result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
     /// The loss is smaller.

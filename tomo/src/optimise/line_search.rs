@@ -8,7 +8,7 @@ pub struct Point {
     pub slope: f64,
 }
 
-/// What a step must achieve, and how long to look for it.
+/// Conditions on a step, and how long to look for it.
 #[derive(Clone, Copy, Debug)]
 pub struct Wolfe {
     /// Part of the linear decrease that is enough.

@@ -85,7 +85,7 @@ impl Muon {
     }
 }
 
-/// What lies between the matrices.
+/// Returns the ranges between the matrices.
 fn between(matrices: &[WeightMatrix], count: usize) -> impl Iterator<Item = Range<usize>> {
     let starts = core::iter::once(0).chain(matrices.iter().map(|matrix| matrix.range().end));
     let ends = matrices.iter().map(|matrix| matrix.offset).chain(core::iter::once(count));

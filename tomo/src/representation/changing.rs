@@ -30,7 +30,7 @@ pub struct Knots {
     pub spacing: f64,
     /// How many; one is a field that does not change.
     pub count: usize,
-    /// What the fields mean.
+    /// Meaning of the fields.
     pub allowed: Allowed,
 }
 

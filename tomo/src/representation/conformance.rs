@@ -1,4 +1,4 @@
-//! What every representation must pass; a new one is tested by one line.
+//! Tests that every representation must pass; a new one is tested by one line.
 //!
 //! ```
 //! use kerrlight_tomo::representation::conformance::{Subject, check};
@@ -32,7 +32,7 @@ use rand_pcg::Pcg64;
 /// its direction). Written plainly and independently of the representation.
 pub type Tangent<'a> = dyn Fn(&[f64], &[f64], &[f64], &[f64]) -> (f64, f64) + Sync + 'a;
 
-/// What is checked.
+/// Representation that is tested, with its points.
 pub struct Subject<'a> {
     /// In double precision.
     pub representation: &'a dyn Representation<f64>,
@@ -59,7 +59,7 @@ struct Product {
 
 /// Relative to the largest component, what a central difference in f64 resolves.
 const DIFFERENCE: f64 = 1e-7;
-/// What sums in another order differ by, relative to the sum of sizes.
+/// Largest difference of sums in another order, relative to the sum of sizes.
 const ROUNDING: f64 = 1e-12;
 
 /// Checks all that the interface promises.
@@ -322,7 +322,7 @@ fn linked(subject: &Subject<'_>) {
     }
 }
 
-/// What is recorded on the way forward changes no bit on the way back, and nothing if other points came in between.
+/// Recording on the way forward changes no bit on the way back, and nothing if other points came in between.
 fn recorded(subject: &Subject<'_>) {
     let workspace = &mut Workspace::new();
     for (seed, count) in [(11, 3_000), (12, 3_000), (13, 40)] {

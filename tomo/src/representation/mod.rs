@@ -75,7 +75,7 @@ pub enum BuiltIn<'a> {
     FeatureGrid(&'a FeatureGrid),
 }
 
-/// What ties values to cotangents inside a batch: the points of a ray to its pixel.
+/// Groups that tie values to cotangents inside a batch: the points of a ray to its pixel.
 #[derive(Clone, Copy)]
 pub struct Groups<'a, T> {
     /// Group k holds the points `starts[k]..starts[k + 1]`, from 0 to the number of points.
@@ -145,9 +145,9 @@ pub trait Representation<T: Float>: Send + Sync {
     /// Coordinates of a point: 3 (x, y, z) or 4 (t, x, y, z).
     fn dimension(&self) -> usize;
 
-    /// Whether a point is given by the place that its matter has at the reference time, rather than by where its light is
-    /// emitted: matter then carries the field along. Fields of space alone always are; those of (t, x, y, z) are fields of
-    /// events, unless they say so.
+    /// Returns whether a point is given by the place that its matter has at the reference time, rather than by where its
+    /// light is emitted: matter then carries the field along. Fields of space alone always are; those of (t, x, y, z) are
+    /// fields of events, unless they say so.
     fn is_carried(&self) -> bool {
         self.dimension() == 3
     }

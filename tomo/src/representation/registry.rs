@@ -14,7 +14,7 @@ pub type BuildRepresentation = fn(&OwnSettings) -> Result<Box<dyn Representation
 pub type FindRepresentation =
     fn(&str, &OwnSettings) -> Option<Result<Box<dyn Representation<f32>>, BuildError>>;
 
-/// What a representation of one's own is told.
+/// Settings of a representation of one's own.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OwnSettings {
     /// Inner radius of the region of recovery, M.

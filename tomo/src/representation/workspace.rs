@@ -4,7 +4,7 @@ use core::any::Any;
 
 /// Memory of a representation: grows at the first batch of its size and is kept.
 ///
-/// What is in it carries no information from one call to the next, but from
+/// Scratch space. Its content carries no information from one call to the next, but from
 /// [`eval_recorded`](super::Representation::eval_recorded) to the call that follows; any workspace serves any
 /// representation.
 #[derive(Default)]
@@ -18,7 +18,7 @@ impl Workspace {
         Self::default()
     }
 
-    /// What a representation keeps; made anew when another kind has used the workspace.
+    /// Returns the memory of a representation; made anew when another kind has used the workspace.
     pub fn of<W: Any + Default + Send>(&mut self) -> &mut W {
         if !self.held.as_ref().is_some_and(|held| held.is::<W>()) {
             self.held = Some(Box::new(W::default()));

@@ -41,8 +41,8 @@ impl Fit<'_> {
         Some(losses)
     }
 
-    /// What rounding may move parameters by in 20 steps. Gradients of few pairs have few singular values that are more than
-    /// rounding, and Muon multiplies the others by up to 3.4⁵ = 480.
+    /// Returns the largest change of parameters by rounding in 20 steps. Gradients of few pairs have few singular values that
+    /// are more than rounding, and Muon multiplies the others by up to 3.4⁵ = 480.
     fn rounding(&self) -> f64 {
         if self.training.muon.is_some() { 480.0 * 1e-5 } else { 1e-5 }
     }

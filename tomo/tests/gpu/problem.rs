@@ -62,7 +62,7 @@ fn model_of(velocity: AngularVelocity) -> ForwardModel<f32> {
     ForwardModel::new(&lines, &motion, &hole, Some(Redshift { power: 2.5 })).unwrap()
 }
 
-/// What a loss is made of.
+/// Kind of loss.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     /// Images alone.
@@ -136,7 +136,7 @@ pub fn objective(kind: Kind) -> Objective<f32> {
     Objective { model, data }
 }
 
-/// What six stations see of a frame.
+/// Simulates the observation of a frame by six stations.
 fn seen(frame: usize) -> Observation {
     let mut observation = Observation::empty(Basis::Stokes);
     for (a, b) in (0..6u16).flat_map(|a| (a + 1..6).map(move |b| (a, b))) {

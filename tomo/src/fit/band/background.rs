@@ -1,5 +1,5 @@
-//! What a source shines with beside the flare: in each Stokes parameter a constant and a stationary process, Gaussian and
-//! independent of each other, whose values no one knows and whose sizes are assumed.
+//! Background of a flare: in each Stokes parameter a constant and a stationary process, Gaussian and independent of each
+//! other, whose values are unknown and whose sizes are assumed.
 //!
 //! Dividing data and rows by the factor of its covariance leaves a problem with white noise. The data that are used come
 //! first, so that the others have no part in theirs.
@@ -148,8 +148,8 @@ impl CurveRows {
     }
 }
 
-/// What the background is expected to be at all data, and its standard deviation (both over those of the data), given the
-/// data that are used and a band; 0 where the data have no standard deviation.
+/// Returns the expected background at all data, and its standard deviation (both over those of the data), given the data
+/// that are used and a band; 0 where the data have no standard deviation.
 ///
 /// # Errors
 /// If the band has no node.

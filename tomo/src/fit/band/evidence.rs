@@ -83,10 +83,10 @@ pub fn without_flare(
     Ok((0..data.len()).map(of).collect())
 }
 
-/// What the data that are used see of a random field.
+/// Response of the data that are used to a random field.
 struct Field {
     covariance: DMatrix<f64>,
-    /// What a field of 1 gives, and the covariance with all emission.
+    /// Response to a field of 1, and the covariance with all emission.
     columns: DMatrix<f64>,
     /// The variance of all emission, and all emission of a field of 1.
     total: [f64; 2],

@@ -13,7 +13,7 @@ const FAINT: f64 = 1e-6;
 pub(super) struct BandCovariance {
     /// Data × data: the covariance of a field of unit variance.
     pub covariance: DMatrix<f64>,
-    /// What a field of 1 gives.
+    /// Response to a field of 1.
     pub uniform: DVector<f64>,
     /// Data × [moments](super::place): their covariance.
     pub moments: DMatrix<f64>,
@@ -125,7 +125,7 @@ impl CurveRows {
         (parts.rows(0, weights.len()).tr_mul(&weights), [weights.norm_squared(), of_one])
     }
 
-    /// What a field of 1 gives.
+    /// Returns the response to a field of 1.
     fn uniform(&self, [across, upright]: [&Profile; 2]) -> DVector<f64> {
         let (data, layers) = (self.data(), self.grid.layers);
         let of_rings = self.waves.columns(0, data * layers).tr_mul(&across.envelope);

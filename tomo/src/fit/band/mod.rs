@@ -25,7 +25,7 @@ pub use rows::{CurveRows, PolarGrid};
 
 use crate::Error;
 
-/// What is thought of the emission before any data: all combinations of these, each as probable.
+/// Prior of the emission: all combinations of these, each as probable.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BandPrior {
     /// ρ₀, M.
@@ -40,7 +40,7 @@ pub struct BandPrior {
     pub powers: Vec<f64>,
     /// μ.
     pub means: Vec<f64>,
-    /// What else may shine.
+    /// Backgrounds, each of which may be there.
     pub backgrounds: Vec<Background>,
 }
 
@@ -97,7 +97,7 @@ pub struct Band {
     pub power: f64,
     /// μ.
     pub mean: f64,
-    /// What else shines.
+    /// Background.
     pub background: Background,
 }
 

@@ -67,7 +67,7 @@ pub fn places(curve: &CurveRows, data: &[f64], bands: &[(Band, f64)]) -> Result<
     Ok(all)
 }
 
-/// What is needed of the data that are used, in front of a background.
+/// Quantities of the data that are used, in front of a background.
 struct Used {
     covariance: DMatrix<f64>,
     /// Moments, uniform emission, data.

@@ -22,7 +22,7 @@ pub struct Columns<T> {
     pub time: Vec<T>,
     /// Angles to the reference time.
     pub angle: Vec<T>,
-    /// What emission is multiplied by in its pixel.
+    /// Weight of emission in its pixel.
     pub weight: Vec<T>,
     /// Where the matter was at the reference time.
     pub pulled: [Vec<T>; 3],
@@ -189,7 +189,7 @@ impl<T: Float> Batch<T> {
         columns.truncate(to);
     }
 
-    /// What a representation sees: points pulled back, or events.
+    /// Returns the coordinates of a representation: points pulled back, or events.
     pub fn coordinates<'a>(
         columns: &'a Columns<T>,
         representation: &dyn Representation<T>,

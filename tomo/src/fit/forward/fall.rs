@@ -40,8 +40,8 @@ impl Fall {
         (&self.flow, &self.origins, self.limits)
     }
 
-    /// What node number k is stretched by and turned by to where its matter was `elapsed` (M) before: no numbers where
-    /// that is outside of the region, so that nothing shines.
+    /// Returns the factor by which node number k is stretched, and the angle by which it is turned, to where its
+    /// matter was `elapsed` (M) before: no numbers where that is outside of the region, so that nothing shines.
     #[inline]
     pub fn before(&self, node: usize, elapsed: f64) -> [f64; 2] {
         let origin = &self.origins[node];

@@ -66,9 +66,9 @@ pub struct ForwardModel<T> {
     pub(in crate::fit) fall: Option<Fall>,
     /// With which factors nodes enter several images; one image without.
     pub(in crate::fit) planes: Option<Planes<T>>,
-    /// What does not move; its parameters are the last of a field's.
+    /// Emission that does not move; its parameters are the last of a field's.
     pub(in crate::fit) quiescent: Option<Quiescent>,
-    /// Whether all rays add to the same pixel.
+    /// True if all rays add to the same pixel.
     pub(in crate::fit) is_flux: bool,
     pub(in crate::fit) factors: Vec<f64>,
     weighted_for: Option<Axis>,
@@ -185,7 +185,7 @@ impl<T: Float> ForwardModel<T> {
         Ok(self)
     }
 
-    /// What does not move, where it is recovered.
+    /// Returns the emission that does not move, where it is recovered.
     pub fn quiescent(&self) -> Option<&Quiescent> {
         self.quiescent.as_ref()
     }
@@ -225,7 +225,7 @@ impl<T: Float> ForwardModel<T> {
         &self.pixel
     }
 
-    /// Whether weights depend on the axis.
+    /// Returns whether weights depend on the axis.
     pub fn is_shifted(&self) -> bool {
         self.shift.is_some()
     }

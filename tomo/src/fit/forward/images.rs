@@ -43,7 +43,7 @@ impl<T: Float> ForwardModel<T> {
         self.add_quiescent(field, image);
     }
 
-    /// What does not move, into the images of a frame.
+    /// Adds the emission that does not move to the images of a frame.
     fn add_quiescent(&self, field: Field<'_, T>, image: &mut [T]) {
         if let Some(quiescent) = &self.quiescent {
             quiescent.add(field.parameters, image);

@@ -15,7 +15,7 @@ pub struct OccupancySettings {
     /// A cell is empty if no emission above this part of the largest one was seen in it or in one of its
     /// 26 neighbours.
     pub threshold: f64,
-    /// What is remembered of the emission that a cell had, from one refreshment to the next.
+    /// Share of the emission that a cell keeps from one refreshment to the next.
     pub memory: f64,
 }
 
@@ -49,7 +49,7 @@ impl Occupancy {
         self.occupied.iter().filter(|cell| **cell).count() as f64 / self.occupied.len() as f64
     }
 
-    /// Whether a point lies in a cell that may shine; none does outside the cube.
+    /// Returns whether a point lies in a cell that may shine; none does outside the cube.
     #[inline]
     pub fn holds(&self, point: [f64; 3]) -> bool {
         let n = self.settings.cells;
@@ -71,7 +71,7 @@ impl Occupancy {
         (self.settings.cells as u32, self.half_width as f32)
     }
 
-    /// Whether each cell may shine, z fastest.
+    /// Iterates over whether each cell may shine, z fastest.
     #[cfg(feature = "wgpu")]
     pub(in crate::fit) fn cells(&self) -> impl Iterator<Item = bool> {
         self.occupied.iter().copied()

@@ -99,7 +99,7 @@ impl PixelRays {
         self.starts.partition_point(|start| *start <= ray) - 1
     }
 
-    /// What a ray counts in its pixel.
+    /// Returns the weight of a ray in its pixel.
     pub fn share(&self, pixel: usize) -> f64 {
         1.0 / (self.starts[pixel + 1] - self.starts[pixel]) as f64
     }

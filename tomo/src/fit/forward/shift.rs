@@ -6,7 +6,7 @@ use kerrlight_geodesic::{Kerr, interrupt};
 use kerrlight_render::dynamics::{AngularVelocity, Axis};
 use rayon::prelude::*;
 
-/// What g of one node depends on: g = √N/(1 − Ω ξ·L), N = −u·u of the gas per (dt)².
+/// Quantities on which g of one node depends: g = √N/(1 − Ω ξ·L), N = −u·u of the gas per (dt)².
 ///
 /// With dφ/dt = −Ω ξ·θ̂/sin θ and dθ/dt = Ω ξ·φ̂ (a turn about ξ of the point r n),
 /// N = −g_tt − 2 g_tφ dφ/dt − g_φφ (dφ/dt)² − g_θθ (dθ/dt)².

@@ -47,14 +47,14 @@ impl Region {
         [self.r_min, self.r_max]
     }
 
-    /// Whether a point (r n, in M) lies in it; the outer sphere does not belong to it.
+    /// Returns whether a point (r n, in M) lies in it; the outer sphere does not belong to it.
     pub fn holds(&self, point: [f64; 3]) -> bool {
         let r = norm(point);
         r >= self.r_min && r < self.r_max && point[2].abs() <= self.z_width
     }
 
-    /// Whether matter at a point (M) passes it, or comes nearer than `margin` (M), while it turns about an axis (a unit vector)
-    /// at the same radius.
+    /// Returns whether matter at a point (M) passes it, or comes nearer than `margin` (M), while it turns about an axis (a unit
+    /// vector) at the same radius.
     pub fn is_passed(&self, axis: [f64; 3], point: [f64; 3], margin: f64) -> bool {
         let r = norm(point);
         let along: f64 = point.iter().zip(axis).map(|(x, axis)| x * axis).sum();
@@ -86,7 +86,7 @@ pub enum Sampling {
     },
 }
 
-/// What is wanted of nodes.
+/// Quantities wanted of nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SightlineRequest {
     /// Where they may lie.
@@ -110,7 +110,7 @@ pub struct Sightlines {
     pub starts: Vec<usize>,
     /// r n: x, y and z, M.
     pub position: [Vec<f64>; 3],
-    /// What the node's emission is multiplied by in the sum that is the pixel, M.
+    /// Weight of the node's emission in the sum that is the pixel, M.
     pub weight: Vec<f64>,
     /// t_o − t less r_o + 2 ln r_o, M; empty unless wanted.
     pub delay: Vec<f64>,
@@ -266,21 +266,21 @@ impl Sightlines {
         columns.map(|column| size_of_val(&**column)).sum()
     }
 
-    /// What there is of each node.
+    /// Returns the columns of all quantities of nodes.
     fn columns(&mut self) -> [&mut Vec<f64>; 9] {
         let Self { position: [x, y, z], weight, delay, momentum: [mx, my, mz], radial, .. } = self;
         [x, y, z, weight, delay, mx, my, mz, radial]
     }
 }
 
-/// What the time of flight from a finite radius has in excess of its finite part.
+/// Returns the excess of the time of flight from a finite radius over its finite part.
 fn flight(observer: &Observer) -> f64 {
     let w = observer.inverse_radius();
     if w > 0.0 { 1.0 / w - 2.0 * w.ln() } else { 0.0 }
 }
 
 impl SightlineRequest {
-    /// What it takes of rays.
+    /// Returns the request of rays that it needs.
     fn of_rays(&self, observer: &Observer) -> Result<BlockRequest, Error> {
         match self.sampling {
             Sampling::Gauss { order, split } => {

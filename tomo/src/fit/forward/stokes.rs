@@ -28,8 +28,8 @@ pub struct PolarizedView {
 }
 
 impl PolarizedView {
-    /// What a unit of emission at each node adds per weight of the node: I, Q and U of matter that moves like this; zero
-    /// where it would be faster than light. The nodes must have momenta.
+    /// Returns the light that a unit of emission at each node adds per weight of the node: I, Q and U of matter that
+    /// moves like this; zero where it would be faster than light. The nodes must have momenta.
     ///
     /// # Errors
     /// If a number of the law is out of its range, or the nodes have no momenta.
@@ -55,7 +55,7 @@ impl PolarizedView {
         Ok(views.iter().flatten().map(|seen| of(seen).turned(self.position_angle)).collect())
     }
 
-    /// What |b| is measured in.
+    /// Returns the unit of |b|.
     fn unit<'a>(&self, views: impl Iterator<Item = &'a SynchrotronView>) -> f64 {
         if self.law.normalisation == Normalisation::None {
             return 1.0;
@@ -124,7 +124,7 @@ impl Node {
     }
 }
 
-/// What data see of a model.
+/// Quantities of a model that data depend on.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Observable {
     /// Every pixel, of total intensity.
@@ -144,7 +144,7 @@ impl Observable {
         }
     }
 
-    /// Whether pixels are added up.
+    /// Returns whether pixels are added up.
     pub fn is_flux(&self) -> bool {
         matches!(self, Observable::Fluxes(_))
     }
@@ -191,7 +191,7 @@ impl<T: Float> Planes<T> {
         &self.factors[node as usize * self.count..(node as usize + 1) * self.count]
     }
 
-    /// What a loss changes by per light of a node in a pixel of the first image.
+    /// Returns the derivative of a loss by the light of a node in a pixel of the first image.
     #[inline(always)]
     pub fn slope(&self, of_image: &[T], pixel: usize, node: u32) -> T {
         let factors = self.of(node).iter().enumerate();

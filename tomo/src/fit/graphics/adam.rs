@@ -17,7 +17,7 @@ pub struct Learning {
     learn: Bound,
     count: usize,
     positive: bool,
-    /// What the device has, where it is known: parameters and moments.
+    /// Values on the device, where they are known: parameters and moments.
     held: [Vec<f32>; 3],
 }
 

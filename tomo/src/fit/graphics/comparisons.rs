@@ -7,7 +7,7 @@ use kerrlight_vlbi::data_terms::{ClosureScan, Comparison};
 use kerrlight_vlbi::operator::ImageGrid;
 use kerrlight_vlbi::products::ClosureKind;
 
-/// What is compared of a visibility.
+/// Kind of comparison of a visibility.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Flux,

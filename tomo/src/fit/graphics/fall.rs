@@ -38,8 +38,8 @@ impl FallTable {
     }
 }
 
-/// What a node has in place of its rate and phase: when it is by the table as the sum of two floats, and its azimuth, or
-/// its angular velocity where its matter stays at its radius.
+/// Returns the values of a node in place of its rate and phase: its time in the table as the sum of two floats, and its
+/// azimuth, or its angular velocity where its matter stays at its radius.
 pub fn of_node(origin: &Origin) -> [f32; 3] {
     let [time, azimuth] = origin.in_table();
     let [high, low] = if time.is_nan() { [NEVER, 0.0] } else { two_floats(time) };

@@ -76,7 +76,7 @@ impl Field {
     }
 }
 
-/// Whether parameters are held at zero or above.
+/// Returns whether parameters are held at zero or above.
 pub fn is_positive(representation: &dyn Representation<f32>) -> bool {
     let Some(BuiltIn::Grid(grid)) = representation.built_in() else { return false };
     grid.settings().activation == Activation::Linear

@@ -75,7 +75,7 @@ impl Levels {
     }
 }
 
-/// What kernels of a block of points are bound to.
+/// Buffers that kernels of a block of points are bound to.
 struct Binding<'a> {
     device: &'a Compute,
     kernels: &'a [Kernel],

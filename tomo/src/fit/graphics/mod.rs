@@ -73,9 +73,9 @@ pub struct GraphicsFit {
     turning: Option<Turning>,
     field: Field,
     pieces: Pieces,
-    /// Whether the field is one of places and times.
+    /// True if the field is one of places and times.
     events: bool,
-    /// Whether the device makes all residuals.
+    /// True if the device makes all residuals.
     makes_residuals: bool,
     /// Where there are data but images, which it compares.
     visibilities: Option<Visibilities>,

@@ -95,7 +95,7 @@ impl Binding<'_> {
     }
 }
 
-/// What the shader knows of the matrices, and how many numbers they work on.
+/// Returns the table of matrices for the shader, and how many numbers they work on.
 fn table(matrices: &[WeightMatrix]) -> (Vec<u32>, usize) {
     let (mut table, mut place) = (Vec::new(), 0);
     for WeightMatrix { offset, rows, columns } in matrices {

@@ -35,7 +35,7 @@ pub struct Network {
     pub stride: usize,
     /// Blocks of points.
     pub blocks: Vec<Block>,
-    /// What the blocks share.
+    /// Memory that the blocks share.
     pub memory: Memory,
     /// Which of the slopes those of given inputs are.
     pub of_inputs: usize,
@@ -67,7 +67,7 @@ pub struct Memory {
     behind_units: Option<(Buffer, Buffer)>,
 }
 
-/// What kernels are bound to, and where.
+/// Buffers that kernels are bound to, and where.
 struct Binding<'a> {
     device: &'a Compute,
     kernels: &'a [Kernel],
@@ -130,7 +130,7 @@ impl Network {
         }
     }
 
-    /// Whether activations of all blocks but the last are gone after so many points went forward.
+    /// Returns whether activations of all blocks but the last are gone after so many points went forward.
     pub fn is_cut(&self, points: usize) -> bool {
         points > self.stride
     }

@@ -35,7 +35,7 @@ impl Share {
         objective.data.others.iter().map(of).collect()
     }
 
-    /// What χ² is multiplied by in the loss.
+    /// Returns the factor of χ² in the loss.
     pub fn factor(&self) -> f32 {
         (self.weight * self.scale) as f32
     }

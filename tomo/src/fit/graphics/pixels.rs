@@ -7,7 +7,7 @@ use super::kernels::{ROW, compiled, grid};
 use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError};
 use kerrlight_geodesic::wgsl;
 
-/// What a device has room for.
+/// Capacity of a device.
 #[derive(Clone, Copy, Debug)]
 pub struct Room {
     /// Nodes of all rays.
@@ -29,7 +29,7 @@ pub struct Room {
 pub struct Node {
     /// x, y, z, M.
     pub place: [f32; 3],
-    /// What emission is multiplied by in its pixel.
+    /// Weight of emission in its pixel.
     pub weight: f32,
     /// Angle that it is turned by in a unit of time, that of its delay, the delay and nothing; where matter falls, what
     /// [`of_node`](super::fall::of_node) says of it about the delay.
@@ -56,7 +56,7 @@ pub struct Gathering {
     pub earliest: Option<f32>,
     /// Cells and half the width (M) of the mask, if it is used.
     pub mask: Option<(u32, f32)>,
-    /// Whether the field is one of places and times of emission.
+    /// True if the field is one of places and times of emission.
     pub events: bool,
     /// dL/dpixel of a residual of 1.
     pub slope: f32,
@@ -88,7 +88,7 @@ pub struct Points {
 pub struct Pixels {
     /// The points.
     pub points: Points,
-    /// What is done where the axis is learnt.
+    /// Slope with the axis, where it is learnt.
     pub axis: Option<AxisSlope>,
     task: Buffer,
     nodes: Buffer,

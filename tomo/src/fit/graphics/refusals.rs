@@ -1,4 +1,4 @@
-//! What is not computed on graphics devices.
+//! Fits that graphics devices do not compute.
 
 use crate::Error;
 use crate::fit::learning::device::DeviceError;

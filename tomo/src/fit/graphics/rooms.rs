@@ -44,9 +44,9 @@ impl Pieces {
 /// Where a piece of a step is in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ends {
-    /// Whether it is the first.
+    /// True if it is the first.
     pub is_first: bool,
-    /// Whether it is the last, of a step that is taken.
+    /// True if it is the last, of a step that is taken.
     pub is_last_and_learns: bool,
 }
 

@@ -1,10 +1,10 @@
-//! What a network looks like, and how its products of matrices are cut into tiles.
+//! Shape of a network, and how its products of matrices are cut into tiles.
 
-/// What a network looks like: parameters are layer after layer, each its kernel (inputs × outputs, row by row) and then
-/// its biases.
+/// Shape of a network: parameters are layer after layer, each its kernel (inputs × outputs, row by row) and then its
+/// biases.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shape {
-    /// What it is given.
+    /// Input.
     pub front: Front,
     /// Where its parameters start.
     pub start: usize,
@@ -12,7 +12,7 @@ pub struct Shape {
     pub width: usize,
     /// Hidden layers.
     pub hidden: usize,
-    /// What it is given is appended to the units of this hidden layer, counted from 1.
+    /// Hidden layer, counted from 1, to whose units the input is appended.
     pub skip: Option<usize>,
     /// Of the output: 0 sigmoid, 1 softplus, 2 none.
     pub activation: u32,
@@ -25,7 +25,7 @@ pub struct Shape {
 pub enum Front {
     /// The encoded point.
     Encoded {
-        /// What x, y, z (or t, x, y, z) are multiplied with.
+        /// Factors of x, y, z (or t, x, y, z).
         scales: [f32; 4],
         /// Coordinates: 3 or 4.
         dimension: usize,
@@ -74,7 +74,7 @@ impl Tiling {
         Self { left_lanes: 256 / right_lanes, right_lanes, slab }
     }
 
-    /// What stands before the shader.
+    /// Returns the constants in front of the shader.
     pub fn constants(self) -> String {
         let Self { left_lanes, right_lanes, slab } = self;
         format!(
@@ -111,7 +111,7 @@ impl Shape {
         }
     }
 
-    /// Whether they are given.
+    /// Returns whether they are given.
     pub fn is_given(&self) -> bool {
         matches!(self.front, Front::Given(_))
     }

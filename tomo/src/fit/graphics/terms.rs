@@ -1,4 +1,4 @@
-//! What data say of light that comes back from the device.
+//! Losses of light that comes back from the device.
 
 use crate::fit::loss::objective::{Loss, Objective};
 use crate::fit::loss::terms::FrameTerm;

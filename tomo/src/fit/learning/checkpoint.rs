@@ -42,7 +42,7 @@ pub enum CheckpointError {
     },
 }
 
-/// What is written in front.
+/// Header in front of a checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Header {

@@ -1,4 +1,4 @@
-//! What programs ask of a fit.
+//! Fits of programs.
 //!
 //! Fits run in single precision, tests of their derivatives in double. What is generic is compiled anew in every program that
 //! uses it; these methods are not, and are compiled here once.

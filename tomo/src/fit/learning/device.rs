@@ -1,8 +1,8 @@
 //! Steps of a fit that something else than this processor takes: a graphics device.
 //!
-//! What is drawn, how long steps are, and what is done when the loss diverges is decided here, as ever; the device gets a
-//! stretch of steps and gives back what they lead to. Between stretches the whole state is in [`State`](crate::fit::State), so that a
-//! checkpoint that one device has written is taken up by another.
+//! Steps on devices. What is drawn, how long steps are, and what is done when the loss diverges is decided here, as ever; the
+//! device gets a stretch of steps and gives back what they lead to. Between stretches the whole state is in
+//! [`State`](crate::fit::State), so that a checkpoint that one device has written is taken up by another.
 
 use super::state::Progress;
 use crate::Error;
@@ -18,7 +18,7 @@ use kerrlight_render::dynamics::Axis;
 #[error("{0}")]
 pub struct DeviceError(pub String);
 
-/// What a step looks at.
+/// Data of a step.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Drawn {
     /// (ray, frame) pairs of images.
@@ -47,13 +47,13 @@ pub struct Stretch<'a, T> {
     pub axis: Axis,
     /// Outside of it nothing shines.
     pub occupancy: Option<&'a Occupancy>,
-    /// What each step looks at.
+    /// Data of each step.
     pub draws: Vec<Drawn>,
     /// Learning rate of each step.
     pub rates: Vec<f64>,
 }
 
-/// What a stretch of steps leads to.
+/// Result of a stretch of steps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Taken<T> {
     /// Parameters after the last step.
@@ -71,7 +71,7 @@ pub trait StepDevice<T>: Send {
     /// Its name.
     fn name(&self) -> &str;
 
-    /// Whether it makes all residuals, so that nothing but losses comes back before the end of a stretch.
+    /// Returns whether it makes all residuals, so that nothing but losses comes back before the end of a stretch.
     fn makes_residuals(&self) -> bool;
 
     /// The most steps of a stretch: one if the axis is learnt.

@@ -1,4 +1,4 @@
-//! What a fit remembers from step to step, and how it goes back when its loss diverges.
+//! State of a fit from step to step, and how it goes back when its loss diverges.
 
 use super::training::{OccupancyPlan, Training};
 use crate::fit::forward::occupancy::Occupancy;
@@ -11,18 +11,18 @@ use kerrlight_render::dynamics::Axis;
 /// Most returns of a fit.
 const MOST_SETBACKS: u32 = 12;
 
-/// What of a fit goes on from step to step.
+/// State of a fit from step to step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Progress<T> {
     /// Steps taken.
     pub step: u64,
     /// Parameters of the representation.
     pub parameters: Vec<T>,
-    /// What Adam remembers of them.
+    /// State of Adam for the parameters.
     pub adam: AdamState<T>,
     /// The axis.
     pub axis: Axis,
-    /// What Adam remembers of it.
+    /// State of Adam for the axis.
     pub axis_adam: AdamState<f64>,
     /// Mask of what shines.
     pub occupancy: Option<Occupancy>,
@@ -43,7 +43,7 @@ pub struct State<T> {
     pub setbacks: u32,
 }
 
-/// What a step did.
+/// Outcome of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// It moved on.

@@ -9,7 +9,7 @@ use kerrlight_common::simd::Float;
 
 /// A fit with its memory.
 pub struct Trainer<'a, T> {
-    /// What is minimised.
+    /// Objective that is minimised.
     pub objective: Objective<T>,
     /// The field.
     pub representation: &'a dyn Representation<T>,

@@ -9,7 +9,7 @@ use kerrlight_common::simd::Float;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What a step looks at.
+/// Data of a step: rays, or whole frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum BatchSize {
@@ -51,7 +51,7 @@ pub struct Training {
     pub batch: BatchSize,
     /// A mask that skips dark cells.
     pub occupancy: Option<OccupancyPlan>,
-    /// What change costs while matter carries emission, where a representation allows it.
+    /// Price of change while matter carries emission, where a representation allows it.
     pub change: Option<ChangePrice>,
     /// Where emission is looked for.
     pub region: Region,
@@ -62,7 +62,7 @@ pub struct Training {
 }
 
 impl Training {
-    /// Whether the axis is learnt, of a representation that knows of it.
+    /// Returns whether the axis is learnt, of a representation that knows of it.
     pub fn learns_axis<T: Float>(&self, representation: &dyn Representation<T>) -> bool {
         self.axis_rate.is_some() && representation.is_carried()
     }

@@ -49,12 +49,12 @@ impl Change {
         Ok(self)
     }
 
-    /// Whether there is more than one knot.
+    /// Returns whether there is more than one knot.
     pub fn is_any(&self) -> bool {
         self.knots.count > 1
     }
 
-    /// Whether emission may appear and fade.
+    /// Returns whether emission may appear and fade.
     pub(super) fn is_free(&self) -> bool {
         self.is_any() && self.knots.allowed == Allowed::Any
     }
@@ -63,20 +63,20 @@ impl Change {
         self.is_any() && self.knots.allowed == Allowed::Births
     }
 
-    /// Whether births that were found cost less than others.
+    /// Returns whether births that were found cost less than others.
     pub(super) fn is_sharpened(&self) -> bool {
         self.is_born() && self.sharpen.is_some()
     }
 
-    /// Whether a node of a grid, at the time of its knot, is where emission may be; above and below that, whether some of
-    /// its cells are. Nodes beyond the largest radius would be a store that costs nothing: matter falls in from there.
+    /// Returns whether a node of a grid, at the time of its knot, is where emission may be; above and below that, whether some
+    /// of its cells are. Nodes beyond the largest radius would be a store that costs nothing: matter falls in from there.
     pub(super) fn allows(&self, position: [f64; 3], spacing: f64) -> bool {
         let within = self.within.filter(|_| self.is_born());
         let higher = |region: Region| Region { z_width: region.z_width + 0.5 * spacing, ..region };
         within.is_none_or(|region| higher(region).holds(position))
     }
 
-    /// What penalties on the field of each knot are multiplied by.
+    /// Returns the factor of penalties on the field of each knot.
     pub(super) fn share(&self) -> f64 {
         if self.is_born() { 1.0 } else { 1.0 / self.knots.count as f64 }
     }
@@ -88,7 +88,8 @@ impl Change {
         knots.flat_map(|share| field.iter().map(move |x| share * x)).collect()
     }
 
-    /// What births of all nodes and knots but the first cost beside `weight`, after a field was found; nothing, if all cost the same.
+    /// Returns the prices beside `weight` of births of all nodes and knots but the first, after a field was found; nothing, if
+    /// all cost the same.
     pub(super) fn prices(&self, x: &[f64], shape: Shape) -> Vec<f64> {
         let Some(s) = self.sharpen.filter(|_| self.is_born()) else { return Vec::new() };
         let born = x[..shape.count() * self.knots.count].chunks_exact(shape.count()).skip(1);

@@ -1,4 +1,4 @@
-//! What a descent asks of a function.
+//! Functions that a descent minimises.
 
 /// A convex function of numbers in a box.
 pub(super) trait Convex {

@@ -7,7 +7,7 @@ use kerrlight_common::simd::Float;
 /// Data with the weight of their reduced χ².
 #[derive(Clone, Copy)]
 pub struct Weighted<'a, T: Float> {
-    /// What they count.
+    /// Weight of the data.
     pub weight: f64,
     /// The data.
     pub term: &'a dyn FrameTerm<T>,
@@ -74,12 +74,12 @@ impl<'a, T: Float> Data<'a, T> {
         self.terms.iter().all(|data| data.term.is_convex())
     }
 
-    /// Whether none of the data knows the flux.
+    /// Returns whether none of the data knows the flux.
     pub fn is_scale_free(&self) -> bool {
         self.terms.iter().all(|data| data.term.is_scale_free())
     }
 
-    /// What the data are.
+    /// Names the data.
     pub fn names(&self) -> String {
         let names: Vec<&str> = self.terms.iter().map(|data| data.term.name()).collect();
         names.join(", ")

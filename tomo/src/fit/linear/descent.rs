@@ -40,7 +40,7 @@ const LATELY: usize = 10;
 struct RecentValues(VecDeque<f64>);
 
 impl RecentValues {
-    /// Whether the last iterations lowered the value by less than `part` of it.
+    /// Returns whether the last iterations lowered the value by less than `part` of it.
     fn is_settled(&mut self, value: f64, part: f64) -> bool {
         self.0.push_back(value);
         let before = if self.0.len() > LATELY { self.0.pop_front() } else { None };

@@ -41,7 +41,7 @@ impl StopRule {
     }
 }
 
-/// What a round leaves.
+/// Result of a round.
 struct Round {
     least: Least,
     ending: Ending,

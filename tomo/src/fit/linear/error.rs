@@ -1,6 +1,6 @@
 //! Why a linear problem has no solution.
 
-/// What a linear problem or a scan of axes ends in instead of a result.
+/// Failure of a linear problem or of a scan of axes.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LinearError {
@@ -22,7 +22,7 @@ pub enum LinearError {
         "a mean flux of {flux} Jy needs an emission of {needed:.4}, above linear.upper = {upper}"
     )]
     TooBright {
-        /// What was given, Jy.
+        /// Flux that was given, Jy.
         flux: f64,
         /// Largest emission.
         needed: f64,

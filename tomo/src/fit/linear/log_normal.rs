@@ -51,7 +51,7 @@ impl LogNormalField {
     }
 }
 
-/// What is minimised over white numbers: −2/data times the logarithm of a density.
+/// Function that is minimised over white numbers: −2/data times the logarithm of a density.
 pub(super) struct Posterior<'a, 'b, T: Float> {
     pub objective: Objective<'a, 'b, T>,
     pub prior: &'b LogNormalField,

@@ -1,4 +1,4 @@
-//! What is minimised: data and penalties as a function of the values at the nodes that count.
+//! Objective of the linear problem: data and penalties as a function of the values at the nodes that count.
 
 use super::change::Change;
 use super::convex::Convex;
@@ -40,7 +40,7 @@ impl Penalised<'_> {
             && self.quiescent.is_none_or(|image| image.priors.is_empty())
     }
 
-    /// Whether anything has second derivatives that are the same everywhere.
+    /// Returns whether anything has second derivatives that are the same everywhere.
     fn is_curved(&self) -> bool {
         let is_smooth = |prior: &Prior| prior.regulariser == Regulariser::Smoothness;
         self.gaussian.is_some() || self.priors.iter().any(is_smooth)

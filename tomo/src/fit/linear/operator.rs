@@ -13,7 +13,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// Pieces that frames are cut into, whatever the number of threads: each adds up its own gradient.
 const PIECES: usize = 16;
-/// What part of the memory slopes may take that are kept to be subtracted.
+/// Share of the memory for slopes that are kept to be subtracted.
 const SLOPES: f64 = 1.0 / 16.0;
 
 /// The movie as a function of the values at the nodes that count. Rows of the first frames are made, as many as fit into a
@@ -213,7 +213,7 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         all.concat()
     }
 
-    /// What slopes with respect to pixels, frame after frame, take from the nodes that count.
+    /// Returns the slopes with respect to the nodes that count, from those with respect to pixels, frame after frame.
     pub fn adjoint(&self, slopes: &[T]) -> Vec<f64> {
         let dark = vec![T::zero(); self.active.count()];
         let link = |k: usize, _: &[T], out: &mut [T]| {

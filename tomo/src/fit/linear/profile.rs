@@ -1,4 +1,4 @@
-//! What data say of numbers that move all images, when the field follows them: variable projection
+//! Slopes and curvatures of data along numbers that move all images, when the field follows them: variable projection
 //! (Golub & Pereyra 1973).
 //!
 //! With F(ω) the minimum over fields of a function of images and fields, its slope is that at the minimising field held

@@ -1,5 +1,5 @@
-//! What L-BFGS knows of the second derivatives, on the numbers that are free to move
-//! (Nocedal & Wright 2006, algorithm 7.4).
+//! Second derivatives of L-BFGS, on the numbers that are free to move (Nocedal & Wright 2006, algorithm
+//! 7.4).
 //!
 //! Which numbers are free changes from step to step; products are therefore taken over those of the moment.
 //! [`Lbfgs`](crate::optimise::Lbfgs) has no bounds.

@@ -18,7 +18,7 @@ pub struct Voxels {
     pub low: [f64; 3],
     /// Coordinates of the last node, M.
     pub high: [f64; 3],
-    /// What is between them.
+    /// Degree of the interpolation between nodes.
     pub degree: Degree,
 }
 
@@ -72,12 +72,12 @@ pub(super) struct Place<T> {
     pub corner: u32,
     /// Position in the cell, 0 to 1 along each axis.
     pub within: [T; 3],
-    /// What the value there is multiplied by in the pixel.
+    /// Weight of the value there in the pixel.
     pub weight: T,
 }
 
 impl<T: Float> Place<T> {
-    /// What the nodes of the cell are multiplied by, z fastest.
+    /// Writes the weights of the nodes of the cell, z fastest.
     #[inline(always)]
     pub fn weights(&self, degree: Degree, out: &mut [T; STENCIL]) {
         degree.products(self.within, self.weight, out);
@@ -180,7 +180,7 @@ impl<'a, T: Float> Walk<'a, T> {
         }
     }
 
-    /// Whether a knot has a share in the light of a frame.
+    /// Returns whether a knot has a share in the light of a frame.
     fn takes_part(&self, knot: usize, frame: usize) -> bool {
         let Knots { first, spacing, count, allowed } = self.knots;
         if count == 1 {
@@ -287,7 +287,7 @@ impl<'a, T: Float> Walk<'a, T> {
         self.model.times[frame] - delay
     }
 
-    /// Whether a node shines in a frame.
+    /// Returns whether a node shines in a frame.
     #[inline(always)]
     fn shines(&self, node: usize, frame: usize) -> bool {
         self.model.earliest.is_none_or(|earliest| self.time(node, frame) >= earliest)

@@ -9,7 +9,7 @@ use kerrlight_common::memory;
 use kerrlight_common::simd::Float;
 use rayon::prelude::*;
 
-/// What part of the memory rows may take.
+/// Share of the memory for rows.
 const ROWS: f64 = 1.0 / 4.0;
 /// Frames between which the budget is looked at: where rows end and walks begin depends on it, and on no memory.
 const AT_A_TIME: usize = 8;

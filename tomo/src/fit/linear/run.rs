@@ -19,7 +19,7 @@ use kerrlight_common::simd::Float;
 /// Values at the nodes, and which of them count.
 type Start = (Vec<f64>, Vec<bool>);
 
-/// What the coarse problem found, and the lit field that it began with if there was one.
+/// Field of the coarse problem, and the lit field that it began with if there was one.
 type Coarsely = (Vec<f64>, Option<Vec<f64>>);
 
 /// Where lit fields are evaluated if no coarse problem is requested.

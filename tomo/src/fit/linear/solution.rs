@@ -1,4 +1,4 @@
-//! What a solution says while it is under way, and in the end.
+//! Progress and result of a solution.
 
 use super::active::Active;
 use super::certificate::{Certificate, Stationarity};
@@ -6,7 +6,7 @@ use super::descent::Ending;
 use core::ops::ControlFlow;
 use kerrlight_common::simd::Float;
 
-/// What is known while iterations go on.
+/// State of a solution while iterations go on.
 pub struct LinearProgress<'a> {
     /// 0: the coarse problem.
     pub round: usize,
@@ -61,12 +61,12 @@ impl<T: Float> LinearSolution<T> {
     }
 }
 
-/// What some iterations reached.
+/// Field that some iterations reached.
 #[derive(Clone, Debug)]
 pub struct Least {
     /// Emission at all nodes of the grid, and parameters of what does not move behind it.
     pub x: Vec<f64>,
-    /// What is minimised.
+    /// Value of the objective.
     pub value: f64,
 }
 

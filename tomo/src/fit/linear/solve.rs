@@ -70,8 +70,8 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         }
     }
 
-    /// What some iterations over all nodes reach from a dark field, or from where a prior's density is highest, or from the
-    /// best lit field where data are not convex.
+    /// Returns the field that some iterations over all nodes reach from a dark field, or from where a prior's density is
+    /// highest, or from the best lit field where data are not convex.
     ///
     /// # Errors
     /// As those of [`solve`](Self::solve).

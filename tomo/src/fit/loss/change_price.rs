@@ -1,5 +1,5 @@
-//! What change costs while matter carries emission, for representations that are learnt: ∫∫ |∂e/∂t| dV dt at a fixed place
-//! of matter at the reference time. The linear problem has the same price ([`Change`](crate::fit::linear::Change)).
+//! Price of change while matter carries emission, for representations that are learnt: ∫∫ |∂e/∂t| dV dt at a fixed place of
+//! matter at the reference time. The linear problem has the same price ([`Change`](crate::fit::linear::Change)).
 
 use crate::fit::Field;
 use crate::fit::forward::sightlines::Region;
@@ -16,7 +16,7 @@ pub struct ChangePrice {
     pub weight: f64,
     /// Times that emission is compared at.
     pub knots: Knots,
-    /// Whether emission is linear between the knots. Else it is compared at times as far apart, anywhere between the first
+    /// True if emission is linear between the knots. Else it is compared at times as far apart, anywhere between the first
     /// and the last of them.
     pub linear: bool,
     /// Where emission is looked for.

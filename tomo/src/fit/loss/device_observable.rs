@@ -1,9 +1,9 @@
-//! What frames are compared with, for those who compute χ² on another device.
+//! Data of frames, for callers who compute χ² on another device.
 
 use kerrlight_vlbi::data_terms::Comparison;
 use kerrlight_vlbi::operator::ImageGrid;
 
-/// What a frame is compared with.
+/// Data of a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Compared {
     /// Nothing.
@@ -16,7 +16,7 @@ pub enum Compared {
         sky: ImageGrid,
         /// (u, v) in wavelengths, and the Fourier transform of a pixel there.
         seen: Vec<([f64; 2], f64)>,
-        /// What they are compared with.
+        /// Comparison with the data.
         with: Comparison,
     },
 }

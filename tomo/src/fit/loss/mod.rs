@@ -1,4 +1,4 @@
-//! What a field is judged by: data terms, penalties, and their sum with its gradient.
+//! Loss of a field: data terms, penalties, and their sum with its gradient.
 
 pub(in crate::fit) mod change_price;
 pub(in crate::fit) mod curve_term;

@@ -1,4 +1,4 @@
-//! What whole movies are like beside the data: their loss without a gradient, and their residuals.
+//! Losses of whole movies, without a gradient, and their residuals.
 
 use super::objective::{Buffers, Loss, Objective};
 use super::terms::FrameTerm;
@@ -20,7 +20,8 @@ impl<T: Float> Objective<T> {
         self.model.movie(field, frames, &mut buffers.batch, &mut buffers.workspace, movie);
     }
 
-    /// What the residuals of images of all frames are like: for each kind of data, in the order of [`Self::names`].
+    /// Returns the statistics of residuals of images of all frames: for each kind of data, in the order of
+    /// [`Self::names`].
     ///
     /// # Errors
     /// If images cannot be read.

@@ -18,7 +18,7 @@ pub struct Weighted<D: ?Sized> {
     pub term: Box<D>,
 }
 
-/// What a fit compares with.
+/// Data of a fit.
 pub struct Data<T> {
     /// Images: the only data whose pixels can be taken one by one.
     pub image: Option<Weighted<ImageTerm<T>>>,
@@ -33,7 +33,7 @@ pub struct Loss {
     pub total: f64,
     /// χ² per datum of each kind of data, the image first if there is one.
     pub terms: Vec<f64>,
-    /// What change costs, where a representation has that price.
+    /// Cost of change, where a representation has that price.
     pub change: Option<f64>,
     /// Nodes at which emission was evaluated.
     pub points: usize,
@@ -88,7 +88,7 @@ impl<T: Float> Buffers<T> {
 pub struct Objective<T> {
     /// From emission to pixels.
     pub model: ForwardModel<T>,
-    /// What pixels are compared with.
+    /// Data of pixels.
     pub data: Data<T>,
 }
 

@@ -1,5 +1,4 @@
-//! What is thought about an emission field beside the data: penalties on values at the nodes of a
-//! regular grid. Off by default.
+//! Penalties on an emission field: on values at the nodes of a regular grid. Off by default.
 //!
 //! Every penalty is an integral over the volume (a sum over nodes times the volume of a cell), so that a weight means
 //! the same on a finer grid.
@@ -38,7 +37,7 @@ pub enum Regulariser {
 pub struct Prior {
     /// Which.
     pub regulariser: Regulariser,
-    /// What it is multiplied by.
+    /// Factor of the penalty.
     pub weight: f64,
 }
 
@@ -68,7 +67,7 @@ impl Regulariser {
         }
     }
 
-    /// What it is called in text.
+    /// Returns its name in text.
     pub fn name(&self) -> &'static str {
         match self {
             Self::TotalVariation { .. } => "total variation",

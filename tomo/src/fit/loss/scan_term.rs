@@ -1,4 +1,4 @@
-//! What an array of telescopes sees of frames.
+//! Visibilities of frames by an array of telescopes.
 
 use super::device_observable::Compared;
 use super::terms::FrameTerm;
@@ -7,7 +7,7 @@ use kerrlight_vlbi::data_terms::{DataTerm, Residual};
 use kerrlight_vlbi::operator::{Operator, Transform};
 use num_complex::Complex;
 
-/// What an array of telescopes measures of a frame.
+/// Measurements of a frame by an array of telescopes.
 pub struct Scan<T> {
     /// From the frame, an image or several for Stokes parameters, to its visibilities.
     pub transform: Transform<T>,

@@ -1,4 +1,4 @@
-//! What of the data a step looks at.
+//! Selection of the data of a step.
 
 /// Which part of the data a step looks at.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +18,7 @@ impl Selection<'_> {
         }
     }
 
-    /// Whether there are none.
+    /// Returns whether there are none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

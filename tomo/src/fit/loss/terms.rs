@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 /// Images are rows of pixels from the north, each from the east, in Jy/pixel where data are
 /// radio ones.
 pub trait FrameTerm<T: Float>: Send + Sync {
-    /// What the data are, for logs and reports.
+    /// Names the data, for logs and reports.
     fn name(&self) -> &str;
 
     /// Images of the movie.
@@ -25,17 +25,17 @@ pub trait FrameTerm<T: Float>: Send + Sync {
     /// Real data of a frame; 0 where there are none.
     fn degrees_of_freedom(&self, frame: usize) -> usize;
 
-    /// Whether χ² is quadratic in the pixels.
+    /// Returns whether χ² is quadratic in the pixels.
     fn is_quadratic(&self) -> bool;
 
-    /// Whether χ² is convex in the pixels: quadratic ones are. Only then can a minimum be told from other stationary
-    /// points.
+    /// Returns whether χ² is convex in the pixels: quadratic ones are. Only then can a minimum be told from other
+    /// stationary points.
     fn is_convex(&self) -> bool {
         self.is_quadratic()
     }
 
-    /// Whether χ² stays the same when all pixels are multiplied by one positive number: such data do not know the
-    /// flux.
+    /// Returns whether χ² stays the same when all pixels are multiplied by one positive number: such data do not
+    /// know the flux.
     fn is_scale_free(&self) -> bool {
         false
     }
@@ -45,7 +45,7 @@ pub trait FrameTerm<T: Float>: Send + Sync {
         None
     }
 
-    /// What a frame is compared with, for those who compute χ² on another device; none where only this processor
+    /// Returns the data of a frame, for callers who compute χ² on another device; none where only this processor
     /// computes it.
     fn compared(&self, _frame: usize) -> Option<Compared> {
         None
@@ -111,7 +111,7 @@ impl<T: Float> ImageTerm<T> {
         self
     }
 
-    /// Whether a pixel counts.
+    /// Returns whether a pixel counts.
     fn counts(&self, pixel: usize) -> bool {
         !self.left_out.get(pixel).is_some_and(|out| *out)
     }

@@ -1,4 +1,5 @@
-//! What does not move: an image on the screen, the same in every frame, that is recovered beside the emission.
+//! Emission that does not move: an image on the screen, the same in every frame, that is recovered beside the moving
+//! emission.
 
 mod with_static_image;
 
@@ -21,7 +22,7 @@ pub struct Quiescent {
     pub signed: Vec<bool>,
     /// The largest parameter.
     pub most: f64,
-    /// What it stands for: the largest brightness, Jy in a pixel.
+    /// Unit of its parameters: the largest brightness, Jy in a pixel.
     pub upper: f64,
     /// Jy in a pixel that is as bright as 1 M of emission 1: the unit of brightness for penalties.
     pub jy_per_pixel: f64,

@@ -51,11 +51,11 @@ pub struct Effort {
 pub struct AxisSettings {
     /// Points of the lattice over the whole sphere.
     pub directions: usize,
-    /// What is solved at each.
+    /// Effort of the solution at each axis.
     pub coarse: Effort,
     /// Local minima of the lattice that are refined, the best one of the hemisphere opposite to the best included.
     pub candidates: usize,
-    /// What is solved in the refinement.
+    /// Effort of the solutions of the refinement.
     pub fine: Effort,
     /// Times that the step of the refinement is halved; it begins with the distance of lattice points, √(4π/directions).
     pub halvings: usize,
@@ -82,7 +82,7 @@ pub struct AxisLoss {
     pub loss: f64,
 }
 
-/// What a scan found.
+/// Result of a scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisScan {
     /// The lattice with its losses, of the coarse problem.

@@ -116,7 +116,7 @@ impl LossKind {
         LossKind::LightCurve,
     ];
 
-    /// What `loss.data` calls it.
+    /// Returns its name in `loss.data`.
     pub fn name(self) -> &'static str {
         match self {
             LossKind::Image => "image",
@@ -130,7 +130,7 @@ impl LossKind {
         }
     }
 
-    /// What it is called in a sentence.
+    /// Returns its name in a sentence.
     pub fn label(self) -> &'static str {
         match self {
             LossKind::Image => "images",
@@ -144,24 +144,25 @@ impl LossKind {
         }
     }
 
-    /// Whether χ² of it is convex in the emission, so that a minimum can be told from other stationary points.
+    /// Returns whether χ² of it is convex in the emission, so that a minimum can be told from other stationary
+    /// points.
     pub fn is_convex(self) -> bool {
         self.is_visibilities() || matches!(self, LossKind::Image | LossKind::LightCurve)
     }
 
-    /// Whether they compare Q and U of baselines too.
+    /// Returns whether they compare Q and U of baselines too.
     pub fn is_polarized(self) -> bool {
         matches!(self, LossKind::PolarizedVisibilities | LossKind::PolarimetricRatios)
     }
 
-    /// Whether they know the flux of the source.
+    /// Returns whether they know the flux of the source.
     pub fn knows_flux(self) -> bool {
         let all =
             [LossKind::ClosurePhases, LossKind::LogClosureAmplitudes, LossKind::PolarimetricRatios];
         !all.contains(&self)
     }
 
-    /// Whether they are complex visibilities, of total intensity or of all products.
+    /// Returns whether they are complex visibilities, of total intensity or of all products.
     pub fn is_visibilities(self) -> bool {
         matches!(self, LossKind::Visibilities | LossKind::PolarizedVisibilities)
     }
@@ -171,7 +172,7 @@ impl LossKind {
 mod tests {
     use super::*;
 
-    /// What messages list is what settings are read as.
+    /// Names that messages list are those that settings are read as.
     #[test]
     fn exact_names_are_those_of_the_settings() {
         for kind in LossKind::ALL {

@@ -24,7 +24,7 @@ pub enum FitError {
         key: String,
         /// The value that was given.
         value: String,
-        /// What would be allowed.
+        /// Allowed values.
         allowed: String,
     },
     /// A key that these settings need.
@@ -38,18 +38,18 @@ pub enum FitError {
     /// Settings that contradict each other or the data.
     #[error("{0}")]
     Conflict(String),
-    /// What is wrong with a part of the settings, such as `loss 1`.
+    /// A part of the settings, such as `loss 1`, is wrong.
     #[error("{part}: {error}")]
     Part {
         /// The part.
         part: String,
-        /// What is wrong with it.
+        /// Error of the part.
         error: Box<FitError>,
     },
     /// More memory would be needed than there is.
     #[error(transparent)]
     Memory(#[from] TooLarge),
-    /// What the numbers are handed to refuses them.
+    /// A number that its consumer refuses.
     #[error(transparent)]
     Other(Box<dyn std::error::Error + Send + Sync>),
 }

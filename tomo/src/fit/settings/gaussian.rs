@@ -6,7 +6,7 @@ use crate::representation::Degree;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What of a field is Gaussian.
+/// Quantity of a field that is Gaussian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FieldKind {
@@ -20,7 +20,7 @@ pub enum FieldKind {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PriorOfVoxels {
-    /// What is Gaussian.
+    /// Quantity that is Gaussian.
     pub kind: FieldKind,
     /// Its mean; of a logarithm, −50 to 50: the median of the emission is exp(mean).
     #[schemars(range(min = -1e12, max = 1e12), extend("unit" = "emission, or its logarithm"))]
@@ -39,7 +39,7 @@ pub struct PriorOfVoxels {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FieldSettings {
-    /// What is Gaussian.
+    /// Quantity that is Gaussian.
     pub kind: FieldKind,
     /// Its mean; of a logarithm, −50 to 50.
     #[schemars(range(min = -1e12, max = 1e12), extend("unit" = "emission, or its logarithm"))]
@@ -52,7 +52,7 @@ pub struct FieldSettings {
     pub correlation_length: f64,
     /// ν of the Matérn covariance.
     pub matern: Roughness,
-    /// What becomes of negative parts of a Gaussian field, for which it is needed.
+    /// Treatment of negative parts of a Gaussian field, for which it is needed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub negative: Option<Negative>,
     /// Nodes along each axis of the cube about the region.
@@ -63,7 +63,7 @@ pub struct FieldSettings {
     pub degree: Degree,
 }
 
-/// What becomes of the negative parts of a field.
+/// Treatment of the negative parts of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Negative {

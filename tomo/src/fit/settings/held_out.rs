@@ -70,7 +70,7 @@ impl Weight {
     }
 }
 
-/// Whether voxels are solved for, about an axis that is known, before anything is learnt.
+/// Returns whether voxels are solved for, about an axis that is known, before anything is learnt.
 fn starts_linear(file: &FitFile) -> bool {
     matches!(file.training.start, Start::Linear { .. }) && file.axis == (AxisSearch::Known {})
 }

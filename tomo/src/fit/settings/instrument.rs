@@ -1,4 +1,4 @@
-//! What of the instrument is solved for.
+//! Parameters of the instrument that are solved for.
 
 use super::{FitError, refuse};
 use kerrlight_vlbi::gains::{GainPriors, PRIOR_TABLES, prior_table};
@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What of the instrument the fit does not know.
+/// Unknown parameters of the instrument.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InstrumentSettings {
@@ -36,7 +36,7 @@ pub struct LeakageSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GainSettings {
-    /// What is known of the phases.
+    /// Prior knowledge of the phases.
     pub phases: GainPhases,
     /// Standard deviation of ln |g| by station; 0: the amplitude is right.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
@@ -51,7 +51,7 @@ pub struct GainSettings {
     pub amplitude: Option<f64>,
 }
 
-/// What is known of phases.
+/// Prior knowledge of phases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum GainPhases {

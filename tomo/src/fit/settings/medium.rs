@@ -1,4 +1,4 @@
-//! What visibilities of a source behind the interstellar medium need besides: its scattering, and errors for what varies.
+//! Interstellar medium in front of a source: its scattering, and errors for what varies.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -139,7 +139,7 @@ impl FitFile {
         Ok(read(text, Self::keys())?)
     }
 
-    /// Whether the data are visibilities, measured or simulated.
+    /// Returns whether the data are visibilities, measured or simulated.
     pub fn has_visibilities(&self) -> bool {
         let simulated = self.observation().is_some() && self.simulated_curve().is_none();
         matches!(self.data, Some(DataFiles::Visibilities { .. })) || simulated

@@ -13,7 +13,7 @@ use std::borrow::Cow;
 pub enum Quantity {
     /// Its value.
     Value(f64),
-    /// What is thought of it before any data.
+    /// Prior of the number.
     Prior(PriorSettings),
 }
 

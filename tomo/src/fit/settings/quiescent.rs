@@ -1,4 +1,4 @@
-//! What does not move, beside the emission.
+//! Emission that does not move, beside the moving one.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

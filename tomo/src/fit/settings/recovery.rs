@@ -111,7 +111,7 @@ pub struct Occupancy {
     pub every: u64,
 }
 
-/// What is known of the axis.
+/// Axis of the motion, or how to look for it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum AxisSearch {

@@ -1,11 +1,12 @@
-//! What is recovered.
+//! Representation of the emission.
 
 use super::{FitFile, Start};
 use crate::representation::Activation;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is recovered. A file may hold settings of several representations, to compare them; `kind` says which is used.
+/// Representation of the emission. A file may hold settings of several representations, to compare them; `kind` says
+/// which is used.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Representation {
@@ -104,7 +105,7 @@ pub struct LinearGrid {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Own {
-    /// What it is built from: any keys that it reads.
+    /// Settings of the representation: any keys that it reads.
     #[schemars(with = "std::collections::BTreeMap<String, schemars::Schema>")]
     pub settings: toml::Table,
     /// First learning rate.
@@ -171,7 +172,7 @@ impl Kind {
     pub const BUILT_IN: [Kind; 5] =
         [Kind::Bhnerf, Kind::Mlp4d, Kind::FeatureGrid, Kind::Grid, Kind::LinearGrid];
 
-    /// What `representation.kind` calls it.
+    /// Returns its name in `representation.kind`.
     pub fn name(&self) -> &str {
         match self {
             Kind::Bhnerf => "bhnerf",
@@ -197,7 +198,7 @@ impl Kind {
 }
 
 impl FitFile {
-    /// Whether the kind of representation has a use for a key, given as a dotted path.
+    /// Returns whether the kind of representation has a use for a key, given as a dotted path.
     pub fn uses(&self, key: &str) -> bool {
         let is_solved = self.representation.kind == Kind::LinearGrid;
         match key.split('.').collect::<Vec<_>>()[..] {
@@ -276,7 +277,7 @@ mod tests {
         assert!(!used(Kind::LinearGrid, "representation.activation"));
     }
 
-    /// What messages list is what settings are read as.
+    /// Names that messages list are those that settings are read as.
     #[test]
     fn exact_names_are_those_of_the_settings() {
         for kind in Kind::BUILT_IN {

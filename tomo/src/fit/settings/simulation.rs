@@ -1,4 +1,4 @@
-//! What is simulated, and the array that sees it.
+//! Simulation: the true emission, and the array that sees it.
 
 use super::{
     Effects, FieldSettings, FitError, FitFile, Hole, Motion, Observer, Region, SimulatedCurve,
@@ -156,7 +156,7 @@ pub struct Movie {
     pub to: f64,
 }
 
-/// What is simulated.
+/// True emission.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Truth {
@@ -299,7 +299,7 @@ impl Shines {
     }
 }
 
-/// What a letter looks like.
+/// Shape of a letter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GlyphShape {

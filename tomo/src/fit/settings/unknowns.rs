@@ -1,10 +1,10 @@
-//! What data do not know of the emission, and what has to be given or avoided because of it.
+//! Emission that data leave unknown, and settings that have to be given or avoided because of it.
 
 use super::{AxisSearch, FitError, FitFile, Kind, Linear, LossKind, Start, refuse};
 use crate::representation::Activation;
 
 impl FitFile {
-    /// Whether a minimum over the emission of voxels can be told from other stationary points.
+    /// Returns whether a minimum over the emission of voxels can be told from other stationary points.
     pub fn is_convex(&self) -> bool {
         self.instrument.as_ref().is_none_or(|i| i.gains.is_none())
             && self.loss.iter().all(|loss| loss.data.is_convex())
@@ -29,7 +29,7 @@ impl FitFile {
         Ok(())
     }
 
-    /// What is recovered, in a sentence for somebody who does not know the names.
+    /// Describes the recovered quantity, in a sentence for somebody who does not know the names.
     pub fn recovered(&self) -> &str {
         match &self.representation.kind {
             Kind::Bhnerf => {
@@ -50,7 +50,7 @@ impl FitFile {
         }
     }
 
-    /// What a reader has to know of what these data leave open, a paragraph each.
+    /// Describes what these data leave open, a paragraph each.
     pub fn unknowns(&self) -> Vec<String> {
         let mut all = Vec::new();
         if !knows_flux(self) {
@@ -73,7 +73,7 @@ impl FitFile {
     }
 }
 
-/// Whether any of the data knows the flux.
+/// Returns whether any of the data knows the flux.
 fn knows_flux(file: &FitFile) -> bool {
     file.loss.is_empty() || file.loss.iter().any(|loss| loss.data.knows_flux())
 }

@@ -62,7 +62,7 @@ pub struct Screen {
     /// Width of the screen, M.
     #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub width: f64,
-    /// What `width` spans.
+    /// Distance that `width` spans.
     #[serde(default)]
     pub width_of: WidthOf,
     /// Width on the sky, µas; that of `width` at the hole's mass and distance without it.
@@ -84,7 +84,7 @@ pub struct Screen {
     pub pulse: Option<PixelShape>,
 }
 
-/// What a pixel is to visibilities.
+/// Shape of a pixel in visibilities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum PixelShape {
@@ -107,7 +107,7 @@ impl PixelShape {
     }
 }
 
-/// What a width is of.
+/// Distance that a width spans.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum WidthOf {
@@ -145,11 +145,11 @@ impl Region {
     }
 }
 
-/// What happens to light.
+/// Effects on light.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Effects {
-    /// Whether emission is evaluated at the time when the light passed.
+    /// True if emission is evaluated at the time when the light passed.
     #[serde(default)]
     pub slow_light: bool,
     /// Emission scales as g to this power, 2 + spectral index; no redshift without it.

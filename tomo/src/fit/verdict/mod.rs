@@ -1,4 +1,4 @@
-//! Whether a fit explains its data: a function of the residuals of its last state.
+//! Verdict of a fit: does it explain its data? A function of the residuals of its last state.
 //!
 //! For N independent data with Gaussian errors about a model that is right, χ² per datum is 1 ± √(2/N). A fit lies lower by
 //! the part of the data that its parameters have used up. How much a network uses nobody knows, and of voxels only that it is
@@ -32,7 +32,7 @@ pub const MISFIT: f64 = 0.1;
 /// Part of the flux at zero spacing that may be missing.
 pub const FLUX: f64 = 0.1;
 
-/// What σ of the data is.
+/// Meaning of σ of the data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Errors {
     /// The noise that was added to a simulation.
@@ -48,7 +48,7 @@ pub enum Errors {
     Weight,
 }
 
-/// What residuals are like if the model is right.
+/// Expected residuals if the model is right.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expected {
     /// Mean of χ² per datum.
@@ -81,9 +81,9 @@ impl Expected {
 pub struct Tested {
     /// Its residuals.
     pub statistics: Statistics,
-    /// What σ is.
+    /// Meaning of σ.
     pub errors: Errors,
-    /// What they are like if the model is right.
+    /// Expected residuals if the model is right.
     pub expected: Expected,
 }
 
@@ -148,11 +148,11 @@ pub enum Outcome {
 pub struct Reason {
     /// Of which kind of data, counted from 0; none of what all of them show.
     pub term: Option<usize>,
-    /// What is wrong.
+    /// Fault of the residuals.
     pub fault: Fault,
 }
 
-/// What is wrong with residuals.
+/// Fault of residuals.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fault {
     /// χ² is not a number.
@@ -237,7 +237,7 @@ fn judge_noisy(term: usize, tested: &Tested, chi2: f64, verdict: &mut Verdict) {
     }
 }
 
-/// What χ² as a whole does not show.
+/// Judges structure that χ² as a whole does not show.
 fn judge_structure(term: usize, tested: &Tested, verdict: &mut Verdict) {
     let Statistics { all, in_time, in_space, .. } = &tested.statistics;
     let beyond = |value: Option<f64>, expected: f64, count: usize| {

@@ -1,4 +1,4 @@
-//! What the residuals of one kind of data are like.
+//! Statistics of the residuals of one kind of data.
 
 use kerrlight_vlbi::data_terms::Residual;
 use std::collections::{BTreeMap, HashMap};
@@ -81,7 +81,7 @@ pub struct Statistics {
     before: Frame,
 }
 
-/// What is remembered of a frame: residuals of stations by what they are of, all others in their order.
+/// Residuals of a frame: those of stations by quantity, all others in their order.
 #[derive(Clone, Debug, Default)]
 struct Frame {
     plain: Vec<f64>,

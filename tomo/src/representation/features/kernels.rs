@@ -61,7 +61,7 @@ impl<'a, T: Float> Network<'a, T> {
     }
 }
 
-/// What the network makes of features.
+/// Units of the network on features.
 struct Units<V> {
     first: [V; WIDTH],
     second: [V; WIDTH],

@@ -32,7 +32,7 @@ pub struct FeatureGridSettings {
     pub high: [f64; 3],
     /// From the network's output to emission: [`Activation::Sigmoid`] or [`Activation::Softplus`].
     pub activation: Activation,
-    /// What the bias of the output starts from: far below 0 it is dark.
+    /// Initial bias of the output: far below 0 it is dark.
     pub initial: f64,
 }
 
@@ -115,7 +115,7 @@ impl FeatureGrid {
     }
 }
 
-/// What every part of a batch is computed with.
+/// Parameters and settings with which every part of a batch is computed.
 #[derive(Clone, Copy)]
 struct Field<'a, T> {
     grid: &'a FeatureGrid,
@@ -123,13 +123,13 @@ struct Field<'a, T> {
     parameters: &'a [T],
 }
 
-/// What is kept from batch to batch.
+/// Memory kept from batch to batch.
 #[derive(Default)]
 struct Memory<T> {
     scatter: Scatter<T>,
     values: Vec<T>,
     cotangents: Vec<T>,
-    /// What the way back needs, a share of points after the other.
+    /// Values that the way back needs, a share of points after the other.
     kept: Vec<T>,
     /// dL/dfeature of each point, all features of a point side by side.
     slopes: Vec<T>,

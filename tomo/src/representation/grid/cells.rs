@@ -22,7 +22,7 @@ pub struct Geometry<T> {
     pub nodes: [usize; 3],
 }
 
-/// Whether a box has finite corners, the second above the first.
+/// Checks that a box has finite corners, the second above the first.
 pub fn check_box(low: [f64; 3], high: [f64; 3]) -> Result<(), Error> {
     for (low, high) in low.into_iter().zip(high) {
         if !low.is_finite() {
@@ -156,7 +156,8 @@ pub fn keep_inside<T: Float, V: Lanes<T>>(inside: V, value: V) -> V {
     V::select(zero.lt(inside), value, zero)
 }
 
-/// What each point adds to the nodes of its cell for a cotangent of one; and what else is wanted.
+/// Products that each point adds to the nodes of its cell for a cotangent of one, and the others
+/// that are wanted.
 pub(super) struct Products<'a, T> {
     pub geometry: Geometry<T>,
     pub activation: Activation,
@@ -193,7 +194,7 @@ impl<T: Float> Task<T> for Products<'_, T> {
 }
 
 impl<T: Float, V: Lanes<T>> Located<T, V> {
-    /// What lanes add to their nodes.
+    /// Writes the contributions of lanes to their nodes.
     #[inline(always)]
     pub fn contribute(&self, weight: V, contributions: &mut [Contribution<T>]) {
         let mut lanes = [[T::zero(); MAX_LANES]; 4];

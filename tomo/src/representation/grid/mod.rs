@@ -25,7 +25,7 @@ pub struct GridSettings {
     /// From the interpolated number to emission. With [`Activation::Linear`] parameters are held at
     /// zero or above.
     pub activation: Activation,
-    /// What all parameters start from.
+    /// Initial value of all parameters.
     pub initial: f64,
 }
 
@@ -115,7 +115,7 @@ fn halfway(points: usize) -> usize {
     (points / 2).next_multiple_of(kerrlight_common::simd::MAX_LANES)
 }
 
-/// What one thread turns into contributions to nodes.
+/// Share of a batch that one thread turns into contributions to nodes.
 struct Share<'a, T> {
     parameters: &'a [T],
     at: Coordinates<'a, T>,
@@ -145,7 +145,7 @@ impl<T> Share<'_, T> {
     }
 }
 
-/// What is kept from batch to batch.
+/// Memory kept from batch to batch.
 #[derive(Default)]
 struct Memory<T> {
     scatter: Scatter<T>,

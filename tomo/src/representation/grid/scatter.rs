@@ -13,7 +13,7 @@ const SLABS: usize = 32;
 /// Of a point that contributes nothing.
 pub const NOWHERE: u32 = u32::MAX;
 
-/// What a point adds to the eight nodes of its cell.
+/// Contribution of a point to the eight nodes of its cell.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Contribution<T> {
     /// First node of the cell, or [`NOWHERE`].

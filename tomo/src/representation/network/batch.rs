@@ -38,7 +38,7 @@ pub enum Way<'a, T> {
     },
 }
 
-/// What is kept from batch to batch.
+/// Memory kept from batch to batch.
 pub struct Memory<T> {
     packed: Packed<T>,
     tiles: Mutex<Vec<Tile<T>>>,
@@ -232,7 +232,7 @@ struct Job<'a, T> {
     kept: &'a mut [Vec<Activations<T>>],
 }
 
-/// What all chunks share.
+/// Batch that all chunks share.
 struct Batch<'a, T> {
     network: &'a Network,
     packed: &'a Packed<T>,

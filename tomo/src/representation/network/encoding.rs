@@ -8,7 +8,7 @@ use kerrlight_common::simd::{Float, Lanes, MAX_LANES, Task, math};
 /// one.
 pub struct Encode<'a, T> {
     pub at: Coordinates<'a, T>,
-    /// What coordinates are multiplied with, in their order.
+    /// Factors of coordinates, in their order.
     pub scales: &'a [T],
     /// p, the part of the first that enters without sine and cosine; 1 of all others.
     pub part: T,

@@ -33,7 +33,7 @@ pub const LINE: usize = 16;
 /// One fully connected layer: kernel (inputs × outputs, row by row), then biases.
 #[derive(Clone, Copy, Debug)]
 pub struct Layer {
-    /// What it takes from a row.
+    /// Number of inputs that it takes from a row.
     pub inputs: usize,
     /// Its units.
     pub outputs: usize,

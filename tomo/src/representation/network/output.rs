@@ -4,7 +4,7 @@ use super::super::{Activation, Link};
 use super::dense::{Matrix, MatrixMut};
 use kerrlight_common::simd::{Float, Lanes, Task};
 
-/// What the values are differentiated against.
+/// Cotangents of the values.
 #[derive(Clone, Copy)]
 pub enum Cotangents<'a, T> {
     /// One number a point.

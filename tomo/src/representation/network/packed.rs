@@ -72,7 +72,7 @@ impl<T: Float + Default> Packed<T> {
         self.output.read()
     }
 
-    /// What coordinates are multiplied with, in their order.
+    /// Returns the factors of coordinates, in their order.
     pub fn scales(&self) -> &[T; 4] {
         &self.scales
     }

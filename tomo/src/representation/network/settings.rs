@@ -19,7 +19,7 @@ pub enum Initialisation {
 pub struct NetworkSettings {
     /// 3 for (x, y, z), 4 for (t, x, y, z).
     pub dimension: usize,
-    /// Whether (x, y, z) is the place that matter has at the reference time, rather than that of an event. Of space alone it
+    /// True if (x, y, z) is the place that matter has at the reference time, rather than that of an event. Of space alone it
     /// always is.
     pub carried: bool,
     /// Positional encoding degree L: γ(x) = [x, sin 2ʲx, sin(2ʲx + π/2)], j = 0..L − 1.
@@ -34,8 +34,8 @@ pub struct NetworkSettings {
     pub length_scale: f64,
     /// Times are divided by it before they are encoded.
     pub time_scale: f64,
-    /// What times are divided by where they enter without sine and cosine, if it is not `time_scale`: far from 0 these inputs
-    /// drown the others.
+    /// Unit of times where they enter without sine and cosine, if it is not `time_scale`: far from 0 these inputs drown the
+    /// others.
     pub time_span: Option<f64>,
     /// The last function, of the output plus `shift`.
     pub activation: Activation,
@@ -78,7 +78,7 @@ impl NetworkSettings {
         Self { dimension: 4, time_scale, time_span, ..Self::bhnerf() }
     }
 
-    /// What the time is multiplied by after its division by `time_scale`, where it enters without sine and cosine.
+    /// Returns the factor of the time after its division by `time_scale`, where it enters without sine and cosine.
     pub(super) fn time_part(&self) -> f64 {
         self.time_span.map_or(1.0, |span| self.time_scale / span)
     }

@@ -18,7 +18,7 @@ pub const POINTS: usize = 120;
 /// A multiple of the rows of a block of every instruction set.
 const BLOCK: usize = 12;
 
-/// What a tile of points has passed through: all that the way back needs.
+/// Activations of a tile of points: all that the way back needs.
 #[derive(Default)]
 pub struct Activations<T> {
     points: usize,
@@ -233,7 +233,7 @@ fn matrix<T: Float + Default>(lines: &Lines<T>, rows: Rows) -> Matrix<'_, T> {
     Matrix { numbers: lines.read(), stride: rows.stride }
 }
 
-/// What stands behind the units of a row: the encoded point after a skip, and a one.
+/// Appends the inputs behind the units of a row: the encoded point after a skip, and a one.
 fn append<T: Float>(encoded: Matrix<'_, T>, rows: &mut [T], format: Rows, points: usize) {
     let from = encoded.numbers.chunks(encoded.stride);
     for (row, from) in rows.chunks_mut(format.stride).zip(from).take(points) {

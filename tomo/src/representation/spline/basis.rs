@@ -4,7 +4,7 @@ use kerrlight_common::simd::Float;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is between the nodes of a grid: a sum of B-splines, one about each node (de Boor 1978).
+/// Degree of the interpolation between the nodes of a grid: a sum of B-splines, one about each node (de Boor 1978).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Degree {

@@ -9,7 +9,7 @@ pub(super) struct Modes {
     axes: [Waves; 3],
 }
 
-/// What is added up.
+/// Sums over modes.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Sums {
     /// Waves, at each node.

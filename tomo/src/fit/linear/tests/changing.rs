@@ -129,8 +129,8 @@ fn solve(model: &ForwardModel<f64>, pixels: Vec<f64>, change: Change) -> LinearS
     problem.solve(&settings, &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
-/// What is born, or appears and fades, explains images of it; a field that matter carries unchanged does not. A price
-/// that is too high leaves such a field.
+/// A field that is born, or appears and fades, explains images of it; a field that matter carries unchanged does not. A
+/// price that is too high leaves such a field.
 #[test]
 fn exact_between_a_field_that_is_carried_and_one_that_is_free() {
     let (model, voxels) = (model(false), Voxels::cube(9, 5.0, Degree::Linear));

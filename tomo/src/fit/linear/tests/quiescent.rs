@@ -1,4 +1,4 @@
-//! What does not move beside voxels: columns of the same problem.
+//! Static images beside voxels: columns of the same problem.
 
 use super::super::convex::Convex;
 use super::super::objective::{Objective, Penalised};
