@@ -30,7 +30,7 @@ fn build(own: &OwnSettings) -> Result<Box<dyn Representation<f32>>, BuildError> 
 /// units of sigma), sₖ and aₖ: a square cannot be negative.
 struct GaussianBlobs {
     count: usize,
-    /// What sizes and distances are measured in, M.
+    /// Unit of sizes and distances, M.
     sigma: f64,
     /// Where centres are drawn, M.
     r_min: f64,

@@ -1,4 +1,4 @@
-//! What a verb hands back: text for a person, or one JSON object for a script.
+//! Answers of verbs: text for a person, or one JSON object for a script.
 
 use crate::columns::{self, Column};
 use crate::output::{self, Output};
@@ -14,7 +14,7 @@ pub struct Answer {
     failure: Option<anyhow::Error>,
 }
 
-/// What a person reads.
+/// Text for a person.
 enum Body {
     Text(String),
     /// Lines of so many entries that they are made one by one, and printed at once; for a script a list called `name`.

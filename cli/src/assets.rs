@@ -14,9 +14,9 @@ use std::path::{Path, PathBuf};
 
 /// The files of a scene.
 pub struct Files {
-    /// What they hold.
+    /// Decoded files.
     pub decoded: Assets,
-    /// What tells them from others: a line for each, with its length and checksum.
+    /// Identity of the files: a line for each, with its length and checksum.
     pub identity: String,
     /// Where they and what they refer to lie.
     pub paths: Vec<PathBuf>,
@@ -32,7 +32,7 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// What a mesh in the folder `beside` refers to; `None` if there is no such file.
+    /// Finds a file that a mesh in the folder `beside` refers to; `None` if there is no such file.
     fn find(self, beside: &Path, name: &str) -> Result<Option<PathBuf>, String> {
         let path = beside.join(name);
         // Links are followed: what counts is where the file itself lies.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, Write};
 
-/// What tells bytes from others.
+/// Checksum and length of bytes.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sum {
     /// How many bytes.
@@ -34,7 +34,7 @@ impl Sum {
     }
 }
 
-/// What stands before the checksum of an object (not of one inside it), and the eight digits until it is known.
+/// Text before the checksum of an object (not of one inside it), and the eight digits until it is known.
 const KEY: &str = "\n  \"checksum\": \"";
 const NONE: &str = "00000000";
 
@@ -86,7 +86,7 @@ pub fn listed(entry: &serde_json::Value) -> String {
     format!("{entry:#}").replace('\n', "\n    ")
 }
 
-/// Whether a text is as [`sealed`] has written it.
+/// Returns whether a text is as [`sealed`] has written it.
 pub fn is_whole(text: &str) -> bool {
     let Some(at) = text.find(KEY).map(|at| at + KEY.len()) else { return false };
     let Some(digits) = text.get(at..at + NONE.len()) else { return false };

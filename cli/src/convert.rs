@@ -206,7 +206,7 @@ impl Convert {
         Ok(written(&output).with("samples", count))
     }
 
-    /// Whether standard output carries the visibilities.
+    /// Returns whether standard output carries the visibilities.
     pub fn pipes(&self) -> bool {
         output::is_pipe(&self.output)
     }
@@ -284,7 +284,7 @@ impl Convert {
     }
 }
 
-/// Whether two numbers are the same but for digits that were left out.
+/// Returns whether two numbers are the same but for digits that were left out.
 fn agree(told: f64, given: f64) -> bool {
     (told - given).abs() <= 1e-5 * told.abs().max(given.abs())
 }

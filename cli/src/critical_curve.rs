@@ -58,13 +58,13 @@ impl CriticalCurveTable {
         Ok(Answer::default().with("count", points.len()).outputs([&output]))
     }
 
-    /// Whether standard output carries the table because `-o -` says so.
+    /// Returns whether standard output carries the table because `-o -` says so.
     pub fn pipes(&self) -> bool {
         self.output.as_deref().is_some_and(output::is_pipe)
     }
 }
 
-/// What the columns hold of a point.
+/// Returns the columns of a point.
 fn values(point: CriticalPoint) -> [f64; 8] {
     let CriticalPoint { radius, lambda, eta, alpha, beta, .. } = point;
     let HalfOrbit { gamma, delta, tau } = point.half_orbit();

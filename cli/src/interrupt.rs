@@ -13,7 +13,7 @@ pub const INTERRUPT: u8 = 2;
 /// The signal that asks a program to end.
 const TERMINATE: u8 = 15;
 
-/// What a signal does depends on what is under way.
+/// Current work, which decides what a signal does.
 struct Now {
     /// The keeper, if there is one.
     keeper: Option<Kept>,
@@ -30,10 +30,10 @@ enum Kept {
     Ends(String),
 }
 
-/// What asks work to stop: signals to the process, or the caller of a [`Call`](crate::Call).
+/// Requests to stop work: signals to the process, or the caller of a [`Call`](crate::Call).
 pub struct Requests {
     now: Mutex<Now>,
-    /// Whether there was one: read in inner loops.
+    /// True if there was one: read in inner loops.
     stop: AtomicBool,
     /// Loops that look at it unwind where work is cut off. Without it the process ends.
     at_once: Option<&'static AtomicBool>,
@@ -146,7 +146,7 @@ impl SignalGuard {
         SignalGuard(requests)
     }
 
-    /// Whether there was a signal.
+    /// Returns whether there was a signal.
     pub fn stopped(&self) -> bool {
         self.0.stop.load(Ordering::Relaxed)
     }
@@ -198,7 +198,7 @@ pub fn listen() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Whether the program was started by `nohup`.
+/// Returns whether the program was started by `nohup`.
 #[cfg(unix)]
 fn is_hangup_ignored() -> bool {
     use nix::sys::signal::{SaFlags, SigAction, SigHandler, SigSet, Signal, sigaction};

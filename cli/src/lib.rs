@@ -220,7 +220,7 @@ fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
 }
 
 impl Verb {
-    /// Whether standard output carries a file, because a path is `-`.
+    /// Returns whether standard output carries a file, because a path is `-`.
     fn pipes(&self) -> bool {
         match self {
             Verb::Render(render) => render.pipes(),

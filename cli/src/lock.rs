@@ -56,7 +56,7 @@ impl Lock {
         })
     }
 
-    /// Whether a process has the lock of a file.
+    /// Returns whether a process has the lock of a file.
     pub fn is_held(path: &Path) -> bool {
         let file = File::open(path);
         file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
@@ -93,7 +93,7 @@ fn in_use(folder: &Path, busy: &str) -> anyhow::Error {
     anyhow!("{} is in use: another kerrlight {busy} it", folder.display())
 }
 
-/// Whether there is nothing else in a folder but its lock; so it is if there is no folder.
+/// Returns whether there is nothing else in a folder but its lock; so it is if there is no folder.
 fn is_free(folder: &Path, is_own: impl Fn(&Path) -> bool) -> bool {
     let Ok(mut entries) = std::fs::read_dir(folder) else { return !folder.exists() };
     let is_fine = |entry: std::fs::DirEntry| entry.file_name() == NAME || is_own(&entry.path());

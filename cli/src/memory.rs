@@ -1,4 +1,4 @@
-//! What memory there is, and an allocator that takes no more.
+//! Memory of the machine, and an allocator that takes no more.
 
 use anyhow::bail;
 use kerrlight_common::memory::{self, Scratch, shown};
@@ -125,7 +125,7 @@ fn groups() -> Option<u64> {
     own.lines().filter_map(of).min()
 }
 
-/// What one group leaves: pages of files are given back where memory is needed.
+/// Returns the memory that one group leaves: pages of files are given back where memory is needed.
 fn left(group: &Path, [limit, used]: [&str; 2]) -> Option<u64> {
     let number =
         |name: &str| std::fs::read_to_string(group.join(name)).ok()?.trim().parse::<u64>().ok();

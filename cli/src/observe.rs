@@ -21,7 +21,7 @@ use std::path::PathBuf;
 /// Arguments of `kerrlight observe`.
 #[derive(Debug, Args)]
 pub struct Observe {
-    /// What is seen: a grid of Jy/pixel (.csv, first line north, first column east), an array or
+    /// Images to observe: a grid of Jy/pixel (.csv, first line north, first column east), an array or
     /// movie (.npy, .npz: (frames,) height, width), an image (.fits), a picture (.exr), a movie of
     /// pictures (a folder of .exr, a pattern such as 'frame_%04d.exr' or 'frames/*.exr', or several
     /// files), or a scene (.toml)
@@ -144,7 +144,7 @@ impl Observe {
         Ok(output.answer().with("visibilities", count).with("history", observation.history))
     }
 
-    /// Whether standard output carries the visibilities.
+    /// Returns whether standard output carries the visibilities.
     pub fn pipes(&self) -> bool {
         output::is_pipe(&self.output)
     }
@@ -274,7 +274,7 @@ impl Observe {
     }
 }
 
-/// What is allowed of pixels and most probably not meant.
+/// Names a property of pixels that is allowed and most probably not meant.
 fn odd(movie: &StokesMovie) -> Option<String> {
     let pixels = &movie.i.pixels;
     let least = pixels.iter().fold(f64::INFINITY, |least, x| least.min(*x));

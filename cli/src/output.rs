@@ -23,14 +23,14 @@ pub struct Output {
     given: PathBuf,
     path: PathBuf,
     folder: PathBuf,
-    /// Whether the bytes go to standard output once they are whole.
+    /// True if the bytes go to standard output once they are whole.
     piped: bool,
 }
 
 /// The name of standard output and of standard input.
 pub const PIPE: &str = "-";
 
-/// Whether a path stands for standard output or standard input.
+/// Returns whether a path stands for standard output or standard input.
 pub fn is_pipe(path: &Path) -> bool {
     path == Path::new(PIPE)
 }
@@ -87,7 +87,7 @@ impl Output {
         Ok(Output { path: given.clone(), given, folder, piped: true })
     }
 
-    /// Whether it is standard output.
+    /// Returns whether it is standard output.
     pub fn is_pipe(&self) -> bool {
         self.piped
     }
@@ -273,7 +273,7 @@ pub fn read_through(path: &Path) -> anyhow::Result<BufReader<File>> {
 }
 
 thread_local! {
-    /// What this thread has read since somebody wants to know.
+    /// Files that this thread has read since somebody wants to know.
     static READ: RefCell<Option<Vec<(PathBuf, Sum)>>> = const { RefCell::new(None) };
 }
 

@@ -26,13 +26,13 @@ pub struct Shot {
 pub struct Shown {
     /// The picture and its summary.
     pub rendered: Rendered,
-    /// What its EXR file says of it.
+    /// Attributes in its EXR file.
     pub attributes: Attributes,
     camera: CameraMatrices,
     look: Look,
 }
 
-/// What pictures of one scene share.
+/// Common parts of pictures of one scene.
 struct Common<'a> {
     legend: String,
     identifiers: Option<String>,

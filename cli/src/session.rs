@@ -1,4 +1,4 @@
-//! What work knows of the program that has called it, if one has: whom it tells of its progress in place of a terminal.
+//! Session of a call: the program that has called, if one has, hears of the progress in place of a terminal.
 
 use crate::plain;
 use indicatif::ProgressBar;
@@ -9,7 +9,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// What the caller hears of while a call runs.
+/// A message to the caller while a call runs.
 #[derive(Debug)]
 pub enum Said<'a> {
     /// Words that the program writes to standard error.
@@ -22,7 +22,7 @@ pub enum Said<'a> {
     End,
 }
 
-/// What threads of a call know of it.
+/// Session of the threads of a call.
 pub struct Session {
     /// Is told of all.
     pub hear: Box<dyn Fn(Said<'_>) + Send + Sync>,
@@ -43,7 +43,7 @@ fn here() -> Option<Arc<Session>> {
     HERE.with_borrow(Clone::clone)
 }
 
-/// Whether another program has called this work.
+/// Returns whether another program has called this work.
 pub fn is_here() -> bool {
     HERE.with_borrow(Option::is_some)
 }

@@ -9,7 +9,7 @@ use std::thread::{Builder, JoinHandle, Scope, ScopedJoinHandle};
 /// Threads a core that `--threads` starts at most: further ones would only wait for each other.
 const MOST_A_CORE: usize = 4;
 
-/// What the environment sets instead of `--threads`.
+/// Variable of the environment in place of `--threads`.
 const VARIABLE: &str = "RAYON_NUM_THREADS";
 
 /// The largest number of threads that can be asked for.
@@ -81,13 +81,13 @@ pub fn spawn_in<'scope, T: Send + 'scope>(
     Builder::new().spawn_scoped(scope, work).map_err(|error| refused(&error, 1))
 }
 
-/// What is said where so many threads cannot be started.
+/// Returns the error where so many threads cannot be started.
 fn refused(error: &dyn Error, count: usize) -> anyhow::Error {
     let threads = if count == 1 { "a thread".to_owned() } else { format!("{count} threads") };
     no_more(&threads, error)
 }
 
-/// What is said where another process cannot be started.
+/// Returns the error where another process cannot be started.
 pub fn no_process(what: &str, error: &std::io::Error) -> anyhow::Error {
     match error.kind() {
         ErrorKind::WouldBlock => no_more(what, error),

@@ -141,7 +141,7 @@ impl Trace {
         Ok(answer.with("integrator", self.integrator.name()).with("tolerance", self.tolerance))
     }
 
-    /// Whether standard output carries the table because `-o -` says so.
+    /// Returns whether standard output carries the table because `-o -` says so.
     pub fn pipes(&self) -> bool {
         self.output.as_deref().is_some_and(output::is_pipe)
     }

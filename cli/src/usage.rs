@@ -1,4 +1,4 @@
-//! What a process has used of the machine.
+//! Usage of the machine by a process.
 
 /// Processor time and memory of this process so far.
 #[derive(Debug, Clone, Copy, PartialEq)]

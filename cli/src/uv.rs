@@ -59,7 +59,7 @@ impl Uv {
         Ok(answer.with("count", count).files(files))
     }
 
-    /// Whether standard output carries the table because `-o -` says so.
+    /// Returns whether standard output carries the table because `-o -` says so.
     pub fn pipes(&self) -> bool {
         self.output.as_deref().is_some_and(output::is_pipe)
     }

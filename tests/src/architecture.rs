@@ -73,7 +73,7 @@ fn leaves(tree: &str, prefix: &str, found: &mut Vec<String>) {
     }
 }
 
-/// What a file imports from its own crate, as paths from the root.
+/// Returns the imports of a file from its own crate, as paths from the root.
 fn imports(source: &Path, file: &Path) -> Vec<Vec<String>> {
     let code = code(file);
     let mut paths = Vec::new();

@@ -102,7 +102,7 @@ fn exact_files_that_unpack_to_too_much_are_named() {
     refused(at, "512MiB", &["render", "sky.toml", "-o", "a.exr"], "a sky of 6000 x 6000 pixels");
 }
 
-/// What no estimate has foreseen ends in a message as well, and no half file stays.
+/// Lack of memory that no estimate has foreseen ends in a message as well, and no half file stays.
 #[test]
 fn exact_what_was_not_foreseen_ends_in_a_message() {
     let folder = tempfile::tempdir().unwrap();

@@ -31,7 +31,7 @@ pub struct Browser {
     replies: BufReader<ChildStdout>,
     number: u64,
     session: String,
-    /// What the page wrote to its console, and what went wrong in it.
+    /// Messages in the page's console, and what went wrong in it.
     problems: Vec<String>,
     _profile: tempfile::TempDir,
 }
@@ -138,14 +138,14 @@ impl Browser {
         }
     }
 
-    /// What the browser shows.
+    /// Returns the screen of the browser.
     pub fn screen(&mut self) -> image::RgbImage {
         let shot = self.call("Page.captureScreenshot", &json!({ "format": "png" }));
         let png = base64::decode(shot["data"].as_str().unwrap()).unwrap();
         image::load_from_memory(&png).unwrap().into_rgb8()
     }
 
-    /// What the page wrote to its console, and what went wrong in it.
+    /// Returns the messages in the page's console, and what went wrong in it.
     pub fn problems(&mut self) -> &[String] {
         // Whatever has happened so far is told before this is answered.
         self.value("0");

@@ -38,7 +38,7 @@ fn render_without_a_scene_says_so_and_writes_both_files() {
     }
 }
 
-/// What is written into the EXR is enough to render it again, to the same bytes.
+/// Attributes in the EXR are enough to render it again, to the same bytes.
 #[test]
 fn exact_rendering_again_from_the_picture() {
     let folder = tempfile::tempdir().unwrap();

@@ -63,7 +63,7 @@ pub(crate) fn cases(results: &Value) -> &Vec<Value> {
     results["cases"].as_array().unwrap()
 }
 
-/// What the page, the table and every case of a finished comparison hold.
+/// Checks the page, the table and every case of a finished comparison.
 fn check_comparison(at: &Path, first: &Value) {
     assert_eq!(cases(first).len(), 4);
     for case in cases(first) {
@@ -321,7 +321,7 @@ fn exact_draws_are_results_of_cases() {
     assert_eq!(&cases(&results(&at.join("out")))[0]["results"]["random_nodes_within_95"], within);
 }
 
-/// What no case can have is refused before anything runs.
+/// Results that no case can have are refused before anything runs.
 #[test]
 fn wrong_results_are_named_before_anything_runs() {
     let folder = tempfile::tempdir().unwrap();

@@ -79,7 +79,7 @@ fn color<'a>(picture: &'a Picture, layer: &str) -> [&'a [f32]; 3] {
     })
 }
 
-/// What is held up of a sky of brightness 1 is the alpha channel, whatever holds it up.
+/// Matter holds up a part of a sky of brightness 1: this part is the alpha channel, whatever holds it up.
 #[test]
 #[ignore = "long"]
 fn exact_alpha_is_what_is_missing_of_a_white_sky() {

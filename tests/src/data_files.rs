@@ -10,7 +10,7 @@ use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::schedule::{Clock, Schedule, Setup, observe};
 use std::path::Path;
 
-/// What a fit of visibilities needs, as small as can be.
+/// Keys of the smallest fit of visibilities.
 const SMALL: [&str; 5] = [
     "screen.pixels=12",
     "training.steps=2",
@@ -112,10 +112,11 @@ const NONE: [f32; 3] = [0.0, 0.0, 0.0];
 const PLACEHOLDER: [f32; 3] = [0.0, 0.0, f32::INFINITY];
 const NAN: [f32; 3] = [f32::NAN, f32::NAN, 0.0];
 
-/// What is done to the four products of a row, whose number is given.
+/// Change of the four products of a row, whose number is given.
 type Change<'a> = Box<dyn Fn(usize, &mut [[f32; 3]; 4]) + 'a>;
 
-/// What is missing or marked in files of the releases, their pipelines and the programs that flag them.
+/// Returns the changes of files: data that are missing or marked in files of the releases, their
+/// pipelines and the programs that flag them.
 fn changes(of_jcmt: &[bool]) -> Vec<(&'static str, Change<'_>)> {
     vec![
         ("full polarisation", Box::new(|_, _| ())),
@@ -167,7 +168,8 @@ fn changes(of_jcmt: &[bool]) -> Vec<(&'static str, Change<'_>)> {
     ]
 }
 
-/// What the releases, their pipelines and the programs that flag them bring, made of one observation.
+/// Files of all kinds that the releases, their pipelines and the programs that flag them bring, made of
+/// one observation, are fitted.
 #[test]
 #[ignore = "long"]
 fn exact_every_kind_of_published_visibilities_is_fitted() {

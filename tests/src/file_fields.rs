@@ -1,4 +1,4 @@
-//! What becomes of fields of files: the same numbers however a file writes them, and none that a file does not tell.
+//! Fields of files: the same numbers however a file writes them, and none that a file does not tell.
 
 use crate::support::{fail, succeed};
 use std::io::Write;

@@ -8,7 +8,7 @@ const SEEN: &str = "observe image.csv --fov-uas 100 --array EHT2017 --mjd 57850 
 const FEW: [&str; 6] =
     ["--set", "training.steps=2", "--set", "screen.pixels=8", "--set", "output.nodes=8"];
 
-/// What a fit of data has said, with the settings in the run's folder.
+/// Returns the messages of a fit of data, with the settings in the run's folder.
 fn said(folder: &Path, words: &[&str], run: &str) -> (String, String) {
     let output = kerrlight(folder, &[&["fit"], words, &FEW, &["-o", run]].concat());
     let said = String::from_utf8_lossy(&output.stderr).into_owned();

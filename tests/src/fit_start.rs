@@ -1,4 +1,4 @@
-//! What a fit starts from (`--init`) and what it leaves for other verbs: a scene, and a movie that telescopes see.
+//! Starts of a fit (`--init`), and its results for other verbs: a scene, and a movie that telescopes see.
 
 use crate::fit::results;
 use crate::support::{fail, root, succeed};

@@ -58,7 +58,7 @@ fn compare(integrator: &str, tolerance: &str) -> [f64; 4] {
     worst
 }
 
-/// What users are promised at the default tolerance: 1e-11 in r and azimuth.
+/// Users are promised 1e-11 in r and azimuth at the default tolerance.
 #[test]
 fn code_mpmath_crossings_at_the_default_tolerance() {
     for integrator in ["taylor-mino", "dop853-mino", "rk45-mino", "elliptic"] {

@@ -37,7 +37,7 @@ const PRIORS: [&str; 6] = [
     "motion.velocity.infall.beta_phi",
 ];
 
-/// What such a number is.
+/// Type of a number with a prior.
 const PRIOR: &str = "number or [prior](#priors)";
 
 fn is_described_elsewhere(path: &str) -> bool {
@@ -99,7 +99,7 @@ fn row(key: &Key, prefix: &str, is_choice: bool) -> String {
     format!("| `{prefix}{}` | {} |\n", key.name, cells.join(" | "))
 }
 
-/// What a value may be, with its range.
+/// Returns the type of a value, with its range.
 fn value(key: &Key) -> String {
     let kind = match &*key.kind {
         kind if kind.starts_with("number, { uniform") => PRIOR.to_owned(),

@@ -102,8 +102,8 @@ fn exact_strong_deflection_limit() {
     }
 }
 
-/// What every observer sees from far away: the delay of a point behind the hole exceeds
-/// that of a point in front of it, and far away it is that of flat space plus logarithms.
+/// Every observer sees from far away that the delay of a point behind the hole exceeds that of a
+/// point in front of it, and far away it is that of flat space plus logarithms.
 #[test]
 fn exact_delay_far_from_the_hole() {
     // From the point of closest approach at r₀ = b − 1, t_o − t = √(r_o² − r₀²) +

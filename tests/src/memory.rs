@@ -38,7 +38,7 @@ static TURN: Mutex<()> = Mutex::new(());
 /// Names, messages and tables of a handful of headers.
 const LITTLE: usize = 64 << 10;
 
-/// Whether reading was a success; fails if it held too much at once.
+/// Returns whether reading was a success; fails if it held too much at once.
 fn bounded(name: &str, bytes: &[u8], read: impl Fn(&[u8]) -> bool) -> bool {
     let before = NOW.load(Ordering::Relaxed);
     PEAK.store(before, Ordering::Relaxed);

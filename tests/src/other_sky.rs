@@ -58,7 +58,7 @@ fn film(path: &Path, (sky, arcs): &(Sky, Vec<Arc>), noise: f64) -> f64 {
     sigma
 }
 
-/// What a search finds in a movie of the sky.
+/// Returns the geometry that a search finds in a movie of the sky.
 fn found(
     folder: &Path,
     sky: &(Sky, Vec<Arc>),

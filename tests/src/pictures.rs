@@ -239,7 +239,7 @@ fn exact_stated_error_of_thin_images() {
     assert!(stated < 0.003 && found < 0.6 * stated && found > 0.05 * stated, "{found} {stated}");
 }
 
-/// What is left out is left out, and what is there is the same.
+/// Channels that are left out are missing, and the others are the same.
 #[test]
 fn exact_chosen_channels() {
     let text = file("disc_edge_on.toml");

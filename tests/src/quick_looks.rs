@@ -7,7 +7,8 @@ use crate::support::succeed;
 /// Q and U of a night.
 const POLARIZED: &str = "ER6_SGRA_2017_097_hi_hops_netcal_LMTcal_10s_ALMArot_dtermcal.uvfits";
 
-/// What an experiment with public data has to be told; none, and says so, where the data are not there.
+/// Returns the changes for an experiment with public data; none, and says so, where the data are not
+/// there.
 fn on_public_data(name: &str) -> Option<Vec<String>> {
     let file = match name {
         "m87-2017" => "SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits",

@@ -54,7 +54,7 @@ fn exact_a_ring_is_told_from_the_flare() {
     assert!(chi2(&without) > 100.0 * chi2(&found), "{without}");
 }
 
-/// What an image beside the emission does not go together with is refused with its key, and nothing is written.
+/// Settings that exclude a quiescent image are refused with their key, and nothing is written.
 #[test]
 fn exact_what_excludes_a_quiescent_image_is_refused() {
     let folder = tempfile::tempdir().unwrap();

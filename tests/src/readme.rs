@@ -42,7 +42,7 @@ fn shown(line: &str) -> Shown {
     Shown { line: line.trim().to_owned(), writes }
 }
 
-/// What a command gives to the program, whichever way it calls it.
+/// Returns the arguments that a command gives to the program, whichever way it calls it.
 fn arguments(line: &str) -> Option<&str> {
     RUNS.iter().find_map(|run| line.strip_prefix(run))
 }
@@ -60,7 +60,7 @@ fn fresh(to: &Path) {
     }
 }
 
-/// What is added to a command so that it takes seconds, not minutes; whatever it is, it is printed.
+/// Returns the arguments that make a command take seconds, not minutes; whatever it is, it is printed.
 fn shorter(line: &str) -> &'static str {
     let is_whole = line.contains("--resume") || line.contains("--init");
     if line.contains("unknown_geometry.toml") {

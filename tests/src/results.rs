@@ -1,4 +1,4 @@
-//! What verbs print at their end: two lines for a person, one JSON object for a script, or a file with `-o -`; and the
+//! Output of verbs at their end: two lines for a person, one JSON object for a script, or a file with `-o -`; and the
 //! command line's own help, completions and manual pages.
 
 use crate::support::{fail, kerrlight, root, succeed};
@@ -102,7 +102,7 @@ fn exact_critical_curve_as_json() {
     assert_eq!(succeed(&root(), &curve), succeed(&root(), &[&curve[..], &["-o", "-"]].concat()));
 }
 
-/// What goes through a pipe is what would stand in a file.
+/// Bytes through a pipe are those of a file.
 #[test]
 fn exact_standard_output_carries_the_bytes_of_files() {
     let folder = rays();

@@ -58,7 +58,7 @@ fn killed(at: &Path, words: &[&str], run: &str) {
     child.wait().unwrap();
 }
 
-/// What a `fit --resume run` says that must be refused and must change nothing.
+/// Returns the message of a `fit --resume run` that must be refused and must change nothing.
 fn refused(at: &Path) -> String {
     let all = || {
         let entries = std::fs::read_dir(at.join("run")).unwrap().flatten();

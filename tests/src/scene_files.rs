@@ -25,7 +25,8 @@ fn warned(folder: &Path, arguments: &[&str]) -> String {
 const RENDER: [&str; 4] = ["render", "s.toml", "-o", "o.exr"];
 const TRIANGLE: &str = "v 0 0 5\nv 1 0 5\nv 0 1 5\nf 1 2 3\n";
 
-/// What a mesh refers to lies beside it or below it, links followed, unless the user allows more.
+/// Files that a mesh refers to lie beside it or below it, links followed, unless the user allows
+/// more.
 #[test]
 fn regress_meshes_stay_in_their_folder() {
     let folder = tempfile::tempdir().unwrap();

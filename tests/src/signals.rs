@@ -1,4 +1,5 @@
-//! What Ctrl-C, SIGTERM and SIGKILL do to long runs: exit codes, what is kept, and that no process outlives its parent.
+//! Effect of Ctrl-C, SIGTERM and SIGKILL on long runs: exit codes, what is kept, and that no process outlives its
+//! parent.
 
 use crate::fit::{small, with};
 use crate::support::{binary, kerrlight, root, succeed};
@@ -40,7 +41,7 @@ fn child_of(parent: u32) -> Option<u32> {
     std::fs::read_to_string(path).ok()?.split_whitespace().next()?.parse().ok()
 }
 
-/// Whether a process is there and not merely waiting to be reaped.
+/// Returns whether a process is there and not merely waiting to be reaped.
 fn runs(pid: u32) -> bool {
     let status = std::fs::read_to_string(format!("/proc/{pid}/stat"));
     status.is_ok_and(|text| !text.rsplit(") ").next().unwrap_or_default().starts_with('Z'))
@@ -75,7 +76,7 @@ fn exact_fits_that_are_stopped_end_in_the_same_bytes() {
     }
 }
 
-/// What keeps nothing ends at once: a fit whose rays are traced, a scan, a linear grid, the sweep of accuracies.
+/// Work that keeps nothing ends at once: a fit whose rays are traced, a scan, a linear grid, the sweep of accuracies.
 #[test]
 fn exact_what_keeps_nothing_ends_at_once() {
     let fit = root().join("scenes/fits/scene_1.toml");

@@ -50,7 +50,7 @@ fn exact_gains_are_found_with_the_flare() {
     assert!(table.lines().count() > 64 * 5);
 }
 
-/// What gains cannot touch gives the same volume as gains that are free.
+/// Closure quantities, which gains cannot touch, give the same volume as gains that are free.
 #[test]
 #[ignore = "long"]
 fn exact_closures_and_free_gains_agree() {

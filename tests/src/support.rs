@@ -1,4 +1,4 @@
-//! What several tests need.
+//! Helpers that several tests need.
 
 use kerrlight_render::image::Picture;
 use kerrlight_render::scene::{Scene, apply_override};

@@ -1,4 +1,4 @@
-//! What the system refuses: threads, an open standard output; and what is left behind by kills.
+//! Limits of the system: threads, a closed standard output; and what is left behind by kills.
 
 use crate::support::{binary, root, succeed};
 use std::fs;

@@ -1,4 +1,4 @@
-//! What a fit says of itself: page, terminal and results.json agree on whether its data are explained.
+//! Verdicts: page, terminal and results.json agree on whether data are explained.
 
 use crate::eht_data;
 use crate::fit::results;

@@ -113,7 +113,7 @@ fn scene(name: &str) -> String {
     root().join("scenes").join(name).to_str().unwrap().to_owned()
 }
 
-/// What is seen in the browser is the picture that `render` makes, in the colours of its map: without a word on the console.
+/// The browser shows the picture that `render` makes, in the colours of its map: without a word on the console.
 #[test]
 fn code_the_page_draws_what_render_draws() {
     let folder = tempfile::tempdir().unwrap();
@@ -342,7 +342,7 @@ fn code_the_page_of_a_fit_has_volume_truth_and_data() {
     assert!(browser.problems().is_empty(), "{:?}", browser.problems());
 }
 
-/// What Save EXR writes is a picture that this program reads.
+/// Save EXR writes a picture that this program reads.
 #[test]
 #[ignore = "long"]
 fn exact_the_page_writes_exr() {

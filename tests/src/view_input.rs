@@ -1,4 +1,4 @@
-//! What fingers do on the page of `kerrlight view`, and the files that it saves.
+//! Touch on the page of `kerrlight view`, and the files that it saves.
 
 use crate::browser::Browser;
 use crate::view::{measured, opened};

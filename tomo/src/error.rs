@@ -47,15 +47,15 @@ pub enum Error {
     Failed(String),
     /// A fit that was told to stop.
     Stopped(#[from] Stopped),
-    /// What happened in a part of a fit, such as `geometry.search`.
+    /// An error in a part of a fit, such as `geometry.search`.
     #[error("{part}: {error}")]
     In {
         /// The part.
         part: &'static str,
-        /// What happened.
+        /// Error of that part.
         error: Box<Error>,
     },
-    /// What keeps the results of a fit cannot.
+    /// An error of the keeper of a fit's results.
     Kept(Box<dyn std::error::Error + Send + Sync>),
 }
 
@@ -95,7 +95,7 @@ impl Error {
         self.parts().1
     }
 
-    /// What would be allowed, in words.
+    /// Returns the allowed values, in words.
     pub fn allowed(&self) -> Option<&str> {
         self.parts().2
     }

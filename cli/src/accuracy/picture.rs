@@ -1,4 +1,4 @@
-//! What one more digit costs, in one picture.
+//! Cost of one more digit, in one picture.
 
 use anyhow::anyhow;
 use kerrlight_geodesic::Integrator;

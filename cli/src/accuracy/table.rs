@@ -73,7 +73,7 @@ pub fn json(rows: &[Row], sweep: &Sweep) -> Document {
     Document { version: env!("CARGO_PKG_VERSION"), seed: sweep.seed, rows }
 }
 
-/// What a reader wants to know first: all spins together.
+/// Summary of all spins together, which a reader wants first.
 pub fn summary(rows: &[Row]) -> String {
     let mut text = String::new();
     for class in Class::ALL {

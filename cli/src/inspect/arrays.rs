@@ -1,4 +1,4 @@
-//! What arrays of NumPy hold: movies, volumes, tables.
+//! Contents of arrays of NumPy: movies, volumes, tables.
 
 use crate::answer::Answer;
 use crate::output;
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-/// Whether a file that starts so is an NPY array or an NPZ archive.
+/// Returns whether a file that starts so is an NPY array or an NPZ archive.
 pub fn begins(start: &[u8]) -> bool {
     is_npy(start) || start.starts_with(b"PK\x03\x04") || start.starts_with(b"PK\x05\x06")
 }
@@ -35,7 +35,7 @@ pub fn describe(path: &Path, start: &[u8]) -> anyhow::Result<Answer> {
     Ok(answer(path, "NPZ", &lines))
 }
 
-/// What arrays hold, a line each.
+/// Describes arrays, a line each.
 pub fn answer(path: &Path, format: &str, lines: &[Line]) -> Answer {
     let name = path.display();
     let holds = if format == "NPY" { None } else { kind(lines) };
@@ -81,7 +81,7 @@ impl Line {
     }
 }
 
-/// What kerrlight takes an archive for.
+/// Returns what kerrlight takes an archive for.
 fn kind(lines: &[Line]) -> Option<String> {
     let shape = |name: &str| lines.iter().find(|line| line.name == name).map(|line| &line.shape);
     if let Some([x, y, z]) = shape("emission").map(Vec::as_slice) {

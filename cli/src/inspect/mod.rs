@@ -72,7 +72,7 @@ fn first_bytes(path: &Path) -> anyhow::Result<Vec<u8>> {
     Ok(start)
 }
 
-/// What a picture holds.
+/// Describes a picture.
 fn picture(path: &Path) -> anyhow::Result<Answer> {
     let name = path.display();
     let file = BufReader::new(output::open(path)?);

@@ -1,4 +1,4 @@
-//! What a fit has left in its folder.
+//! Contents of the folder of a fit.
 
 use crate::answer::Answer;
 use crate::output;

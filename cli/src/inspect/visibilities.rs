@@ -1,4 +1,4 @@
-//! What an observation holds.
+//! Contents of an observation.
 
 use crate::answer::Answer;
 use kerrlight_vlbi::files::Format;
@@ -6,7 +6,7 @@ use kerrlight_vlbi::observation::{Basis, Observation, Repeats, Row};
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What there is to know about visibilities.
+/// Describes visibilities.
 pub fn describe(name: &str, format: Format, observation: &Observation) -> Answer {
     let text = text(name, format, observation);
     let [times, baselines] = counts(observation);

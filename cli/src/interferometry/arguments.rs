@@ -56,7 +56,7 @@ pub enum FrameName {
 /// When, where to, and with what receivers.
 #[derive(Debug, Clone, Args)]
 pub struct Observing {
-    /// What is observed: sgra, m87, or right ascension in hours and declination in degrees
+    /// Source: sgra, m87, or right ascension in hours and declination in degrees
     #[arg(long, value_name = "sgra|m87|RA,DEC", value_parser = source)]
     pub source: Source,
     /// Day (modified Julian date) whose 0 h UTC hours count from

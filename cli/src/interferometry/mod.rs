@@ -1,4 +1,4 @@
-//! What the verbs of interferometry share: arguments, files of visibilities, plots, images.
+//! Common parts of the verbs of interferometry: arguments, files of visibilities, plots, images.
 
 pub mod arguments;
 pub mod image_files;
@@ -87,7 +87,7 @@ impl ObservationFile {
         Ok(ObservationFile { output: Output::or_pipe(path, &[])?, format, comments })
     }
 
-    /// Whether more than Stokes I is written.
+    /// Returns whether more than Stokes I is written.
     pub fn keeps_polarization(&self) -> bool {
         matches!(self.format, Written::Uvfits | Written::ObsText)
     }
@@ -111,7 +111,7 @@ impl ObservationFile {
         self.output.write(&bytes.with_context(|| format!("cannot write {shown}"))?)
     }
 
-    /// What is told of the file once it is written.
+    /// Describes the file once it is written.
     pub fn answer(&self) -> Answer {
         let files = answer::written([&self.output]);
         let text: String = files.iter().map(|file| format!("{}\n", file.display())).collect();

@@ -62,11 +62,11 @@ pub fn files(argument: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(names.iter().map(|name| folder.join(name)).collect())
 }
 
-/// What names of a sequence have in common.
+/// Common parts of the names of a sequence.
 struct Pattern<'a> {
     start: &'a str,
     end: &'a str,
-    /// Whether only digits stand between.
+    /// True if only digits stand between.
     digits: bool,
 }
 
@@ -214,7 +214,7 @@ fn at_scans(frames: usize, own: &OwnTimes, scans_h: &[f64]) -> anyhow::Result<(V
     Ok((scans_h.to_vec(), format!("{frames} images, image k at scan k")))
 }
 
-/// What files tell; times that count from nowhere start with the first scan.
+/// Returns the hours in files; times that count from nowhere start with the first scan.
 fn own_hours(own: &OwnTimes, first_scan_h: f64) -> anyhow::Result<Vec<f64>> {
     match own {
         OwnTimes::Unknown => bail!("--frame-times own: the images do not tell their times"),

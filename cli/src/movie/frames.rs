@@ -37,7 +37,7 @@ pub struct Sequence {
 
 /// Where a film comes from.
 pub struct Origin<'a> {
-    /// What its scene is called in messages.
+    /// Name of its scene in messages.
     pub name: &'a str,
     /// The scene's text.
     pub text: &'a str,
@@ -158,7 +158,7 @@ impl Sequence {
         self.wanted().filter(|k| !self.done[*k]).collect()
     }
 
-    /// Whether the first frame, which no batch begins with, is needed for its scale.
+    /// Returns whether the first frame, which no batch begins with, is needed for its scale.
     pub fn lacks_scale(&self) -> bool {
         let is_scaled = self.plans.first().is_some_and(|p| p.scene.screen.total_flux_jy.is_some());
         is_scaled && self.factor.is_none() && self.missing().first().is_some_and(|k| *k > 0)
@@ -242,7 +242,7 @@ impl Sequence {
         Ok(())
     }
 
-    /// What decides a frame.
+    /// Returns the settings that decide a frame.
     fn settings(&self, k: usize) -> Attributes {
         let scene = &self.plans[k].scene;
         let minutes = scene.hole.seconds().map(|unit| scene.observer.time * unit / 60.0);

@@ -20,7 +20,7 @@ pub struct Frames {
 const MOST: u32 = 1_000_000;
 
 impl Frames {
-    /// Whether all are rendered.
+    /// Returns whether all are rendered.
     pub fn are_all(&self) -> bool {
         self.part.end() - self.part.start() + 1 == self.all
     }

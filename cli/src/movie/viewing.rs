@@ -65,7 +65,7 @@ impl Animations {
         self.gif.iter().collect()
     }
 
-    /// Whether any image or animation is to be made.
+    /// Returns whether any image or animation is to be made.
     pub fn any(&self) -> bool {
         self.gif.is_some() || self.png
     }

@@ -1,5 +1,5 @@
-//! What processes leave beside files that they were killed in the middle of writing: `.kerrlight-NAME-` and six letters
-//! or digits. Whoever writes such a file holds its lock.
+//! Leftovers of processes that were killed in the middle of writing: `.kerrlight-NAME-` and six letters or digits.
+//! Whoever writes such a file holds its lock.
 
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
@@ -25,7 +25,7 @@ fn meant(name: &str) -> Option<&str> {
     is_random.then_some(meant)
 }
 
-/// What there is in a folder of such things, by the names that they were to have.
+/// Lists the leftovers in a folder, by the names that they were to have.
 fn all(folder: &Path) -> Vec<(String, PathBuf)> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let of = |entry: std::fs::DirEntry| {
@@ -40,7 +40,7 @@ pub fn sweep(folder: &Path, ours: impl Fn(&str) -> bool) {
     all.for_each(|(_, path)| remove(&path));
 }
 
-/// What each folder held when this process first wrote there: later ones are of processes that run.
+/// Leftovers in each folder when this process first wrote there: later ones are of processes that run.
 static HELD: Mutex<BTreeMap<PathBuf, Vec<(String, PathBuf)>>> = Mutex::new(BTreeMap::new());
 
 /// The same for one name; the folder is read the first time only.
@@ -102,7 +102,7 @@ mod tests {
         }
     }
 
-    /// What somebody writes stays, and so does what only looks like it.
+    /// Files that somebody writes stay, and so do those that only look like leftovers.
     #[test]
     fn exact_leftovers_go_and_what_is_written_stays() {
         let folder = tempfile::tempdir().unwrap();

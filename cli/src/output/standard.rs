@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{ErrorKind, Seek, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Whether standard output was closed when the program started, as by `>&-` in a shell. Before `main` the standard
+/// True if standard output was closed when the program started, as by `>&-` in a shell. Before `main` the standard
 /// library opens what leads nowhere in its place, and writing there never fails.
 static WAS_CLOSED: AtomicBool = AtomicBool::new(false);
 

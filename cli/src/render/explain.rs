@@ -1,4 +1,4 @@
-//! What a scene calls for, and what that is going to cost.
+//! Effects of a scene, and their cost.
 
 use crate::answer::Answer;
 use kerrlight_render::Error;

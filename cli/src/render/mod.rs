@@ -129,13 +129,13 @@ impl Render {
         Ok(outputs)
     }
 
-    /// Whether standard output carries one of the files.
+    /// Returns whether standard output carries one of the files.
     pub fn pipes(&self) -> bool {
         let all = [&self.output, &self.preview];
         all.into_iter().flatten().any(|path| output::is_pipe(path))
     }
 
-    /// What keeps the channels of the PNG, if there is one.
+    /// Returns the reduction that keeps the channels of the PNG, if there is one.
     fn reduction(
         &self,
         scene: &Scene,

@@ -56,7 +56,7 @@ impl Partial {
         self.path.as_ref().map_or("a temporary file".to_owned(), |path| path.display().to_string())
     }
 
-    /// What is left of an interrupted run, and how to resume it.
+    /// Describes what is left of an interrupted run, and how to resume it.
     pub fn kept(&self) -> String {
         match &self.path {
             Some(path) => format!(

@@ -55,7 +55,7 @@ impl PreviewOptions {
         Ok(wanted.to_vec())
     }
 
-    /// What the PNG of `scene` shows.
+    /// Returns the values that the PNG of `scene` shows.
     pub fn look(&self, scene: &Scene) -> Look {
         let stretch = match self.stretch {
             StretchName::Linear => Stretch::Linear,

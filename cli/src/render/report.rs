@@ -1,12 +1,12 @@
-//! What is told about a picture: in the file and on the terminal.
+//! Attributes of a picture: in the file and on the terminal.
 
 use kerrlight_render::image::exr::Attributes;
 use kerrlight_render::picture::Summary;
 use kerrlight_render::scene::Scene;
 use serde_json::{Value, json};
 
-/// What decided the picture, and what it amounts to: `text` is the scene as it was given,
-/// `legend` says what the channels hold.
+/// Returns the settings of the picture and its totals: `text` is the scene as it was given,
+/// `legend` describes the channels.
 pub fn attributes(scene: &Scene, text: &str, legend: String, summary: &Summary) -> Attributes {
     let entry = |name: &str, value: String| (name.to_owned(), value);
     [
@@ -27,7 +27,7 @@ pub fn attributes(scene: &Scene, text: &str, legend: String, summary: &Summary) 
     .into()
 }
 
-/// What the size of a pixel is called: in M, or on the picture plane of a camera.
+/// Names the unit of a pixel's size: M, or the picture plane of a camera.
 fn pixel_unit(scene: &Scene) -> &'static str {
     if scene.camera.is_some() { "pixel_size_plane" } else { "pixel_size_m" }
 }

@@ -16,11 +16,11 @@ pub const BUILT_IN: &str = include_str!("../built_in_scene.toml");
 #[derive(Debug)]
 pub struct Source {
     pub text: String,
-    /// What it is called in messages.
+    /// Name in messages.
     pub name: String,
-    /// What relative paths in it are relative to.
+    /// Folder from which relative paths in it start.
     pub folder: PathBuf,
-    /// What tells the files that it named from others, where it comes from a picture.
+    /// Identity of the files that it named, where it comes from a picture.
     pub files: Option<String>,
 }
 

@@ -14,15 +14,15 @@ use kerrlight_render::picture::{AnyJournal, Journal, Raster, RenderError, Summar
 use kerrlight_render::scene::Scene;
 use std::io::Cursor;
 
-/// What is rendered.
+/// Picture to render.
 pub struct Work<'a> {
     pub raster: &'a Raster,
     pub scene: &'a Scene,
     /// The scene as it was given.
     pub text: &'a str,
-    /// What the scene is called in messages.
+    /// Name of the scene in messages.
     pub name: &'a str,
-    /// What tells the files that the scene names from others.
+    /// Identity of the files that the scene names.
     pub files: &'a str,
     /// How the EXR is written.
     pub style: &'a ExrOptions,
@@ -101,7 +101,7 @@ impl Work<'_> {
         anyhow::anyhow!("{}; {left}", self.device_failure().unwrap_or_default())
     }
 
-    /// What to tell of a picture that has not been finished.
+    /// Returns the error of a picture that has not been finished.
     fn failed(&self, error: Error, partial: Partial) -> anyhow::Error {
         match error {
             Error::Render(RenderError::Stopped) => {

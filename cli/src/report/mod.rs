@@ -26,18 +26,18 @@ pub use view::{Motion, View3d, rates, thinned};
 
 use crate::output::Output;
 
-/// What is on the page; empty lists are left out.
+/// Content of the page; empty lists are left out.
 #[derive(Debug, Default)]
 pub struct Report {
-    /// What was done, in a few words.
+    /// Title of the run, in a few words.
     pub title: String,
-    /// What has to be read before all else.
+    /// Notice before all else.
     pub notice: Option<Notice>,
     /// Sentences: what was asked, what was measured, what it means.
     pub summary: Vec<String>,
     /// Paragraphs under headings.
     pub parts: Vec<Part>,
-    /// What was measured.
+    /// Measured results.
     pub results: Vec<Outcome>,
     /// Further tables.
     pub tables: Vec<Table>,
@@ -60,13 +60,13 @@ pub struct Report {
 pub struct Drawing {
     /// Its SVG.
     pub svg: String,
-    /// What it shows.
+    /// Caption.
     pub caption: String,
-    /// What somebody who does not see it should know.
+    /// Description for somebody who does not see it.
     pub alt: String,
 }
 
-/// What has to be read before all else.
+/// Notice before all else.
 #[derive(Debug)]
 pub struct Notice {
     /// How it is meant.
@@ -84,7 +84,7 @@ pub enum Tone {
     Good,
     /// Something to know.
     Plain,
-    /// What follows is not to be trusted.
+    /// Warning: the rest of the page is not to be trusted.
     Bad,
 }
 
@@ -93,7 +93,7 @@ pub enum Tone {
 pub struct Part {
     /// The heading.
     pub heading: String,
-    /// What stands under it.
+    /// Text under it.
     pub text: Vec<String>,
 }
 
@@ -102,7 +102,7 @@ pub struct Part {
 pub struct Table {
     /// Its title.
     pub title: String,
-    /// What it says, for somebody who does not know what is in it.
+    /// Caption, for somebody who does not know what is in it.
     pub caption: String,
     /// Names of the columns.
     pub head: Vec<String>,
@@ -119,7 +119,7 @@ pub struct Setting {
     pub key: String,
     /// Its value.
     pub value: String,
-    /// What it says, with its unit.
+    /// Meaning, with its unit.
     pub meaning: String,
 }
 
@@ -132,7 +132,7 @@ pub struct Outcome {
     pub value: String,
     /// Its unit, or nothing.
     pub unit: String,
-    /// What it says, for somebody who does not know the name.
+    /// Meaning, for somebody who does not know the name.
     pub meaning: String,
 }
 

@@ -10,7 +10,7 @@ const SCRIPT: &str = include_str!("assets/rows.js");
 /// Rows that stand on the page at a time.
 pub const ROWS: usize = 200;
 
-/// Whether a table is too long to stand on the page as a whole.
+/// Returns whether a table is too long to stand on the page as a whole.
 pub fn is_long(table: &Table) -> bool {
     table.rows.len() > ROWS
 }

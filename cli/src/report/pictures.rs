@@ -14,9 +14,9 @@ use std::io::Cursor;
 pub struct Figure {
     /// The bytes of its PNG file.
     pub png: Vec<u8>,
-    /// What it shows and how it was made.
+    /// Caption: what it shows, and how it was made.
     pub caption: String,
-    /// What somebody who does not see it should know.
+    /// Description for somebody who does not see it.
     pub alt: String,
 }
 

@@ -14,7 +14,7 @@ pub struct Axis {
     pub label: String,
     /// Its unit; empty for a number without one.
     pub unit: String,
-    /// Whether equal ratios are equally far apart.
+    /// True if equal ratios are equally far apart.
     pub log: bool,
 }
 
@@ -32,7 +32,7 @@ pub enum Marks {
 /// One curve.
 #[derive(Debug)]
 pub struct Series {
-    /// What the legend calls it.
+    /// Name in the legend.
     pub name: String,
     /// (x, y).
     pub points: Vec<[f64; 2]>,
@@ -47,7 +47,7 @@ pub struct Series {
 pub struct LinePlot {
     /// Its title.
     pub title: String,
-    /// What it shows.
+    /// Caption.
     pub caption: String,
     /// The axis to the right.
     pub x: Axis,
@@ -125,7 +125,7 @@ impl LinePlot {
         Ok(all.filter(visible).collect())
     }
 
-    /// What is drawn of a series, one over another.
+    /// Returns the layers of a series, one over another.
     fn curve(&self, series: &Series, shown: &[Point], color: &str) -> Vec<Plot> {
         let points = shown.iter().map(|([x, y], _)| (*x, *y));
         let line = |width| Line::new().with_color(color).with_stroke_width(width);

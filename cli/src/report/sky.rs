@@ -9,7 +9,7 @@ use kerrlight_render::image::{Channel, Picture};
 
 /// An image of the sky.
 pub struct SkyPanel<'a> {
-    /// What stands above it.
+    /// Title above it.
     pub name: &'a str,
     /// Pixels, Jy, north first and east left.
     pub image: Vec<f64>,

@@ -10,11 +10,11 @@ use kuva::render::plots::Plot;
 /// A number with its draws.
 #[derive(Debug)]
 pub struct Variable {
-    /// What it is called, with its unit.
+    /// Name, with its unit.
     pub name: String,
     /// The draws, as many as of the others.
     pub values: Vec<f64>,
-    /// What it is in truth.
+    /// True value.
     pub truth: Option<f64>,
 }
 

@@ -44,12 +44,12 @@ pub fn rates(flow: &AngularVelocity, [first, last]: [f64; 2]) -> Vec<[f64; 2]> {
     (0..200).map(radius).map(|r| [r, flow.rate(r)]).collect()
 }
 
-/// What the viewer shows.
+/// Volumes that the viewer shows.
 #[derive(Debug)]
 pub struct View3d {
-    /// What was recovered.
+    /// Recovered volume.
     pub recovered: Volume,
-    /// What it should be, if that is known.
+    /// True volume, if that is known.
     pub truth: Option<Volume>,
     /// Unit of the emission.
     pub unit: String,
@@ -144,7 +144,8 @@ impl View3d {
         Ok(fill(VIEWER, &parts))
     }
 
-    /// What a printed page has in place of the viewer: its first view, and the one from the other side.
+    /// Returns the picture of a printed page in place of the viewer: its first view, and the one from
+    /// the other side.
     fn still(&self) -> anyhow::Result<Vec<u8>> {
         let mut shown = vec![Shown { name: "recovered", volume: &self.recovered }];
         shown.extend(self.truth.as_ref().map(|volume| Shown { name: "truth", volume }));

@@ -1,4 +1,4 @@
-//! What the page is told of its subject, as one object.
+//! Subject of the page, as one object.
 
 use super::matter::{self, Volumes};
 use super::run_folder::Measured;

@@ -1,4 +1,4 @@
-//! What of a scene the page does not show.
+//! Parts of a scene that the page does not show.
 
 use super::subject::Subject;
 use kerrlight_render::scene::Scene;

@@ -1,4 +1,4 @@
-//! What fills space, as the page takes it: volumes, how they turn, and spots.
+//! Matter that fills space, as the page takes it: volumes, how they turn, and spots.
 
 use super::left_out::SPOTS;
 use super::subject::Subject;
@@ -59,7 +59,7 @@ impl Volumes {
         Ok(Volumes { law: law(source, turns.as_ref(), reach), textures, falls, reach })
     }
 
-    /// What the page is told of them.
+    /// Describes them for the page.
     pub fn described(&self) -> Value {
         self.textures.iter().map(Texture::described).collect()
     }
@@ -131,7 +131,7 @@ fn half(value: f32) -> u16 {
     half::f16::from_f32(value.max(0.0)).to_bits()
 }
 
-/// What the page is told of the spots.
+/// Describes the spots for the page.
 pub fn spots(subject: &Subject) -> anyhow::Result<Value> {
     let hole = Kerr::new(subject.scene.hole.spin)?;
     let spot = |spot: &Spot| {

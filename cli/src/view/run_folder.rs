@@ -1,4 +1,4 @@
-//! What the folder of a fit holds for the page.
+//! Folder of a fit, for the page.
 
 use crate::output;
 use crate::volume_files;

@@ -70,8 +70,8 @@ fn answer(page: &Page, mut stream: TcpStream) -> std::io::Result<()> {
     stream.write_all(content.as_bytes())
 }
 
-/// Whether a request names this computer as its host, at any port, which may be forwarded. Another name that leads here is
-/// that of a page that would read what is served (DNS rebinding).
+/// Returns whether a request names this computer as its host, at any port, which may be forwarded. Another name that leads
+/// here is that of a page that would read what is served (DNS rebinding).
 fn is_loopback(host: &str) -> bool {
     let name = match host.rsplit_once(':') {
         Some((name, port)) if port.bytes().all(|digit| digit.is_ascii_digit()) => name,

@@ -1,4 +1,4 @@
-//! What the page shows: a scene with its files, or the folder of a fit.
+//! Subject of the page: a scene with its files, or the folder of a fit.
 
 use super::run_folder::{self, Measured};
 use crate::assets::{self, Reach};
@@ -17,7 +17,7 @@ pub struct Subject {
     pub assets: Assets,
     /// Words that stand behind `kerrlight render` for this scene.
     pub words: Vec<String>,
-    /// What the page is called.
+    /// Title of the page.
     pub title: String,
     /// The volume that a fit should have recovered, if it is known.
     pub truth: Option<VolumeFile>,

@@ -8,7 +8,7 @@ use std::process::Command;
 
 const LAYER: &str = "VK_LAYER_KERRLIGHT_faults";
 
-/// What is run on a device: one word of the command line each.
+/// Command to run on a device: one word of the command line each.
 type Words = Vec<String>;
 
 fn words(words: &[&str], changes: &[&str]) -> Words {
@@ -98,7 +98,7 @@ impl Faults {
         ]
     }
 
-    /// What is said of a fault.
+    /// Returns the message about a fault.
     fn told(&self, folder: &Path, fault: &str, words: &Words) -> String {
         fails(folder, &self.variables(fault), &borrowed(words))
     }

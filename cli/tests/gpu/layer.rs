@@ -62,7 +62,7 @@ pub struct Interface {
     of_physical_device: Function,
 }
 
-/// What comes after this layer.
+/// Function that comes after this layer.
 struct Below(AtomicPtr<c_void>);
 
 static INSTANCE: Below = Below(AtomicPtr::new(null_mut()));

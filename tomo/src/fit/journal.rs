@@ -1,4 +1,4 @@
-//! What long searches have found so far, so that one that was interrupted looks at nothing twice.
+//! Journal of long searches, so that one that was interrupted looks at nothing twice.
 //!
 //! Searches are the same each time they run. One that begins anew and is told what it has found before ends with the same
 //! bits, within moments of where it was.
@@ -7,7 +7,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Numbers by the key of what they were found for.
 pub trait Journal: Sync {
-    /// What was kept under a key.
+    /// Returns the value under a key.
     fn recall(&self, key: u64) -> Option<Vec<f64>>;
 
     /// Keeps numbers, bit by bit.

@@ -43,7 +43,7 @@ fn browse(browser: &Path, folder: &Path, fragment: &str, switch: &str) -> String
     std::fs::read_to_string(out).unwrap()
 }
 
-/// What the browser makes of the page, as HTML.
+/// Returns the page as the browser has built it, as HTML.
 fn dump(browser: &Path, folder: &Path, fragment: &str) -> String {
     browse(browser, folder, fragment, "--dump-dom")
 }
@@ -115,7 +115,7 @@ fn carried(volume: &Volume, time: f64) -> Volume {
     Volume::new(volume.nodes(), volume.low(), volume.high(), values).unwrap()
 }
 
-/// What the viewer turns to a time looks as what the fit's own dynamics carry there.
+/// Matter that the viewer turns to a time looks as what the fit's own dynamics carry there.
 #[test]
 fn code_viewer_moves_matter_as_the_fit_does() {
     let Some(browser) = browser() else {

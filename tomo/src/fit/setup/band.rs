@@ -36,7 +36,7 @@ pub struct BandGeometry {
     pub likely: Vec<(Band, f64)>,
 }
 
-/// What was found.
+/// Result of a scan of bands.
 #[derive(Clone, Debug)]
 pub struct BandScan {
     /// All geometries.
@@ -56,8 +56,7 @@ pub struct BandScan {
     pub ln_bayes_factor: f64,
     /// Periods of the orbit in minutes, geometry by geometry and radius by radius; infinite where matter stands still.
     pub periods_min: Vec<Vec<f64>>,
-    /// What the background is expected to be at all data in the best geometry and its standard deviation, Jy; none if there is
-    /// none.
+    /// Expected background at all data in the best geometry and its standard deviation, Jy; none if there is none.
     pub background: Option<Vec<FluxDatum>>,
 }
 
@@ -240,7 +239,7 @@ fn check_rings(file: &FitFile, settings: &BandSettings) -> Result<()> {
     Ok(())
 }
 
-/// Whether every frame has Q and U, in this order, with the same error: noise then has no direction.
+/// Returns whether every frame has Q and U, in this order, with the same error: noise then has no direction.
 fn can_turn(curve: &Curve) -> bool {
     let same = |pair: &[Option<[f64; 2]>]| match pair {
         [Some([_, a]), Some([_, b])] => (a - b).abs() <= 1e-9 * a,

@@ -1,4 +1,4 @@
-//! What searches look through: fewer pixels and nodes, or other ones.
+//! Coarse views of searches: fewer pixels and nodes, or other ones.
 
 use super::linear_problem::terms;
 use super::{FitData, Instrument, Result, forward_model, linear, priors, sky, spacing};
@@ -8,7 +8,7 @@ use crate::fit::{Motion, Objective, Sampling};
 use kerrlight_common::frames::Frames;
 use kerrlight_vlbi::operator::Pulse;
 
-/// What a fit is seen through by a search.
+/// Coarse view of a fit for a search.
 pub struct CoarseView {
     pub(super) file: FitFile,
     pub(super) instrument: Instrument,

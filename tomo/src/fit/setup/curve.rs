@@ -15,8 +15,8 @@ pub struct Curve {
     pub data: Vec<Option<FluxDatum>>,
     /// Frames that are fitted; the others judge the fit.
     pub fitted: Vec<bool>,
-    /// What shines beside the emission that is fitted and its standard deviation, Jy, in the order of the data; none where
-    /// nothing does.
+    /// Background of the emission that is fitted and its standard deviation, Jy, in the order of the data; none where
+    /// there is none.
     pub background: Option<Vec<FluxDatum>>,
 }
 
@@ -50,7 +50,7 @@ impl Curve {
         StokesCurveTerm::new(count, (0..self.data.len()).map(of).collect())
     }
 
-    /// What shines beside the emission that is fitted at a number of the data, and its standard deviation, Jy.
+    /// Returns the background of the emission that is fitted at a number of the data, and its standard deviation, Jy.
     pub fn background_at(&self, k: usize) -> FluxDatum {
         self.background.as_ref().map_or([0.0; 2], |background| background[k])
     }

@@ -6,8 +6,8 @@ use crate::fit::settings::{AxisSearch, FitFile, Spot};
 use kerrlight_common::frames::Frames;
 use kerrlight_render::dynamics::Velocity;
 
-/// What another forward model needs to know of a drawn geometry: matter on circular geodesics about the hole, which shines in a
-/// region, seen from far away with the time that light takes.
+/// A drawn geometry for another forward model: matter on circular geodesics about the hole, which shines in a region, seen from
+/// far away with the time that light takes.
 #[derive(Clone, Copy, Debug)]
 pub struct Drawn<'a> {
     /// Spin, M.
@@ -37,17 +37,17 @@ pub type OtherModel<'a> =
 /// Pixels of the other model along each side of one of the fit's.
 pub(super) const FINER: usize = 4;
 
-/// Whether the geometry of a simulation is drawn from priors.
+/// Returns whether the geometry of a simulation is drawn from priors.
 pub(super) fn is_drawn(file: &FitFile) -> bool {
     file.simulation.as_ref().is_some_and(|simulation| simulation.drawn)
 }
 
-/// Whether data of these settings are those of a drawn geometry that another forward model can make.
+/// Returns whether data of these settings are those of a drawn geometry that another forward model can make.
 pub(super) fn is_drawn_elsewhere(file: &FitFile) -> Result<bool> {
     Ok(is_drawn(file) && is_of_other_model(&file.simulated()?))
 }
 
-/// Whether another forward model can make the data of a drawn geometry.
+/// Returns whether another forward model can make the data of a drawn geometry.
 fn is_of_other_model(drawn: &FitFile) -> bool {
     let is_circular = matches!(drawn.motion.velocity, Velocity::Keplerian { drag: None });
     let is_upright = drawn.motion.axis == Some([0.0, 0.0, 1.0]);

@@ -21,15 +21,15 @@ pub struct FitData {
     pub movie: Option<Frames<f64>>,
     /// Visibilities, with the frame of each row.
     pub visibilities: Option<(Observation, Vec<usize>)>,
-    /// Whether errors of visibilities are those of a source that varies: common to many data, so that χ² may be small.
+    /// True if errors of visibilities are those of a source that varies: common to many data, so that χ² may be small.
     pub has_intrinsic_variability: bool,
     /// The light curve of an unresolved source.
     pub curve: Option<Curve>,
     /// Where pixels are on the sky, where that matters.
     pub sky: Option<ImageGrid>,
-    /// What those pixels are to visibilities.
+    /// Shape of those pixels in visibilities.
     pub pulse: Pulse,
-    /// What is simulated.
+    /// True emission of a simulation.
     pub truth: Option<Truth>,
     /// Priors of the stations' gains, where these are solved for.
     pub gains: Option<GainPriors>,

@@ -82,7 +82,7 @@ impl Glyph {
         })
     }
 
-    /// Whether its amplitude is 0.
+    /// Returns whether its amplitude is 0.
     pub fn is_dark(&self) -> bool {
         self.amplitude == 0.0
     }

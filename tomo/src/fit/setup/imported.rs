@@ -15,7 +15,7 @@ use crate::fit::settings::{
 use kerrlight_common::frames::Frames;
 use kerrlight_vlbi::observation::Observation;
 
-/// What to write where there are no data.
+/// Advice where there are no data.
 pub(super) const FILE: &str = "a table [data.visibilities] or [data.movie] with `path = \"FILE\"` (`kerrlight fit --init FILE` writes \
      all of it)";
 
@@ -102,7 +102,7 @@ impl FitData {
     }
 }
 
-/// What is done with measured visibilities before a model is compared with them.
+/// Reduction of measured visibilities before a model is compared with them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reduction {
     /// Averages, and baselines that are left out.
@@ -111,7 +111,7 @@ pub struct Reduction {
     pub systematic: f64,
     /// Scattering that is undone.
     pub scattering: Option<Scattering>,
-    /// What the source varies, which is added to errors of Stokes I in quadrature.
+    /// Variability of the source, which is added to errors of Stokes I in quadrature.
     pub variability: Option<Variability>,
 }
 

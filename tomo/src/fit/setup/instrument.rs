@@ -1,4 +1,4 @@
-//! What a fit looks through: sight lines, traced once.
+//! Instrument of a fit: sight lines, traced once.
 
 use super::observable::seen;
 use super::quiescent::quiescent;
@@ -14,7 +14,7 @@ use kerrlight_common::simd::Float;
 use kerrlight_geodesic::Kerr;
 use kerrlight_render::polarization::StokesParameter;
 
-/// What a fit looks through: the same for all data and representations.
+/// Instrument of a fit: the same for all data and representations.
 pub struct Instrument {
     /// Where its pixels are: M to the right and upwards of the middle of the screen.
     pub pixels: [Vec<f64>; 2],
@@ -26,9 +26,9 @@ pub struct Instrument {
     pub redshift: Option<Redshift>,
     /// How polarised light is seen; total intensity alone, without.
     pub polarized: Option<PolarizedView>,
-    /// What data see.
+    /// Quantities that data depend on.
     pub seen: Observable,
-    /// What does not move, where it is recovered.
+    /// Emission that does not move, where it is recovered.
     pub quiescent: Option<Quiescent>,
 }
 
@@ -116,7 +116,7 @@ impl Instrument {
         Ok(Self { pixels, hole, lines, redshift, polarized, seen, quiescent })
     }
 
-    /// What data see of emission that moves like this.
+    /// Returns the forward model of emission that moves like this.
     ///
     /// # Errors
     /// If the motion is out of range.

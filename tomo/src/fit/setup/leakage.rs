@@ -8,9 +8,9 @@ use kerrlight_vlbi::polarimetry::SharedLeakage;
 /// Leakage that is not known.
 #[derive(Clone, Debug)]
 pub struct LeakageUnknown {
-    /// What is known of it, and how often it is solved for.
+    /// Settings of leakage: its prior, and how often it is solved for.
     pub settings: LeakageSettings,
-    /// What was found last; terms of the loss see it.
+    /// Leakage that was found last; terms of the loss see it.
     pub shared: SharedLeakage,
 }
 
@@ -34,7 +34,7 @@ pub(super) fn unknown(
     Ok(Some(LeakageUnknown { settings, shared }))
 }
 
-/// Whether each station has any rows.
+/// Returns whether each station has any rows.
 pub(super) fn observing(observation: &Observation) -> Vec<bool> {
     let mut observes = vec![false; observation.stations.len()];
     for station in observation.rows.iter().flat_map(|row| row.stations) {

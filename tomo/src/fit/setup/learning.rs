@@ -18,9 +18,9 @@ use crate::representation::{
 };
 use kerrlight_common::memory;
 
-/// What is recovered, with the parameters of what does not move behind its own; `registry` has what the program adds to kerrlight's own representations. Where emission
-/// may change, `times` are those of the first and the last emission, M since the reference time
-/// ([`emission_times`](super::emission_times)).
+/// Returns the representation, with the parameters of emission that does not move behind its own; `registry` has what the
+/// program adds to kerrlight's own representations. Where emission may change, `times` are those of the first and the last
+/// emission, M since the reference time ([`emission_times`](super::emission_times)).
 ///
 /// # Errors
 /// If there is none of this kind, or a number is out of range.
@@ -75,7 +75,7 @@ fn carrier(file: &FitFile) -> Result<Carrier> {
     Ok(Carrier { axis, velocity, limits: [r_min, r_max] })
 }
 
-/// What is recovered where matter carries emission unchanged.
+/// Returns the representation where matter carries emission unchanged.
 pub(super) fn of_matter(
     file: &FitFile,
     registry: &Registry,
@@ -139,7 +139,7 @@ fn chosen_grid(chosen: &settings::Representation, r: f64) -> GridSettings {
     GridSettings { nodes: [nodes; 3], low: [-r; 3], high: [r; 3], activation, initial }
 }
 
-/// What is between the nodes of a linear grid.
+/// Returns the degree of the interpolation of a linear grid.
 fn degree(file: &FitFile) -> Degree {
     file.linear.as_ref().map_or(Degree::Cubic, |linear| linear.degree)
 }
@@ -195,7 +195,7 @@ pub fn training(
     })
 }
 
-/// What change costs in steps; the linear problem has its own price.
+/// Returns the price of change in steps; the linear problem has its own price.
 fn price(file: &FitFile, times: [f64; 2]) -> Result<Option<ChangePrice>> {
     let kind = &file.representation.kind;
     if file.change.is_none() || *kind == Kind::LinearGrid {
@@ -206,7 +206,7 @@ fn price(file: &FitFile, times: [f64; 2]) -> Result<Option<ChangePrice>> {
     Ok(Some(ChangePrice { weight, knots, linear, region: file.region.limits() }))
 }
 
-/// What is allowed and most probably not meant.
+/// Names a setting that is allowed and most probably not meant.
 pub fn caution(file: &FitFile) -> Option<&'static str> {
     let training = &file.training;
     let is_dark = file.representation.kind == Kind::Grid && training.start == Start::Drawn;

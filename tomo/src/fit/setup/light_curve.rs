@@ -58,7 +58,7 @@ fn datum(
     Ok(Some([flux.jy, sigma]))
 }
 
-/// What is left of a file's light curve.
+/// Returns a file's light curve after its selection.
 fn prepared(mut curve: LightCurve, settings: &MeasuredCurve) -> Result<LightCurve> {
     check_positive("data.light-curve.average", settings.average.map(|count| count as f64))?;
     check_positive("data.light-curve.average_s", settings.average_s)?;
@@ -115,7 +115,7 @@ fn check_positive(key: &str, value: Option<f64>) -> Result<()> {
     }
 }
 
-/// Whether each frame is fitted.
+/// Returns whether each frame is fitted.
 fn fitted(hours: &[f64], after_min: Option<f64>) -> Result<Vec<bool>> {
     let last = after_min.unwrap_or(f64::INFINITY);
     let fitted: Vec<bool> = hours.iter().map(|h| (h - hours[0]) * 60.0 <= last).collect();

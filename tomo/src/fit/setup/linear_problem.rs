@@ -17,10 +17,10 @@ const COARSE: usize = 24;
 /// Bytes of the sparse matrix of emission that changes: its rows take long to compute anew.
 const MANY_ROWS: usize = 2 << 30;
 
-/// What is left of the first gradient beside a prior: what data hardly tell is decided last.
+/// Share of the first gradient that is left beside a prior: what data hardly tell is decided last.
 const SURE: f64 = 1e-7;
-/// What is left of the first gradient without one: slopes of bright data, or with respect to the pixels of a quiescent image,
-/// which add up over all frames, fall to a thousandth while the volume has hardly been found.
+/// Share of the first gradient that is left without one: slopes of bright data, or with respect to the pixels of a quiescent
+/// image, which add up over all frames, fall to a thousandth while the volume has hardly been found.
 const LEFT: f64 = 1e-6;
 /// Part of what noise changes χ² by that ten iterations must gain.
 const GAIN: f64 = 0.1;
@@ -64,7 +64,7 @@ pub fn draw_linear(
     solve_frames(&Of { file, objective, how, nodes, seed }, &frames, watch)
 }
 
-/// What the linear problem of a fit is made of; its model is weighed for the axis.
+/// Parts of the linear problem of a fit; its model is weighed for the axis.
 pub(super) struct Of<'a> {
     pub file: &'a FitFile,
     pub objective: &'a Objective<f32>,

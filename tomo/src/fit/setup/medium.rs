@@ -1,5 +1,5 @@
-//! What measured visibilities need besides errors of calibration: the scattering that the light has passed, and errors
-//! for what the source varies.
+//! Corrections of measured visibilities besides errors of calibration: the scattering that the light has passed, and
+//! errors for the variability of the source.
 
 use super::Result;
 use super::polarized::is_polarized;

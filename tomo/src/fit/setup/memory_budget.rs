@@ -20,10 +20,10 @@ const STILL_NODES: usize = 48;
 const OF_BATCH: f64 = 64.0;
 /// Bytes of a node of a linear problem: numbers of its steps in double precision, and gradients of pieces.
 const OF_LINEAR: f64 = 512.0;
-/// What is taken beside all of this: the page, pictures, files that are read, blocks of threads.
+/// Memory beside all of this: the page, pictures, files that are read, blocks of threads.
 const OTHERS: f64 = 32.0 * 1048576.0;
-/// What parts of the limit are taken by movies, one that is seen and one that is found, and rows and slopes of linear
-/// problems: as much as they need, up to that.
+/// Shares of the limit for movies, one that is seen and one that is found, and for rows and slopes of linear problems: as
+/// much as they need, up to that.
 const MOVIE: f64 = 1.0 / 8.0;
 const LINEAR: [f64; 2] = [1.0 / 4.0, 1.0 / 16.0];
 

@@ -134,15 +134,15 @@ pub fn sky(file: &FitFile) -> Result<ImageGrid> {
     Ok(ImageGrid::new(n, n, field_uas * MICROARCSECOND)?)
 }
 
-/// What to write where the mass is missing.
+/// Advice where the mass is missing.
 const MASS: &str =
     "give `mass_msun = …`, in solar masses, in [hole], e.g. 4.154e6 for Sgr A*, 6.5e9 for M87*";
 
-/// What to write where the axis is missing.
+/// Advice where the axis is missing.
 const AXIS: &str = "give `axis = [0.0, 0.0, 1.0]`, the direction that matter turns about right-handed (this one: \
      the hole's), in [motion]";
 
-/// What to write where the linear problem is missing.
+/// Advice where the linear problem is missing.
 const LINEAR: &str = "add a table [linear] with `upper = 3.0` (the largest emission that is allowed: a few times what \
      you expect), `rounds = 4` and `iterations = 200`";
 

@@ -1,4 +1,4 @@
-//! What data see of the source: images, images of Stokes parameters, or fluxes.
+//! Quantities that data depend on: images, images of Stokes parameters, or fluxes.
 
 use super::Result;
 use super::polarized::{PARAMETERS, is_polarized};
@@ -6,7 +6,7 @@ use crate::fit::Observable;
 use crate::fit::settings::{DataFiles, FitError, FitFile, Loss, LossKind, refuse};
 use kerrlight_render::polarization::StokesParameter;
 
-/// What data see: fluxes, if they are a light curve of their own.
+/// Returns the quantities that data depend on: fluxes, if they are a light curve of their own.
 ///
 /// # Errors
 /// If other losses stand beside it, a Stokes parameter has no model, or settings are missing.
@@ -53,7 +53,7 @@ fn check(file: &FitFile, parameters: &[StokesParameter]) -> Result<()> {
     Ok(())
 }
 
-/// What polarised visibilities see; nothing where they are not fitted.
+/// Returns the quantities that polarised visibilities depend on; nothing where they are not fitted.
 ///
 /// # Errors
 /// If there is no field, or other settings contradict them.

@@ -1,4 +1,4 @@
-//! What an array sees of a simulation: its schedule, and what spoils the data.
+//! Simulated observations: the schedule of the array, and corruptions of the data.
 
 use super::Result;
 use super::leakage::observing;
@@ -59,7 +59,7 @@ fn clock(seen: &Observable) -> Result<(Clock, [f64; 2])> {
     }
 }
 
-/// What was put on simulated data.
+/// Corruptions of simulated data.
 #[derive(Default)]
 pub(super) struct Spoiled {
     pub gains: Option<GainTable>,

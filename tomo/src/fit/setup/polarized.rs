@@ -9,7 +9,7 @@ use kerrlight_vlbi::polarimetry::MODELLED;
 pub(super) const PARAMETERS: [StokesParameter; MODELLED] =
     [StokesParameter::I, StokesParameter::Q, StokesParameter::U];
 
-/// Whether any of the data compare Q and U of baselines.
+/// Returns whether any of the data compare Q and U of baselines.
 pub(super) fn is_polarized(losses: &[Loss]) -> bool {
     losses.iter().any(|loss| loss.data.is_polarized())
 }

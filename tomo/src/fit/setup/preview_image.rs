@@ -32,7 +32,7 @@ pub struct PreviewImage {
     pub truth: Option<Vec<f32>>,
 }
 
-/// What a still shows, and from where.
+/// View of a still.
 pub struct PreviewView<'a> {
     /// The settings.
     pub file: &'a FitFile,

@@ -9,7 +9,7 @@ use crate::representation::Workspace;
 /// Pixels whose rays are held at a time.
 const BLOCK: usize = 2048;
 
-/// What images are made of.
+/// Parts of which images are made.
 #[derive(Clone, Copy)]
 pub struct Imaged<'a> {
     /// Settings, in the geometry that was found.

@@ -1,4 +1,4 @@
-//! What does not move, as settings say.
+//! Emission that does not move, from settings.
 
 use super::observable::seen;
 use super::{Result, spacing};

@@ -34,7 +34,7 @@ impl Rings {
         Ok(all)
     }
 
-    /// Whether there are none.
+    /// Returns whether there are none.
     pub fn is_empty(&self) -> bool {
         self.images[0].is_empty()
     }

@@ -148,7 +148,7 @@ fn densely(file: &FitFile) -> FitFile {
     dense
 }
 
-/// What the pixels of a simulation are to its visibilities.
+/// Returns the shape of the pixels of a simulation in its visibilities.
 fn pulse(fit: &FitFile) -> Pulse {
     fit.screen.pulse.unwrap_or(PixelShape::Triangle).pulse()
 }

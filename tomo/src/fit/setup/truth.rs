@@ -12,7 +12,7 @@ use kerrlight_geodesic::vector::distance;
 use kerrlight_render::dynamics::{AngularVelocity, Axis};
 use kerrlight_render::polarization::StokesParameter;
 
-/// What to write where there is no truth.
+/// Advice where there is no truth.
 pub(super) const SPOT: &str = "add a table [[simulation.truth.spot]] with `center = [x, y, z]` and `sigma = …` in M and `amplitude = 1.0`";
 
 /// The emission that is simulated.
@@ -26,7 +26,7 @@ pub struct Truth {
     velocity: AngularVelocity,
     /// M.
     reference: f64,
-    /// What its amplitudes are multiplied by.
+    /// Factor of its amplitudes.
     scale: f64,
 }
 
@@ -121,14 +121,14 @@ impl Truth {
         }
     }
 
-    /// Whether every amplitude is 0: data of noise alone.
+    /// Returns whether every amplitude is 0: data of noise alone.
     pub fn is_dark(&self) -> bool {
         self.spots.iter().all(|spot| spot.amplitude == 0.0)
             && self.glyphs.iter().all(Glyph::is_dark)
             && self.field.is_none()
     }
 
-    /// Whether matter carries it unchanged.
+    /// Returns whether matter carries it unchanged.
     pub fn is_carried(&self) -> bool {
         self.spots.iter().all(|spot| spot.shines.is_none())
     }
@@ -138,7 +138,7 @@ impl Truth {
         self.axis
     }
 
-    /// What does not move, Jy per pixel, rows from the top; none without rings.
+    /// Returns the emission that does not move, Jy per pixel, rows from the top; none without rings.
     pub fn quiescent(&self, parameter: StokesParameter) -> Option<&[f64]> {
         (!self.rings.is_empty()).then(|| self.rings.of(parameter))
     }

@@ -5,7 +5,7 @@ use crate::fit::settings::refuse;
 use kerrlight_vlbi::observation::{Averaging, Flags, Observation, Row};
 use std::collections::HashSet;
 
-/// What a fit does with the rows of a file.
+/// Settings of the rows of a file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VisibilitySettings {
     /// Rows of an interval of this many seconds are averaged; 0 keeps all.

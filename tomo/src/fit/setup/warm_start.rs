@@ -26,7 +26,7 @@ const ROUNDS: u64 = 4;
 /// Draws of points that tell how close it is.
 const DRAWS: usize = 4;
 
-/// What an imprint took.
+/// Result of a warm start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WarmStarted {
     /// Steps.
@@ -35,7 +35,7 @@ pub struct WarmStarted {
     pub relative_error: f64,
 }
 
-/// What a representation starts from.
+/// Start of a representation.
 #[derive(Clone, Copy, Debug)]
 pub struct WarmStart<'a> {
     /// The solution of a linear problem.
@@ -104,7 +104,7 @@ fn grown(step: u64, matrices: &[WeightMatrix]) -> f64 {
     if matrices.is_empty() { 1.0 } else { ((step + 1) as f64 / RAMP as f64).min(1.0) }
 }
 
-/// What a linear problem has found.
+/// Result of a linear problem.
 struct Solution<'a> {
     /// Between the nodes, and between the knots.
     field: Changing<f32>,

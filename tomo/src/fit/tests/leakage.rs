@@ -62,7 +62,7 @@ fn exact_gradients_with_respect_to_emission() {
     }
 }
 
-/// What contradicts polarised visibilities and leakage is refused by name.
+/// Settings that contradict polarised visibilities and leakage are refused by name.
 #[test]
 fn exact_refusals() {
     let refused = |set: &[&str], without_field: bool| {

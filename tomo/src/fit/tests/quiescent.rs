@@ -1,4 +1,4 @@
-//! What does not move beside a field that is learnt.
+//! Emission that does not move beside a field that is learnt.
 
 use super::training::settings;
 use super::*;

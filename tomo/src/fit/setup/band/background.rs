@@ -1,4 +1,4 @@
-//! What the source emits beside a flare in a band: settings, and what is expected of it.
+//! Background of a flare in a band: settings, and its expected value.
 
 use super::{BandGeometry, turn};
 use crate::fit::FluxDatum;
@@ -45,7 +45,7 @@ pub(super) fn backgrounds(settings: &BandSettings) -> Vec<Background> {
     all
 }
 
-/// What the background is expected to be in a geometry and its standard deviation, Jy, as the data have it.
+/// Returns the expected background in a geometry and its standard deviation, Jy, as the data have it.
 pub(super) fn expected(
     rows: &CurveRows,
     curve: &Curve,
