@@ -38,7 +38,7 @@ impl<T> core::fmt::Debug for Store<T> {
 }
 
 impl<T: Float> Frames<T> {
-    /// Of pixels in memory, image after image.
+    /// Takes pixels in memory, image after image.
     ///
     /// # Panics
     /// If they are not whole images.
@@ -48,8 +48,8 @@ impl<T: Float> Frames<T> {
         Self { pixels, count, store: Store::Memory(Arc::new(values)) }
     }
 
-    /// Of images that `make` hands over one after the other, in memory where they are a small part of what may be taken
-    /// ([`memory::part`]), otherwise in a file.
+    /// Takes images that `make` hands over one after the other, in memory where they are a small part of what may be
+    /// taken ([`memory::part`]), otherwise in a file.
     ///
     /// # Errors
     /// Those of `make`; if there is no memory and no file for them.
@@ -85,7 +85,7 @@ impl<T: Float> Frames<T> {
         Ok(Self { pixels, count, store: Store::File(Arc::new(Mutex::new(file))) })
     }
 
-    /// How many images.
+    /// Returns the number of images.
     pub fn count(&self) -> usize {
         self.count
     }

@@ -1,5 +1,5 @@
-//! How much memory may be taken. What a number of a user or of a file's header decides is estimated before it is
-//! allocated: nothing is begun that cannot end.
+//! Limits on memory. What a number of a user or of a file's header decides is estimated before it is allocated: nothing is
+//! begun that cannot end.
 
 use crate::Error;
 use std::cell::Cell;
@@ -37,7 +37,7 @@ pub fn set_limit_of_thread(bytes: u64) {
     OF_THREAD.set(Some(bytes));
 }
 
-/// How many bytes may be taken.
+/// Returns the number of bytes that may be taken.
 pub fn limit() -> u64 {
     OF_THREAD.get().unwrap_or_else(|| LIMIT.load(Ordering::Relaxed))
 }

@@ -1,4 +1,4 @@
-//! Between units of the hole (G = c = M = 1) and those of the sky.
+//! Conversions between units of the hole (G = c = M = 1) and those of the sky.
 
 /// GM☉/c³ in seconds (IAU 2015 nominal solar mass parameter, 1.3271244e20 m³ s⁻²).
 pub const SOLAR_MASS_SECONDS: f64 =

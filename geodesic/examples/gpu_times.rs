@@ -1,5 +1,5 @@
-//! How fast a graphics device traces, by its own clock: rays with crossings and samples, and pictures of a disc in front of
-//! a sky by the shader of the example `gpu_disc`.
+//! Speed of a graphics device, by its own clock: rays with crossings and samples, and pictures of a disc in front of a sky
+//! by the shader of the example `gpu_disc`.
 //!
 //! `cargo run --release -p kerrlight-geodesic --features wgpu --example gpu_times -- [DEVICE]`
 

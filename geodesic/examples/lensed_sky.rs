@@ -1,5 +1,5 @@
-//! How a pixel's beam spreads: its footprint on the sky behind a hole, from a camera nearby.
-//! Between images of the sky, where the footprint grows, textures need filtering.
+//! Footprint of a pixel's beam on the sky behind a hole, from a camera nearby. Between images of
+//! the sky, where the footprint grows, textures need filtering.
 //!
 //! `cargo run --release -p kerrlight-geodesic --example lensed_sky`
 

@@ -26,7 +26,7 @@ pub struct Error {
 }
 
 impl Error {
-    /// That `field` cannot be `value`, with the allowed range in words. A
+    /// States that `field` cannot be `value`, with the allowed range in words. A
     /// [`RayVisitor`](crate::RayVisitor) reports its own refusals with it.
     pub const fn out_of_range(field: &'static str, value: f64, allowed: &'static str) -> Self {
         Self { field, value, allowed }

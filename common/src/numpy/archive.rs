@@ -103,7 +103,7 @@ pub fn write_archive<'n>(arrays: impl IntoIterator<Item = (&'n str, Vec<u8>)>) -
 pub struct ArchiveWriter<W: Write + Seek>(zip::ZipWriter<W>);
 
 impl<W: Write + Seek> ArchiveWriter<W> {
-    /// Into this file.
+    /// Writes into this file.
     pub fn new(out: W) -> Self {
         Self(zip::ZipWriter::new(out))
     }

@@ -7,7 +7,7 @@ mod array;
 pub use archive::{Archive, ArchiveWriter, write_archive};
 pub use array::{Headed, Stream, open, read_array, write_array};
 
-/// Why bytes are not the arrays that are expected.
+/// Reason why bytes are not the arrays that are expected.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NumpyError {
@@ -30,7 +30,7 @@ impl NumpyError {
         NumpyError::Content(message.into())
     }
 
-    /// With the member of an archive that it is about.
+    /// Adds the member of an archive to an error.
     pub fn member(
         member: impl Into<String>,
         error: impl core::error::Error + Send + Sync + 'static,

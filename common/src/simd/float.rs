@@ -19,7 +19,7 @@ pub trait Float:
 {
     /// The nearest number of this kind.
     fn of(x: f64) -> Self;
-    /// As double precision.
+    /// Converts to double precision.
     fn double(self) -> f64;
 }
 
@@ -65,7 +65,7 @@ pub trait Coefficients: Sized + 'static {
     const TWO_OVER_PI: Self;
     /// 1/ln 2.
     const LOG2_E: Self;
-    /// Beyond this the standard library takes the sine.
+    /// Argument beyond which the standard library takes the sine.
     const FAR: Self;
     /// Largest |x| of eˣ; beyond it is held.
     const HELD: Self;

@@ -261,7 +261,7 @@ struct Entries<'a> {
 }
 
 impl<'a> Entries<'a> {
-    /// In the order of the text, so that the first error is the first that a reader meets.
+    /// Takes entries in the order of the text, so that the first error is the first that a reader meets.
     fn new(table: &'a DeTable<'a>) -> Self {
         let mut entries: Vec<Entry<'a>> = table.iter().collect();
         entries.sort_by_key(|(key, _)| key.span().start);

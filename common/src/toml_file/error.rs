@@ -4,7 +4,7 @@ use serde::de;
 use std::fmt::Display;
 use std::ops::Range;
 
-/// Why a TOML text is not what was to be read.
+/// Reason why a TOML text cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReadError {
     message: String,

@@ -434,7 +434,7 @@ mod tests {
         /// Rigid.
         Rigid,
         Power {
-            /// Where the rate is.
+            /// Radius of the rate.
             #[schemars(range(max = 5.0))]
             radius: f64,
         },

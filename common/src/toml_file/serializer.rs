@@ -12,7 +12,7 @@ use toml_edit::{Array, ArrayOfTables, Item, Table, Value};
 /// A value in TOML; nothing for `None`.
 type Written = Result<Option<Item>, ReadError>;
 
-/// Where a value is written.
+/// A document into which a value is written.
 pub(super) struct Document;
 
 /// A table that grows, and the variant whose values it holds.

@@ -27,7 +27,7 @@ pub struct ClosedForm {
     total: f64,
 }
 
-/// Where a ray crosses the equatorial plane.
+/// A crossing of the equatorial plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
     /// Mino time since the observer, in 1/M.
@@ -239,7 +239,7 @@ impl Roots {
         }
     }
 
-    /// From the root e that is not one of the close pair −e/2 ± √split.
+    /// Starts from the root e that is not one of the close pair −e/2 ± √split.
     fn from_isolated(e: f64, split: f64) -> Self {
         if split < 0.0 {
             let h = (2.25 * e * e - split).sqrt();

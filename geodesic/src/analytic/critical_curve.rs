@@ -228,7 +228,7 @@ impl Family {
     }
 }
 
-/// Where ρ is the better parameter.
+/// Returns whether ρ is the better parameter.
 fn is_slow(spin: f64) -> bool {
     spin.abs() < 0.5
 }

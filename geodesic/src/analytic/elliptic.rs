@@ -8,7 +8,7 @@
 
 use core::f64::consts::FRAC_PI_2;
 
-/// Where a quadratically convergent iteration may stop: √ε.
+/// Difference at which a quadratically convergent iteration may stop: √ε.
 const HALF_PRECISION: f64 = 1e-8;
 
 /// The arithmetic-geometric mean of two numbers ≥ 0 (0 if one of them is).
@@ -82,7 +82,7 @@ pub(crate) fn rf_pair(mut x: f64, mut y: f64, mut v: f64) -> f64 {
     }
 }
 
-/// Up to where the series of R_F about equal arguments is used: its error is the sixth power.
+/// Largest difference for the series of R_F about equal arguments: its error is the sixth power.
 const SERIES: f64 = 2e-3;
 
 fn rf_series(e2: f64, e3: f64) -> f64 {

@@ -31,7 +31,7 @@ pub(crate) fn find_root(mut a: f64, mut b: f64, f: impl Fn(f64) -> f64) -> f64 {
     if fa.abs() < fb.abs() { a } else { b }
 }
 
-/// Where between a (0) and b (1) to look next.
+/// Returns the next place between a (0) and b (1).
 fn next_fraction([a, b, c]: [f64; 3], [fa, fb, fc]: [f64; 3]) -> f64 {
     let xi = (a - b) / (c - b);
     let phi = (fa - fb) / (fc - fb);

@@ -22,7 +22,7 @@ pub struct CameraPlace {
     pub inclination_degrees: f64,
     /// Azimuth, radians.
     pub azimuth: f64,
-    /// To the right, radians.
+    /// Turn to the right, radians.
     pub yaw: f64,
     /// Upwards, radians.
     pub pitch: f64,

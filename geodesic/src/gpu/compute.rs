@@ -188,8 +188,8 @@ impl Compute {
         unsafe { self.compiled(source, entries, checks) }
     }
 
-    /// Like [`kernels`](Self::kernels), without the checks of indices and the counter in each loop by which one that does
-    /// not end is ended: a network's kernels then take a quarter less time.
+    /// Makes kernels like [`kernels`](Self::kernels), without the checks of indices and the counter in each loop by which
+    /// one that does not end is ended: a network's kernels then take a quarter less time.
     ///
     /// # Safety
     /// All indices have to be within their arrays, and all loops of the shader have to end.
@@ -277,7 +277,7 @@ impl Compute {
         Ok(())
     }
 
-    /// From now on what kernels take is measured by the device's clock, up to [`times`](Self::times). Each
+    /// Starts to measure the times of kernels by the device's clock, up to [`times`](Self::times). Each
     /// [`run`](Self::run) then waits until it is done.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// Why a graphics card does not do what it is asked for.
+/// Failure of a graphics device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum GpuError {

@@ -1,4 +1,4 @@
-//! How long kernels take, by the clock of the device.
+//! Times of kernels, by the clock of the device.
 
 use super::device::{Device, Mapped};
 use super::error::GpuError;
@@ -71,7 +71,7 @@ impl Stopwatch {
         encoder.begin_compute_pass(&descriptor)
     }
 
-    /// Behind the last kernel.
+    /// Marks the end, behind the last kernel.
     pub fn end(&self, encoder: &mut wgpu::CommandEncoder) {
         let readings = 2 * self.entries.len() as u32;
         if readings > 0 {

@@ -344,7 +344,7 @@ impl AffinePath {
         }
     }
 
-    /// Where the radius takes a value between two Mino times of one leg: bisection.
+    /// Returns the time at which the radius takes a value between two Mino times of one leg: bisection.
     fn time_at(&self, target: f64, [mut lo, mut hi]: [f64; 2]) -> f64 {
         let rising = self.at(hi).radius() > self.at(lo).radius();
         for _ in 0..100 {

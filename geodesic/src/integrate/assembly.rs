@@ -18,7 +18,7 @@ const TERMS: usize = 11;
 /// is a constant of the ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TaylorStep {
-    /// For how much of bτ the series are used, above 0.
+    /// Length in bτ, from 0, on which the series are used.
     pub length: f64,
     /// +1 on a step that starts inwards, −1 on one that starts outwards.
     pub leg: f64,

@@ -201,7 +201,8 @@ impl<T: Scalar> System<T> {
         f
     }
 
-    /// How many roundings the denominator g is blurred by: its largest term over itself.
+    /// Returns the number of roundings by which the denominator g is blurred: its largest term over
+    /// itself.
     #[inline(always)]
     pub fn blur<const N: usize>(&self, y: &[T; N], leg: T) -> T {
         let (w, dw) = (y[index::W], y[index::DW]);

@@ -14,7 +14,7 @@ pub enum Outcome {
     Unresolved(Unresolved),
 }
 
-/// Why a ray was given up.
+/// Reason for giving a ray up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unresolved {
     /// It lies on the critical curve within rounding and circles on a photon orbit.

@@ -22,13 +22,12 @@ pub(crate) struct Run<'a, T, M, const N: usize> {
     energy: f64,
 }
 
-/// How much smaller than their estimates the truncation errors of cos θ are: its motion is nearly
-/// harmonic, for which every method is better than for the radial motion. Measured
-/// (docs/measurements/geodesics.md of the repository).
+/// Ratio of the truncation errors of cos θ to their estimates: its motion is nearly harmonic, for which every method
+/// is better than for the radial motion. Measured (docs/measurements/geodesics.md of the repository).
 const HARMONIC: f64 = 0.3;
 
 impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
-    /// At the start of `ray`; the steps go into `path`.
+    /// Stands at the start of `ray`; the steps go into `path`.
     pub fn new(
         hole: &Kerr<T>,
         ray: &'a Ray<T>,
@@ -58,7 +57,7 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         }
     }
 
-    /// To the end, or until the ray is given up after `max_steps` steps.
+    /// Follows the ray to its end, or until it is given up after `max_steps` steps.
     pub fn go(mut self, max_steps: u32) {
         if self.state.ray.check_hole(&self.path.hole).is_err() {
             self.path.outcome = Outcome::Unresolved(Unresolved::OtherHole);
@@ -246,7 +245,7 @@ impl<'a, T: Elementary, M: Stepper<T, N>, const N: usize> Run<'a, T, M, N> {
         false
     }
 
-    /// Where and how the ray ends in segment `k`, if it does.
+    /// Returns where and how the ray ends in segment `k`, if it does.
     fn end_of_ray(&self, k: usize) -> Option<(T, Outcome)> {
         let radial = self.path.polynomial(k, 0);
         let (w, rate) = (self.state.y[index::W], self.state.y[index::DW].value());
@@ -341,7 +340,7 @@ pub(crate) fn start_angle<T: Elementary>(ray: &Ray<T>) -> T {
     y.atan2(x)
 }
 
-/// On which side of the equatorial plane a ray is, or is about to be.
+/// Returns the side of the equatorial plane on which a ray is, or is about to be.
 fn side<T: Elementary, const N: usize>(y: &[T; N]) -> bool {
     let (u, rate) = (y[index::U].value(), y[index::DU].value());
     if u == 0.0 { rate > 0.0 } else { u > 0.0 }

@@ -20,7 +20,7 @@ pub(crate) struct Tableau<const S: usize> {
 /// A method whose coefficients the compiler knows, so that the loops over its stages unroll.
 pub(crate) trait Method<const S: usize> {
     const TABLEAU: Tableau<S>;
-    /// How much larger the true local error may be than h times the estimate of it: measured
+    /// Largest ratio of the true local error to h times its estimate: measured
     /// (docs/measurements/geodesics.md of the repository).
     const CAUTION: f64;
 }

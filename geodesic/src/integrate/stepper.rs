@@ -1,4 +1,4 @@
-//! How one step is made: by the stages of a Runge–Kutta method, or by a Taylor series.
+//! Steps: by the stages of a Runge–Kutta method, or by a Taylor series.
 
 use crate::integrate::mino::{System, has_azimuth, has_time, index};
 use crate::integrate::runge_kutta::{Control, Method, step};
@@ -11,7 +11,7 @@ use crate::screen::observer::Ray;
 /// (at least 1.8), so that a step holds at most one crossing of the equator.
 pub(crate) const LONGEST_STEP: f64 = 0.8;
 
-/// Where a ray is, and what its equations are.
+/// State of a ray, and its equations.
 pub(crate) struct State<'a, T, const N: usize> {
     pub ray: &'a Ray<T>,
     pub system: System<T>,
@@ -48,13 +48,13 @@ pub(crate) trait Stepper<T, const N: usize> {
         out: &mut Vec<T>,
     );
 
-    /// To be called when the state starts, or changes otherwise than by a step.
+    /// Restarts the stepper when the state starts, or changes otherwise than by a step.
     fn restart(&mut self, state: &State<'_, T, N>, series: &mut Series<T>);
 }
 
 impl<T: Elementary, const N: usize> State<'_, T, N> {
-    /// How large the error of every variable may be in a step of length `h` to `end`, where
-    /// the slopes of azimuth and time are `slope`.
+    /// Returns the largest allowed error of every variable in a step of length `h` to `end`, where the
+    /// slopes of azimuth and time are `slope`.
     pub fn allowed(&self, end: &[T; N], slope: [f64; 2], h: f64) -> [f64; N] {
         let rounding = 4.0 * T::EPSILON;
         let mut allowed = [self.tolerance.max(rounding); N];
@@ -243,8 +243,8 @@ impl Taylor {
     }
 }
 
-/// How much larger the rest of a series may be than its first term: measured (docs/measurements/geodesics.md
-/// of the repository).
+/// Largest ratio of the rest of a series to its first term: measured (docs/measurements/geodesics.md of the
+/// repository).
 const CAUTION: f64 = 3.0;
 
 impl Taylor {
@@ -278,7 +278,7 @@ impl Taylor {
     }
 }
 
-/// Which variable each row of the series is.
+/// Returns the variable of each row of the series.
 fn variables<const N: usize>() -> impl Iterator<Item = (usize, usize)> {
     let azimuth = [(2, index::X), (3, index::Y), (4, index::AZIMUTH)];
     let time = (rows(N) - 1, N - 1);

@@ -1,4 +1,4 @@
-//! From a ray's initial data to its path.
+//! Tracing: from a ray's initial data to its path.
 
 use crate::error::{Error, check};
 use crate::integrate::path::Path;
@@ -10,7 +10,7 @@ use crate::screen::observer::Ray;
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::quantities::Quantities;
 
-/// How a ray is followed in Mino time.
+/// Method by which a ray is followed in Mino time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub enum Method {
     /// The adaptive Runge–Kutta method of order 5(4) of Dormand & Prince (1980), with quintic

@@ -17,13 +17,13 @@ use core::f64::consts::SQRT_2;
 /// usually a few times larger (docs/measurements/geodesics.md of the repository has the figures).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Uncertainty {
-    /// Of the radius, relative.
+    /// Error of the radius, relative.
     pub radius: f64,
-    /// Of the polar angle θ, in radians.
+    /// Error of the polar angle θ, in radians.
     pub theta: f64,
-    /// Of the azimuth, in radians.
+    /// Error of the azimuth, in radians.
     pub azimuth: f64,
-    /// Of the delay, in units of M.
+    /// Error of the delay, in units of M.
     pub delay: f64,
 }
 
@@ -190,14 +190,14 @@ impl Budget {
     }
 }
 
-/// By how much more r may be off than 1/r, whose estimated error is `relative`: once several times that may
-/// reach 1/r itself, nothing is known about r. Below a thousandth it makes no difference.
+/// Returns the ratio of the relative error of r to that of 1/r, whose estimate is `relative`: once several
+/// times that may reach 1/r itself, nothing is known about r. Below a thousandth it makes no difference.
 fn stretch(relative: f64) -> f64 {
     const SEVERAL: f64 = 8.0;
     if relative < 1e-3 { 1.0 } else { 1.0 / (1.0 - SEVERAL * relative).max(f64::EPSILON) }
 }
 
-/// How fast a ray moves at a point, per Mino time.
+/// Rates of a ray at a point, per Mino time.
 struct Rates {
     /// |dw/dτ|.
     w: f64,

@@ -39,10 +39,9 @@ fn orbit(hole: &Kerr, r: f64) -> Option<(f64, f64)> {
 /// g of matter that moves rigidly at constant r with angular velocity vector `omega`
 /// (Cartesian, radians per M of coordinate time): dn/dt = ω × n.
 ///
-/// With v = ω × n, the norm of u = uᵗ(1, 0, v) is
-/// g_tt + 2g_tφ φ̇ + M|v|² − a²(Σ + 2r)/Σ · v_z², M = \[(r² + a²)² − a²Δ sin²θ\]/Σ, free of
-/// coordinate poles, and k·u = −uᵗ(1 + n'·v) with n' of the backward ray. `None` where
-/// such a motion is not slower than light, and outside of which no matter can be.
+/// Returns the redshift of rotating matter. With v = ω × n, the norm of u = uᵗ(1, 0, v) is g_tt + 2g_tφ φ̇ + M|v|² −
+/// a²(Σ + 2r)/Σ · v_z², M = \[(r² + a²)² − a²Δ sin²θ\]/Σ, free of coordinate poles, and k·u = −uᵗ(1 + n'·v) with n' of
+/// the backward ray. `None` where such a motion is not slower than light, and outside of which no matter can be.
 ///
 /// The point must have been traced with its azimuth.
 pub fn rotating_redshift(hole: &Kerr, point: &PathPoint, omega: [f64; 3]) -> Option<f64> {
@@ -135,7 +134,7 @@ mod tests {
         }
     }
 
-    /// In the equatorial plane both formulas must agree; off the poles' singularities too.
+    /// Both formulas agree in the equatorial plane; off the poles' singularities too.
     #[test]
     fn exact_rotating_matter_agrees_with_the_keplerian_formula() {
         for a in [-0.9, 0.0, 0.5, 0.94] {

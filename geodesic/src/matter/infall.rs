@@ -21,7 +21,7 @@ use crate::numbers::scalar::Elementary;
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::orbits;
 
-/// Where a flow of the family lies between circles and free fall.
+/// Mixture of circular motion and free fall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mixture<T = f64> {
     /// ξ: specific angular momentum over that of circular geodesics; 1, Keplerian.
@@ -68,7 +68,7 @@ impl<T: Elementary> Infall<T> {
         Ok(Infall { hole: *hole, mixture, isco, plunge })
     }
 
-    /// Where the circular part begins to plunge: the innermost stable circular orbit, in M.
+    /// Returns the radius where the circular part begins to plunge: the innermost stable circular orbit, in M.
     pub fn isco(&self) -> T {
         self.isco
     }

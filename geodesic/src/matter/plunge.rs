@@ -34,7 +34,7 @@ impl Plunge {
         self.angular_momentum
     }
 
-    /// Where the flow starts: the innermost stable orbit, in M.
+    /// Returns the radius where the flow starts: the innermost stable orbit, in M.
     pub fn isco(&self) -> f64 {
         self.isco
     }

@@ -31,7 +31,7 @@ pub trait Elementary: Scalar + PartialEq + core::fmt::Debug + Send + Sync {
     /// The same number with twice the digits.
     type Wide: Elementary;
 
-    /// As a number with twice the digits.
+    /// Widens to a number with twice the digits.
     fn widen(self) -> Self::Wide;
 
     /// The number nearest to a wider one.

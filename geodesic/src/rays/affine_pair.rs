@@ -32,7 +32,7 @@ impl AffinePair {
     }
 }
 
-/// How far two positions are from each other.
+/// Returns the distance between two positions.
 fn difference(a: &PathPoint, b: &PathPoint, observer: f64) -> Uncertainty {
     let turn = (a.azimuth - b.azimuth).rem_euclid(core::f64::consts::TAU);
     // Coordinates are rounded where they are largest, at the observer.
@@ -45,9 +45,8 @@ fn difference(a: &PathPoint, b: &PathPoint, observer: f64) -> Uncertainty {
     }
 }
 
-/// How much larger the error may be than the difference from a run at ten times the tolerance,
-/// whose own error has the same sign or vanishes by chance: measured (docs/measurements/geodesics.md of the
-/// repository).
+/// Largest ratio of the error to the difference from a run at ten times the tolerance, whose own error has
+/// the same sign or vanishes by chance: measured (docs/measurements/geodesics.md of the repository).
 const AFFINE_CAUTION: f64 = 3.0;
 
 impl AffinePair {
@@ -83,7 +82,7 @@ impl AffinePair {
         error
     }
 
-    /// By how much an error of θ moves a crossing.
+    /// Returns the Mino time by which an error of θ moves a crossing.
     fn early(&self, theta: f64, mino_time: f64) -> f64 {
         let step = 1e-4 * self.fine.mino_total();
         let [before, after] = [-step, step].map(|step| self.fine.at(mino_time + step).theta());

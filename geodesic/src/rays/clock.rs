@@ -35,7 +35,7 @@ impl Clock {
         Clock { spin: hole.spin(), lambda: ray.lambda, b: ray.angular.max(1.0).sqrt(), start }
     }
 
-    /// By quadrature with steps of bτ `step`: of order ten.
+    /// Returns the error of a quadrature with steps of bτ `step`: of order ten.
     pub fn quadrature(&self, step: f64) -> f64 {
         QUADRATURE * self.b * (step / MAX_STEP).powi(10)
     }
@@ -49,8 +49,8 @@ impl Clock {
         self.b * inner.max(rest) / steps
     }
 
-    /// At worst of samples a `step` of Mino time apart, whose positions have this error; without
-    /// those at the horizon, where the delay has no limit.
+    /// Returns the worst error of samples a `step` of Mino time apart, whose positions have this
+    /// error; without those at the horizon, where the delay has no limit.
     pub fn worst(&self, hole: &Kerr, [radii, delays]: [&[f64]; 2], step: f64, error: f64) -> f64 {
         let horizon = hole.horizon() * (1.0 + 2e-8);
         let fine = (self.b * step / MAX_STEP).ceil().max(1.0);
@@ -60,18 +60,18 @@ impl Clock {
         each.fold(0.0, f64::max) + quadrature
     }
 
-    /// By rounding, at radius `r`.
+    /// Returns the rounding error at radius `r`.
     pub fn rounding(&self, delay: f64, r: f64) -> f64 {
         16.0 * f64::EPSILON * (delay.abs() + r + self.start + self.b)
     }
 
-    /// By how much faster the azimuth grows at radius `r` than bτ: frame dragging.
+    /// Returns the excess of the azimuth's rate at radius `r` over that of bτ: frame dragging.
     pub fn dragging(&self, r: f64) -> f64 {
         let (a, delta) = (self.spin, (r * (r - 2.0) + self.spin * self.spin).max(f64::EPSILON));
         1.0 + (a * ((r * r + a * (a - self.lambda)) / delta - 1.0)).abs() / self.b
     }
 
-    /// By how much the delay moves with a relative error of the radius: r dt/dr.
+    /// Returns the change of the delay with a relative error of the radius: r dt/dr.
     pub fn reach(&self, r: f64) -> f64 {
         let a2 = self.spin * self.spin;
         r * (r * r + a2) / (r * (r - 2.0) + a2).max(f64::EPSILON)

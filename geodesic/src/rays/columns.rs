@@ -11,7 +11,7 @@ use crate::spacetime::point::PathPoint;
 /// Points of many rays in columns, ray after ray. Columns that were not requested are empty.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Points {
-    /// Where each ray's points end; the first ray's start at 0.
+    /// Ends of each ray's points; the first ray's start at 0.
     ends: Vec<usize>,
     /// Mino time since the observer in M⁻¹, growing backward in time.
     pub mino_time: Vec<f64>,
@@ -39,7 +39,7 @@ impl Points {
         start..end(ray)
     }
 
-    /// Where each ray's points end in the columns; those of the first ray start at 0.
+    /// Returns the ends of each ray's points in the columns; those of the first ray start at 0.
     pub fn ends(&self) -> &[usize] {
         &self.ends
     }
@@ -110,7 +110,7 @@ impl Points {
         self.weight.extend(other.weight);
     }
 
-    /// How many points `pieces` have in all.
+    /// Returns the number of points that `pieces` have in all.
     fn count<'a>(pieces: impl Iterator<Item = &'a Self>) -> usize {
         pieces.map(|points| points.radius.len()).sum()
     }
@@ -150,7 +150,7 @@ pub struct RayTable {
     pub mino_total: Vec<f64>,
     /// Smallest radius in M of each ray that turns; NaN of others.
     pub turning_radius: Vec<f64>,
-    /// How many times each ray crosses the equatorial plane.
+    /// Number of times each ray crosses the equatorial plane.
     pub crossing_count: Vec<u32>,
     /// Unit vector of the direction in which each ray escapes, NaN of those that do not: of
     /// [`Integrator::trace_view`](crate::Integrator::trace_view) alone.
@@ -159,8 +159,8 @@ pub struct RayTable {
     pub crossings: Points,
     /// The samples.
     pub samples: Points,
-    /// For each ray the largest estimated errors of its crossings and samples, if requested; a
-    /// sample at the horizon itself, where azimuth and delay have no limit, does not count.
+    /// Largest estimated errors of each ray's crossings and samples, if requested; a sample at the horizon itself,
+    /// where azimuth and delay have no limit, does not count.
     pub uncertainty: Vec<Uncertainty>,
 }
 

@@ -66,7 +66,8 @@ impl Gradient {
     const NONE: Gradient =
         Gradient { spin: f64::NAN, inclination: f64::NAN, alpha: f64::NAN, beta: f64::NAN };
 
-    /// In the order spin, inclination, α, β: the unit of the quantity per 1, per radian, per M and per M.
+    /// Returns the derivatives in the order spin, inclination, α, β: the unit of the quantity per 1, per
+    /// radian, per M and per M.
     pub fn to_array(self) -> [f64; 4] {
         [self.spin, self.inclination, self.alpha, self.beta]
     }
@@ -86,7 +87,7 @@ impl Gradient {
     }
 }
 
-/// How the coordinates of a point change along its ray, per Mino time (which grows backward).
+/// Rates of the coordinates of a point along its ray, per Mino time (which grows backward).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Rate {
     /// dr/dτ, in M².
@@ -104,19 +105,19 @@ pub struct Rate {
 /// where azimuth and delay diverge, their derivatives are NaN.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Gradients {
-    /// Of the Mino time.
+    /// Gradient of the Mino time.
     pub mino_time: Vec<Gradient>,
-    /// Of the radius.
+    /// Gradient of the radius.
     pub radius: Vec<Gradient>,
-    /// Of the polar angle (0 on the axis itself, where it has none).
+    /// Gradient of the polar angle (0 on the axis itself, where it has none).
     pub theta: Vec<Gradient>,
-    /// Of the azimuth.
+    /// Gradient of the azimuth.
     pub azimuth: Vec<Gradient>,
-    /// Of the delay.
+    /// Gradient of the delay.
     pub delay: Vec<Gradient>,
-    /// Of the path weight.
+    /// Gradient of the path weight.
     pub weight: Vec<Gradient>,
-    /// Of the covariant momentum (p_t, p_r, p_θ, p_φ).
+    /// Gradient of the covariant momentum (p_t, p_r, p_θ, p_φ).
     pub momentum: Vec<[Gradient; 4]>,
     /// Rates of change along the ray: those of azimuth and delay wherever they are requested,
     /// else 0.
@@ -126,13 +127,13 @@ pub struct Gradients {
 /// Derivatives of the position of a point that stays at its Mino time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Fixed {
-    /// Of the radius.
+    /// Gradient of the radius.
     pub radius: Gradient,
-    /// Of the polar angle.
+    /// Gradient of the polar angle.
     pub theta: Gradient,
-    /// Of the azimuth; 0 unless requested.
+    /// Gradient of the azimuth; 0 unless requested.
     pub azimuth: Gradient,
-    /// Of the delay; 0 unless requested.
+    /// Gradient of the delay; 0 unless requested.
     pub delay: Gradient,
 }
 
@@ -206,13 +207,13 @@ fn values(point: &Point) -> PathPoint {
 pub struct Differentiated {
     /// The rays themselves, as from [`Integrator::TaylorMino`](crate::Integrator::TaylorMino).
     pub values: RayTable,
-    /// Of [`RayTable::mino_total`]; NaN where unresolved.
+    /// Gradient of [`RayTable::mino_total`]; NaN where unresolved.
     pub mino_total: Vec<Gradient>,
-    /// Of [`RayTable::turning_radius`]; NaN where the ray does not turn.
+    /// Gradient of [`RayTable::turning_radius`]; NaN where the ray does not turn.
     pub turning_radius: Vec<Gradient>,
-    /// Of the points of [`RayTable::crossings`].
+    /// Gradients of the points of [`RayTable::crossings`].
     pub crossings: Gradients,
-    /// Of the points of [`RayTable::samples`].
+    /// Gradients of the points of [`RayTable::samples`].
     pub samples: Gradients,
 }
 

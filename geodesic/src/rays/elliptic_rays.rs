@@ -168,7 +168,7 @@ impl Collector<'_> {
     }
 }
 
-/// Where a ray turns; NaN if it does not.
+/// Returns the radius where a ray turns; NaN if it does not.
 fn turning_radius(photon: &Ray) -> f64 {
     photon.potential.outer_turning_point().map_or(f64::NAN, |w| 1.0 / w)
 }

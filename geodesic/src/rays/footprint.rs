@@ -49,7 +49,8 @@ pub struct Ellipse {
 }
 
 impl Ellipse {
-    /// Of the linear map with these columns (images of the two unit vectors of the screen).
+    /// Returns the footprint of the linear map with these columns (images of the two unit vectors
+    /// of the screen).
     pub fn of_map(columns: [[f64; 2]; 2]) -> Self {
         // Closed form of the singular values of a 2 × 2 matrix: half sum and half difference of
         // the lengths of its conformal and its mirroring part, free of cancellation.
@@ -70,7 +71,7 @@ fn half_turn(angle: f64) -> f64 {
     if angle > FRAC_PI_2 { angle - PI } else { angle }
 }
 
-/// Where an escaping ray comes from on the sky at infinity, and how that changes with the screen.
+/// Direction on the sky at infinity of an escaping ray, and how that changes with the screen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sky {
     /// Unit vector towards the source, n = (sin θ cos φ, sin θ sin φ, cos θ).
@@ -124,7 +125,7 @@ impl Sky {
     }
 }
 
-/// Where a ray meets the equatorial plane, and how that changes with the screen.
+/// Point where a ray meets the equatorial plane, and how that changes with the screen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disc {
     /// Boyer–Lindquist radius, in M.
@@ -162,7 +163,7 @@ impl Disc {
 pub struct Beams {
     /// Outcome of each ray.
     pub outcome: Vec<Outcome>,
-    /// Where each ray ends on the sky, if it does.
+    /// End of each ray on the sky, if there is one.
     pub sky: Vec<Option<Sky>>,
     /// The first equatorial crossings of all rays, ray after ray: see [`of`](Self::of).
     pub crossings: Vec<Disc>,
@@ -210,9 +211,9 @@ fn disc(point: &PathPoint<Number>) -> Disc {
     }
 }
 
-/// Where one ray ends on the sky, and how that changes with the two parameters of its dual numbers
-/// (see [`Observer::ray`] and [`Camera::ray`]); `None` if it does not escape. `path` is memory that
-/// is reused from ray to ray.
+/// Returns the end of one ray on the sky, and how that changes with the two parameters of its dual
+/// numbers (see [`Observer::ray`] and [`Camera::ray`]); `None` if it does not escape. `path` is
+/// memory that is reused from ray to ray.
 ///
 /// # Errors
 /// If `tolerance` is not in \[1e-14, 1e-2\].

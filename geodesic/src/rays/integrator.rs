@@ -2,7 +2,7 @@
 
 use crate::integrate::trace::Method;
 
-/// How rays are traced.
+/// Method by which rays are traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 #[non_exhaustive]
 pub enum Integrator {

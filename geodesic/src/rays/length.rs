@@ -7,10 +7,10 @@ use crate::numbers::scalar::Elementary;
 pub(crate) const NODES: usize = 16;
 /// Relative size that the last terms of a part's series may have; those left out are smaller still.
 const SMALL: f64 = 1e-10;
-/// Below this size of the last terms, halves that are not smoother than the whole show noise of the density, which
+/// Size of the last terms below which halves that are not smoother than the whole show noise of the density, which
 /// no halving removes.
 const NOISY: f64 = 1e-3;
-/// How often a part is halved at most: from a light year to a hole of a stellar mass.
+/// Largest number of halvings of a part: from a light year to a hole of a stellar mass.
 const HALVINGS: i32 = 48;
 
 /// The length along a piece of a ray: on each part the Legendre series through the density at the
@@ -25,7 +25,7 @@ pub(crate) struct Length<T> {
 }
 
 struct Part<T> {
-    /// Where it starts and how much of the piece it is, in shares of the Mino time.
+    /// Start and share of the piece, in shares of the Mino time.
     from: f64,
     width: f64,
     /// Length from the start of the piece to its start.
@@ -48,7 +48,7 @@ impl Node {
 }
 
 impl<T: Elementary> Length<T> {
-    /// Of the piece from `start` to `end`, by the rule with [`NODES`] nodes.
+    /// Integrates the piece from `start` to `end`, by the rule with [`NODES`] nodes.
     pub fn new([start, end]: [T; 2], rule: &[(f64, f64)], density: impl Fn(T) -> T) -> Self {
         let zero = T::constant(0.0);
         let mut length = Length { start, whole: end - start, parts: Vec::new(), total: zero };

@@ -71,7 +71,7 @@ impl NodeState<Number> {
 /// A node, and how it moves.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DifferentiatedNode {
-    /// Where it is, as [`Nodes`] has it.
+    /// Position, as [`Nodes`] has it.
     pub value: NodeState<f64>,
     /// Its derivatives.
     pub gradient: NodeState<Gradient>,

@@ -176,7 +176,7 @@ impl NodeColumns {
 /// turning point, or at the horizon.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leg {
-    /// Where it starts and ends, in Mino time (M⁻¹) or another parameter of the ray.
+    /// Start and end, in Mino time (M⁻¹) or another parameter of the ray.
     pub ends: [f64; 2],
     /// True if it ends at the horizon: its last panel is followed at a pace that falls to zero.
     pub falls: bool,

@@ -1,4 +1,4 @@
-//! How far along a ray a point is.
+//! Path length: how far along a ray a point is.
 
 use super::length::{Length, NODES};
 use crate::integrate::path::Path;

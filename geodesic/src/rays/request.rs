@@ -3,27 +3,25 @@
 use crate::error::{Error, check};
 use crate::spacetime::quantities::Quantities;
 
-/// Where a ray is sampled, from the observer on.
+/// Placement of samples on a ray, from the observer on.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub enum Placement {
     /// Nowhere.
     #[default]
     None,
-    /// At this many points equidistant in Mino time, from the observer to the ray's end: the
-    /// horizon, or back at the observer's radius; infinity for an observer who is there and for a camera. Points at
-    /// infinity are left out.
+    /// This many points equidistant in Mino time, from the observer to the ray's end: the horizon, or back at the
+    /// observer's radius; infinity for an observer who is there and for a camera. Points at infinity are left out.
     MinoTime(usize),
-    /// At the middles of this many pieces of equal length ∫Σ dτ (the affine parameter, for unit
-    /// energy) of the part inside a sphere.
+    /// Middles of this many pieces of equal length ∫Σ dτ (the affine parameter, for unit energy) of the part inside
+    /// a sphere.
     PathLength {
         /// Number of pieces.
         points: usize,
         /// Boyer–Lindquist radius of the sphere, in M.
         radius: f64,
     },
-    /// At the nodes of the Gauss–Legendre rule in Mino time on each of the one or two pieces of
-    /// the ray between two radii.
+    /// Nodes of the Gauss–Legendre rule in Mino time on each of the one or two pieces of the ray between two radii.
     GaussLegendre {
         /// Nodes on each piece.
         points: usize,
@@ -44,9 +42,9 @@ pub enum Placement {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Request {
-    /// How many equatorial crossings at most.
+    /// Largest number of equatorial crossings.
     pub crossings: usize,
-    /// Where else.
+    /// Placement of samples.
     pub samples: Placement,
     /// Azimuth.
     pub azimuth: bool,

@@ -1,5 +1,5 @@
-//! Where the points of a traced ray lie, whichever tracer traced it and whatever kind of
-//! number it is made of: with dual numbers every place carries its own derivatives.
+//! Points of a traced ray, whichever tracer traced it and whatever kind of number it is made of: with dual numbers
+//! every place carries its own derivatives.
 
 use crate::integrate::outcome::Outcome;
 use crate::integrate::uncertainty::Uncertainty;
@@ -21,7 +21,7 @@ pub(crate) trait Trajectory<T> {
     fn exit(&self) -> Option<[T; 3]>;
     fn at(&self, mino_time: T) -> PathPoint<T>;
     fn uncertainty(&self, mino_time: T) -> Uncertainty;
-    /// That of crossing number `k`, at `mino_time`.
+    /// Returns the error of crossing number `k`, at `mino_time`.
     fn uncertainty_at_crossing(&self, k: usize, mino_time: T) -> Uncertainty;
     /// The pieces with lo ≤ r ≤ hi.
     fn within(&self, lo: f64, hi: f64, pieces: &mut Vec<[T; 2]>);

@@ -8,11 +8,11 @@ use crate::spacetime::kerr::Kerr;
 use crate::spacetime::orbits;
 use crate::spacetime::radial::RadialPotential;
 
-/// How a local observer moves.
+/// Motion of a local observer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Motion {
-    /// At rest with respect to infinity; outside the ergosphere only.
+    /// Rest with respect to infinity; outside the ergosphere only.
     Static,
     /// Zero angular momentum (Bardeen 1970): carried along with the rotation of space.
     Zamo,

@@ -1,5 +1,5 @@
-//! Who looks: Bardeen's screen of an observer, and cameras with a place, a motion and a lens. Both
-//! turn a point of the picture into a ray's constants of motion and initial data.
+//! Observers: Bardeen's screen, and cameras with a place, a motion and a lens. Both turn a point of
+//! the picture into a ray's constants of motion and initial data.
 
 pub(crate) mod camera;
 pub(crate) mod observer;

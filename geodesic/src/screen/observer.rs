@@ -1,4 +1,4 @@
-//! Where the observer sits and which photon arrives at a point of the screen.
+//! Place of the observer, and the photon that arrives at a point of the screen.
 
 use crate::error::{Error, check};
 use crate::numbers::compensated::Double;
@@ -22,7 +22,7 @@ pub struct Inclination<T: Elementary = f64> {
 }
 
 impl Inclination {
-    /// From degrees in \[0, 180\]; 0°, 90° and 180° are exact.
+    /// Takes degrees in \[0, 180\]; 0°, 90° and 180° are exact.
     ///
     /// # Errors
     /// If `degrees` is outside the range.
@@ -73,8 +73,7 @@ impl Inclination {
 }
 
 impl<T: Elementary> Inclination<T> {
-    /// From radians in \[0, π\], taken at face value: the double nearest to π/2 is an
-    /// inclination 6e-17 short of the equator.
+    /// Takes radians in \[0, π\], at face value: the double nearest to π/2 is an inclination 6e-17 short of the equator.
     ///
     /// # Errors
     /// If `radians` is outside the range.

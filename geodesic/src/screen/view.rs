@@ -6,7 +6,7 @@ use crate::screen::camera::Camera;
 use crate::screen::observer::{Observer, Ray, check_hole};
 use crate::spacetime::kerr::Kerr;
 
-/// Where a picture is taken from: a distant observer's screen or a camera near the hole.
+/// Place from which a picture is taken: a distant observer's screen or a camera near the hole.
 ///
 /// Code that renders or traces takes a `View` and need not know which of the two it has: points
 /// are (x, y), and [`blueshift`](Self::blueshift) tells what a camera's motion and depth in the

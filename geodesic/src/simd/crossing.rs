@@ -21,7 +21,7 @@ const MOST_STEPS: f64 = 1e5;
 /// Errors compared with those of samples: there are few steps, and no sum of angles.
 const LESS: f64 = 0.4;
 
-/// Where the crossings of a block of rays go, ray after ray.
+/// Destination of the crossings of a block of rays, ray after ray.
 pub(super) struct Target<'a> {
     pub delay: &'a mut [f64],
     pub radius: &'a mut [f64],
@@ -37,7 +37,7 @@ pub(super) struct Whole<'a> {
     pub duration: &'a mut [f64],
     /// True if it returns to the observer's radius (1) or is captured (0).
     pub escapes: &'a mut [f64],
-    /// How many times it crosses the plane.
+    /// Number of crossings of the plane.
     pub count: &'a mut [f64],
     /// Error of its phase, as an angle.
     pub doubt: &'a mut [f64],

@@ -49,7 +49,7 @@ impl<V: Lanes<f64>> PolarSum<V> {
         atan2(self.y, self.x)
     }
 
-    /// How far the frame has turned.
+    /// Returns the angle by which the frame has turned.
     #[inline(always)]
     pub fn turned(&self, steps: usize) -> V {
         self.step.turn * V::splat(steps as f64)

@@ -34,7 +34,7 @@ pub struct RayEnds {
     pub mino_total: f64,
     /// True if it returns to the observer's radius, be that infinite; else it is captured.
     pub escapes: bool,
-    /// How many times it crosses the plane, requested or not.
+    /// Number of crossings of the plane, requested or not.
     pub crossings: u32,
     /// An estimate, rarely exceeded, of the error of its phase by rounding, in radians: in
     /// inverse proportion to its distance from the critical curve. Where that is not small
@@ -42,7 +42,7 @@ pub struct RayEnds {
     pub error: f64,
 }
 
-/// Where a ray crosses the equatorial plane.
+/// A crossing of the equatorial plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
     /// t_o − t, in M; lim \[(t_o − t) − r_o − 2 ln r_o\] for an observer at infinity.

@@ -35,7 +35,7 @@ pub fn estimate<V: Lanes<f64>>(condition: V, b: V, speed: V, step: V, depth: V) 
     phase.mul_add(speed.max(b), quadrature + s(position))
 }
 
-/// How much a phase error counts at worst at samples `h` apart.
+/// Returns the largest weight of a phase error at samples `h` apart.
 pub fn speed_of_samples(camera: &Camera, motion: &Motion<f64>, h: f64, escapes: bool) -> f64 {
     if escapes {
         return 1.0 / if camera.w_obs > 0.0 { camera.w_obs } else { h };

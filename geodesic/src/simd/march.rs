@@ -109,7 +109,7 @@ impl<V: Lanes<f64>> Panels<V> {
     }
 }
 
-/// Where rays are.
+/// State of rays.
 struct State<V> {
     time: V,
     w: V,
@@ -137,7 +137,7 @@ pub(super) struct March<'a, V> {
     pub jumps: &'a mut [Jump<V>],
 }
 
-/// Where each lane's next node goes, and the columns.
+/// Destination of each lane's next node, and the columns.
 type Target<'a, 'b> = (&'a mut [usize; MAX_LANES], &'a mut [&'b mut [f64]; COLUMNS]);
 
 /// Values at the nodes of a panel.
@@ -236,7 +236,7 @@ impl<V: Lanes<f64>> March<'_, V> {
         }
     }
 
-    /// At the turning point: what follows mirrors what was before.
+    /// Passes the turning point: what follows mirrors what was before.
     #[inline(always)]
     fn turn(&self, state: &mut State<V>) {
         if self.turns() {
@@ -347,7 +347,7 @@ impl<V: Lanes<f64>> March<'_, V> {
         state.integrals = integral(rule.weights(), &known.rates, length, state.integrals);
     }
 
-    /// To the end of the panel.
+    /// Goes to the end of the panel.
     #[inline(always)]
     fn cross(&self, state: &mut State<V>) {
         let Jump { h, radial, polar } = self.jumps[self.rule.order()];

@@ -54,7 +54,7 @@ impl Camera {
         self.spin * self.spin / self.r_plus()
     }
 
-    /// Where captured rays end.
+    /// Returns the w at which captured rays end.
     #[inline(always)]
     pub fn w_end(&self) -> f64 {
         (1.0 - self.margin) / self.r_plus()
@@ -141,7 +141,7 @@ pub struct Clock<V> {
 }
 
 impl<V: Lanes<f64>> Clock<V> {
-    /// That of one motion.
+    /// Starts the sum of one motion.
     #[inline(always)]
     pub fn new(m: &Motion<V>) -> Self {
         let s = V::splat;
@@ -157,24 +157,24 @@ impl<V: Lanes<f64>> Clock<V> {
         rf_pair(p - self.e, p - self.half, self.gap)
     }
 
-    /// From infinity inwards to the point w > 0 that is passed at the speed w'.
+    /// Returns the time from infinity inwards to the point w > 0 that is passed at the speed w'.
     #[inline(always)]
     pub fn until(&self, w: V, speed: V) -> V {
         self.read((speed + V::splat(1.0)) / (w * w * V::splat(2.0)) + self.shift)
     }
 }
 
-/// How long a ray lasts, and what becomes of it.
+/// Duration of a ray, and its outcome.
 #[derive(Clone, Copy)]
 pub struct Journey<V> {
     /// Mino time from the observer to the end of the ray.
     pub duration: V,
     /// One if the ray turns and returns to the observer's radius, zero if it is captured.
     pub escapes: V,
-    /// By how much the photon orbit amplifies errors: 1/(distance from the critical curve), up to
-    /// a factor of order 1; one for rays that pass it at a distance.
+    /// Amplification of errors by the photon orbit: 1/(distance from the critical curve), up to a factor of order 1; one
+    /// for rays that pass it at a distance.
     pub condition: V,
-    /// Where rays that escape turn.
+    /// Radius where rays that escape turn.
     pub r_turn: V,
 }
 
@@ -224,8 +224,8 @@ impl<V: Lanes<f64>> Journey<V> {
 /// others. With e < 0 these nearly coincide next to the critical curve, and the Mino time is the logarithm of their
 /// difference over √(3|e|/2). Scaled to be 1/(distance) for a hole without spin.
 ///
-/// At the tips of the straight part of an extremal hole's critical curve all three coincide, whatever the sign of e: they
-/// then lose as many more digits as they are smaller than η + λ².
+/// Returns the condition. At the tips of the straight part of an extremal hole's critical curve all three coincide,
+/// whatever the sign of e: they then lose as many more digits as they are smaller than η + λ².
 #[inline(always)]
 fn condition<V: Lanes<f64>>(b2: V, e: V, gap: V) -> V {
     /// The largest root below which a ray passes a tip: no photon orbit of a spin up to 0.9999 has one as small.

@@ -13,14 +13,14 @@ use crate::screen::observer::Observer;
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::quantities::Quantities;
 
-/// Which nodes, and what of them.
+/// Selection of nodes, and of quantities at them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodeRequest {
     /// Radius in M of the sphere outside of which there are no nodes.
     pub radius: f64,
     /// The rule of a panel: at most 16 nodes.
     pub rule: PanelRule,
-    /// Into how many panels each of the coarsest division is cut. Those are at most
+    /// Number of panels into which each of the coarsest division is cut. Those are at most
     /// 0.4/√max(1, η + λ²) of Mino time: a tenth of a half-turn about the hole or so.
     pub split: u32,
     /// Quantities computed at the nodes.
@@ -33,7 +33,7 @@ pub struct NodeRequest {
 /// smooth in Mino time, or go like a half-integer power of Δ at the horizon.
 #[derive(Debug, Clone, Default)]
 pub struct Nodes {
-    /// Where each ray's nodes end.
+    /// Ends of each ray's nodes.
     ends: Vec<usize>,
     columns: [Vec<f64>; COLUMNS],
     error: Vec<f64>,
@@ -43,7 +43,7 @@ pub struct Nodes {
 /// Most panels of a ray before `split`: longer rays have no digits left.
 const MOST: f64 = 1e4;
 
-/// How a ray is cut.
+/// Division of a ray.
 #[derive(Debug, Clone, Copy)]
 struct Plan {
     key: Key,
@@ -144,7 +144,8 @@ impl Nodes {
         Ok(())
     }
 
-    /// Where each ray's nodes go, and in what order rays are taken: those alike together.
+    /// Lays out the destinations of each ray's nodes, and the order in which rays are taken: those
+    /// alike together.
     fn lay_out(&mut self, rays: &Rays<'_>) {
         let (order, wanted) = (rays.request.rule.order(), rays.request.quantities);
         self.ends.clear();
@@ -162,7 +163,7 @@ impl Nodes {
         self.plan.sort_by_key(|plan| plan.key);
     }
 
-    /// How many panels lie on each leg of each ray, in the order of the rays.
+    /// Returns the number of panels on each leg of each ray, in the order of the rays.
     pub(crate) fn layouts(&self) -> Vec<Key> {
         let mut layouts = vec![Key::default(); self.plan.len()];
         self.plan.iter().for_each(|plan| layouts[plan.ray] = plan.key);

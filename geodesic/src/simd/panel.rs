@@ -9,8 +9,9 @@ pub(crate) const LONGEST_PANEL: f64 = 0.4;
 
 /// The Gauss–Legendre rule on [0, 1] with the integrals from 0 to its nodes.
 ///
-/// On its last panel before the horizon, where what is integrated may go like a half-integer power
-/// of the distance, a ray is followed at a pace that falls linearly to zero: τ = L (1 − (1 − s)²).
+/// Rule of panels. On its last panel before the horizon, where what is integrated may go like a
+/// half-integer power of the distance, a ray is followed at a pace that falls linearly to zero: τ =
+/// L (1 − (1 − s)²).
 #[derive(Debug, Clone, PartialEq)]
 pub struct PanelRule {
     nodes: Vec<f64>,

@@ -20,7 +20,7 @@ use core::f64::consts::{FRAC_PI_2, TAU};
 /// Terms of the series in h².
 const TERMS: usize = 7;
 
-/// Where the direction is, and the step that led there, in the turning frame.
+/// Direction, and the step that led there, in the turning frame.
 #[derive(Clone, Copy)]
 pub struct PolarState<V> {
     /// x in the turning frame.

@@ -145,7 +145,7 @@ pub struct Ring<V> {
 }
 
 impl<V: Lanes<f64>> Ring<V> {
-    /// Without nodes yet.
+    /// Starts without nodes.
     #[inline(always)]
     pub fn new() -> Self {
         let zero = V::splat(0.0);
@@ -341,8 +341,8 @@ impl<V: Lanes<f64>> RadialRun<V> {
         (self.w, self.p, self.q) = (w, p, q);
     }
 
-    /// At the current node: `r`, the radial part of time, `G₀ + a² G₂ − r − 2F − 2r₊Λ`, and
-    /// that of azimuth, `−a G₂ + a Λ`, up to constants.
+    /// Returns the parts at the current node: `r`, the radial part of time, `G₀ + a² G₂ − r − 2F −
+    /// 2r₊Λ`, and that of azimuth, `−a G₂ + a Λ`, up to constants.
     #[inline(always)]
     pub fn parts(&self, ring: &Ring<V>) -> [V; 3] {
         let s = V::splat;

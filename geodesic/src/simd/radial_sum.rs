@@ -31,7 +31,7 @@ pub struct RadialEnd<V> {
 }
 
 impl<V: Lanes<f64>> RadialSum<V> {
-    /// From the point (w, w'), in at least [`LEAST_STEPS`] steps h.
+    /// Starts from the point (w, w'), in at least [`LEAST_STEPS`] steps h.
     #[inline(always)]
     pub fn new(m: &Motion<V>, h: V, w: V, speed: V) -> Self {
         let step = RadialStep::new(m, h);

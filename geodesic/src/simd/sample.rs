@@ -8,7 +8,7 @@ use super::motion::{Camera, Journey, Motion};
 use super::polar::{PolarState, PolarStep, unwrap};
 use super::radial::{RadialRun, Ring};
 
-/// Where the samples of a block of rays go, ray after ray.
+/// Destination of the samples of a block of rays, ray after ray.
 pub(super) struct Target<'a> {
     pub delay: &'a mut [f64],
     pub radius: &'a mut [f64],
@@ -115,7 +115,7 @@ fn arrange(rays: &Rays<'_>, out: &mut Target<'_>) -> Vec<Item> {
 /// Radius and the radial parts of time and azimuth, at the samples of the inward leg.
 type Radial<V> = [V; 3];
 
-/// How far ahead of the samples being computed their places in memory are called up.
+/// Distance ahead of the samples being computed at which their places in memory are called up.
 const AHEAD: usize = 8;
 
 /// Asks for the line of `v[index]` with the intent to write it.

@@ -15,8 +15,8 @@ fn grid(n: usize, half: f64) -> (Vec<f64>, Vec<f64>) {
     (0..n * n).map(|k| (at(k % n), at(k / n))).unzip()
 }
 
-/// How much dφ = a dr/Δ and dt = (r² + a²) dr/Δ amplify relative errors of r: without bound at
-/// the horizon.
+/// Returns the factors by which dφ = a dr/Δ and dt = (r² + a²) dr/Δ amplify relative errors of r:
+/// without bound at the horizon.
 fn amplification(hole: &Kerr, r: f64) -> f64 {
     1.0 + (r * r + hole.spin().powi(2)) / hole.delta(r).abs().max(1e-20)
 }
@@ -165,7 +165,7 @@ fn compare_crossings(hole: &Kerr, observer: &Observer, rays: (&[f64], &[f64])) -
     worst
 }
 
-/// Up to four crossings of every ray, for every kind of hole and place of the observer, rays
+/// Crossings, up to four of every ray, agree for every kind of hole and place of the observer, rays
 /// through the axis among them.
 #[test]
 fn code_crossings_agree_with_the_runge_kutta_tracer_and_the_closed_form() {

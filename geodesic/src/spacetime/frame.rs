@@ -122,7 +122,7 @@ impl ZamoFrame {
         [0.0, self.length * polar / self.lapse, across / self.lapse]
     }
 
-    /// In Carter's tetrad: (E_r, H_r) and (E_θ, E_φ) of the bivector k∧f, and kᵗ.
+    /// Returns (E_r, H_r) and (E_θ, E_φ) of the bivector k∧f in Carter's tetrad, and kᵗ.
     #[inline]
     fn carter_bivector(&self, k: [f64; 4], f: [f64; 4]) -> ([f64; 2], [f64; 2], f64) {
         let [boost, swift] = self.carter;
@@ -175,8 +175,8 @@ pub struct ScreenPoint {
     principal: bool,
 }
 
-/// Below this 𝒦/sin²i (in M²) the ray is taken to be a principal null one: the limit is
-/// right to √𝒦/sin i, the general formula to the momentum's rounding over √𝒦.
+/// Largest 𝒦/sin²i (in M²) of a ray that is taken to be a principal null one: the limit is right to √𝒦/sin i, the
+/// general formula to the momentum's rounding over √𝒦.
 const PRINCIPAL: f64 = 1e-14;
 
 impl ScreenPoint {
@@ -193,11 +193,10 @@ impl ScreenPoint {
     /// `frame`, k for unit energy at infinity), has become there, as its components (north,
     /// east) along +β and −α. Its length is that of f but for multiples of k.
     ///
-    /// With κ the Walker–Penrose constant, f_β + i f_α = κ/(β + iν), ν = −(α + a sin i) (Himwich
-    /// et al. 2020, eq. 27; Gelles et al. 2021, arXiv:2105.09440, eq. 31). Where β = ν = 0 the
-    /// ray is a principal null one, κ vanishes, and the limit is
-    /// −(f_θ − i f_φ)(r + ia cos θ)/√Σ in Carter's tetrad, without the last factor (a turn of
-    /// the meridian) on the axis itself.
+    /// Transports polarisation to the screen. With κ the Walker–Penrose constant, f_β + i f_α = κ/(β + iν), ν = −(α + a
+    /// sin i) (Himwich et al. 2020, eq. 27; Gelles et al. 2021, arXiv:2105.09440, eq. 31). Where β = ν = 0 the ray is a
+    /// principal null one, κ vanishes, and the limit is −(f_θ − i f_φ)(r + ia cos θ)/√Σ in Carter's tetrad, without the
+    /// last factor (a turn of the meridian) on the axis itself.
     #[inline]
     pub fn transport(&self, frame: &ZamoFrame, k: [f64; 4], f: [f64; 4]) -> [f64; 2] {
         if self.principal {

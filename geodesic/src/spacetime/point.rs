@@ -20,8 +20,8 @@ pub struct PathPoint<T = f64> {
     pub velocity: [T; 3],
     /// Azimuth, unwrapped from the observer on; 0 unless requested.
     pub azimuth: T,
-    /// How much earlier the photon was here: t_o − t for an observer at finite radius,
-    /// lim \[(t_o − t) − r_o − 2 ln r_o\] for one at infinity; 0 unless requested.
+    /// Delay of the photon: t_o − t for an observer at finite radius, lim \[(t_o − t) − r_o − 2 ln r_o\] for one at
+    /// infinity; 0 unless requested.
     pub delay: T,
 }
 
@@ -92,7 +92,7 @@ impl<T: Elementary> PathPoint<T> {
         [-(self.inverse_radius_rate / (w * w)), -p_theta, -around, time]
     }
 
-    /// Where a path without a step is.
+    /// Returns the point of a path without a step.
     pub(crate) fn nowhere() -> Self {
         let nan = T::constant(f64::NAN);
         PathPoint {

@@ -1,4 +1,4 @@
-//! Which quantities are computed at the points of a ray.
+//! Quantities at the points of a ray.
 
 /// Quantities computed at the points of a ray besides r, θ and Mino time. Those that are off cost
 /// nothing.

@@ -51,7 +51,7 @@ impl<T: Elementary> Barrier<T> {
 }
 
 impl<T: Elementary> RadialPotential<T> {
-    /// From A, B, C and w at the horizon.
+    /// Takes A, B, C and w at the horizon.
     pub(crate) fn new(coefficients: [T; 3], horizon: T) -> Self {
         let barrier = barrier(&coefficients, horizon.value());
         RadialPotential { coefficients, horizon, barrier }

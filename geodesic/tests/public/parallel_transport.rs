@@ -27,15 +27,16 @@ fn normal(k: [f64; 4], s: [f64; 3]) -> [f64; 4] {
     [0.0, s[0] - along * k[1], s[1] - along * k[2], s[2] - along * k[3]]
 }
 
-/// In Kerr–Schild coordinates: the place, and two vectors (t, x, y, z).
+/// Vectors in Kerr–Schild coordinates: the place, and two vectors (t, x, y, z).
 struct Transported {
     x: [f64; 3],
     k: [f64; 4],
     f: [f64; 4],
 }
 
-/// From the frame to ingoing Kerr–Schild coordinates whose azimuth is Boyer and Lindquist's at
-/// infinity: dt̃ = dt + 2r dr/Δ, dφ̃ = dφ + a dr/Δ, x + iy = (r + ia) sin θ e^{iφ̃}, z = r cos θ.
+/// Transforms from the frame to ingoing Kerr–Schild coordinates whose azimuth is Boyer and
+/// Lindquist's at infinity: dt̃ = dt + 2r dr/Δ, dφ̃ = dφ + a dr/Δ, x + iy = (r + ia) sin θ e^{iφ̃},
+/// z = r cos θ.
 fn kerr_schild(
     hole: &Kerr,
     point: &PathPoint,

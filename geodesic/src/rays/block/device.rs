@@ -58,14 +58,14 @@ pub trait RayDevice: fmt::Debug + Send + Sync {
         paths: &mut DevicePaths,
     ) -> Result<(), Error>;
 
-    /// How it failed, if it did.
+    /// Returns the failure, if there was one.
     fn failure(&self) -> Option<String>;
 }
 
 /// Quantities that a device traces for each ray, beside outcome and number of crossings.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DeviceRequest {
-    /// How many crossings of the equatorial plane are located.
+    /// Number of crossings of the equatorial plane that are located.
     pub crossings: usize,
     /// Samples equidistant in Mino time along the whole ray, both ends included but for those at infinity.
     pub samples: usize,
@@ -77,7 +77,7 @@ pub struct DeviceRequest {
     pub sphere: Option<f64>,
 }
 
-/// How a ray ends.
+/// End of a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeviceEnd {
     /// Unit vector of the direction in which it escapes, if it does; needs `quadratures`.

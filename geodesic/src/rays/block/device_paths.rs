@@ -49,7 +49,7 @@ impl DevicePaths {
         self.rays.push(None);
     }
 
-    /// How many rays there are, those that the device does not vouch for among them.
+    /// Returns the number of rays, those that the device does not vouch for among them.
     pub fn len(&self) -> usize {
         self.rays.len()
     }

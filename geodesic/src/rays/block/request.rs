@@ -5,7 +5,7 @@ use crate::simd::NodeRequest;
 /// Quantities to be found for the rays of a block.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BlockRequest {
-    /// How many crossings of the equatorial plane are located. 0: they are counted, not located.
+    /// Number of crossings of the equatorial plane that are located. 0: they are counted, not located.
     pub crossings: usize,
     /// True if a ray with more crossings, the first of which are not opaque, is traced step by step and has them
     /// all.
@@ -36,6 +36,6 @@ pub struct BlockRequest {
 pub struct SphereNodes {
     /// The coarsest nodes.
     pub request: NodeRequest,
-    /// How many panels a panel of the coarsest nodes is cut into at most.
+    /// Largest number of panels that a panel of the coarsest nodes is cut into.
     pub finest: u32,
 }

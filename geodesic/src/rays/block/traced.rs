@@ -6,7 +6,7 @@ use crate::screen::observer::Ray;
 use crate::spacetime::point::PathPoint;
 use core::ops::Range;
 
-/// Where a ray crosses the equatorial plane.
+/// A crossing of the equatorial plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaneCrossing {
     /// Mino time since the observer, in 1/M.
@@ -46,9 +46,9 @@ pub struct TracedRay {
     pub eta: f64,
     /// Outcome if no surface ends it.
     pub outcome: Outcome,
-    /// How many times it crosses the equatorial plane outside the horizon, along its whole length.
+    /// Number of crossings of the equatorial plane outside the horizon, along its whole length.
     pub crossing_count: u32,
-    /// Which of the block's crossings are its own.
+    /// Range of its own crossings among those of the block.
     pub crossings: Range<usize>,
     /// Mino time of the whole ray, M⁻¹: to the horizon, or back at the radius of an observer; to infinity for one that is
     /// there and for cameras. (A [`Path`] goes on to infinity, and so does its `mino_total`.)

@@ -82,10 +82,10 @@ pub trait RayVisitor {
 pub enum PathUse {
     /// Nothing.
     None,
-    /// For sources of its own: crossings, nodes and the direction of escape stay those of the closed
+    /// The path serves sources of its own: crossings, nodes and the direction of escape stay those of the closed
     /// form.
     Beside,
-    /// For everything: the ray is traced step by step.
+    /// The path serves everything: the ray is traced step by step.
     Instead,
 }
 

@@ -171,7 +171,7 @@ pub trait Lanes<T: Element>:
     /// Returns whether the mask holds in all lanes.
     fn all(mask: Self::Mask) -> bool;
 
-    /// For positive normal numbers: `(m, k)` with `self = m · 2^k`, `√½ ≤ m < √2`, `k` integer.
+    /// Splits positive normal numbers: `(m, k)` with `self = m · 2^k`, `√½ ≤ m < √2`, `k` integer.
     fn split(self) -> (Self, Self);
 
     /// Two to the power of integers −127 < n < 128 (f32), −1023 < n < 1024 (f64).
