@@ -1,4 +1,4 @@
-//! How calls cross the border: what is refused is a `ValueError` with the same words, a bug a `RuntimeError`.
+//! Calls across the border: refusals are a `ValueError` with the same words, bugs a `RuntimeError`.
 
 use crate::refusal::refused;
 use crate::threads::{Pool, stay_on_this_thread};
@@ -42,7 +42,7 @@ pub fn at_once<T: Send, E: Display + Send>(
     finished(py.detach(|| catch_unwind(AssertUnwindSafe(work))))
 }
 
-/// How long a signal may wait to be seen.
+/// Longest time that a signal may wait to be seen.
 const MOMENT: Duration = Duration::from_millis(50);
 
 /// Does work in a pool, since signals reach Python's main thread alone, which looks for them.

@@ -1,4 +1,4 @@
-//! From images to visibilities, and back.
+//! Transforms from images to visibilities, and back.
 
 use crate::call::detached;
 use crate::refusal::refused;
@@ -38,7 +38,8 @@ const MEMORY: usize = 256 << 20;
 
 #[pymethods]
 impl Fourier {
-    /// For images of width × height pixels over a field (µas), `counts[k]` of the flat (u, v) seeing image k.
+    /// Makes a transform for images of width × height pixels over a field (µas), `counts[k]` of the flat (u,
+    /// v) seeing image k.
     #[new]
     fn new(
         py: Python<'_>,
@@ -59,7 +60,7 @@ impl Fourier {
         Ok(Fourier { transform: detached(py, work)? })
     }
 
-    /// Which transform it is.
+    /// Names the transform.
     fn describe(&self) -> String {
         self.transform.describe()
     }

@@ -38,9 +38,9 @@ pub struct Model {
     /// Times of the frames, and when it begins to shine.
     times: Vec<f64>,
     injection: Option<f64>,
-    /// Of each frame, whether the matter of a node was outside of the region; empty where none can have been.
+    /// Masks of nodes whose matter was outside of the region, frame by frame; empty where none can have been.
     dark: Vec<Vec<bool>>,
-    /// Of each Stokes parameter that is wanted, what it is multiplied by at each node; none for intensity alone.
+    /// Factors of each wanted Stokes parameter at each node; none for intensity alone.
     factors: Vec<Vec<f64>>,
 }
 
@@ -172,7 +172,8 @@ impl Model {
         cotangents
     }
 
-    /// Where the matter of a frame's nodes was at the reference time: x, y and z, no numbers outside of the region.
+    /// Returns the places of the matter of a frame's nodes at the reference time: x, y and z, no numbers outside of
+    /// the region.
     fn carried(&self, frame: usize) -> [Vec<f64>; 3] {
         interrupt::check();
         let mut batch = Batch::default();
@@ -294,7 +295,7 @@ impl Model {
         self.factors.concat().into_pyarray(py).into_any()
     }
 
-    /// Where nodes lie, what they weigh, their pixels and delays.
+    /// Returns the nodes' places, weights, pixels and delays.
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
         let place = |k: usize| [0, 1, 2].map(|c| self.position[c][k]);

@@ -17,7 +17,7 @@ pub struct Settings {
     pub per_ray: Option<usize>,
     pub slow_light: bool,
     pub redshift_power: Option<f64>,
-    /// How matter moves, as JSON of what files say.
+    /// Motion of matter, as JSON of what files say.
     pub velocity: String,
     pub axis: [f64; 3],
     /// Times of the frames and of the field of emission, M.
@@ -42,7 +42,7 @@ impl Settings {
         }
     }
 
-    /// How matter moves about a hole of this spin.
+    /// Returns the motion of matter about a hole of this spin.
     pub fn motion(
         &self,
         spin: f64,

@@ -150,7 +150,7 @@ fn number(value: i64, count: usize, what: &str) -> PyResult<u16> {
 }
 
 impl Visibilities {
-    /// Of an observation.
+    /// Wraps an observation.
     pub fn of(observation: Observation) -> Self {
         Visibilities { observation }
     }
@@ -158,14 +158,14 @@ impl Visibilities {
 
 #[pymethods]
 impl Visibilities {
-    /// From the bytes of a file in any format; the second value names the format.
+    /// Reads the bytes of a file in any format; the second value names the format.
     #[staticmethod]
     fn decode(py: Python<'_>, bytes: &[u8]) -> PyResult<(Self, String)> {
         let (format, observation) = detached(py, || decode(bytes))?;
         Ok((Visibilities { observation }, format.to_string()))
     }
 
-    /// From columns.
+    /// Makes an observation from columns.
     #[new]
     fn new(metadata: Metadata, columns: Columns<'_>) -> PyResult<Self> {
         let mut observation = metadata.observation()?;
@@ -253,8 +253,8 @@ impl Visibilities {
         Ok(Visibilities { observation: detached(py, work)? })
     }
 
-    /// How many rows repeat the baseline, channel and time of another, and how many closure quantities averages of scans
-    /// have, if these are more.
+    /// Returns the number of rows that repeat the baseline, channel and time of another, and of closure quantities that
+    /// averages of scans have, if these are more.
     fn rows_that_do_not_close(
         &self,
         py: Python<'_>,
@@ -266,7 +266,7 @@ impl Visibilities {
         Ok((of.repeats().rows, detached(py, count)?))
     }
 
-    /// As Stokes I alone.
+    /// Returns Stokes I alone.
     fn total_intensity(&self) -> Self {
         Visibilities { observation: self.observation.total_intensity() }
     }

@@ -58,7 +58,7 @@ struct Plan {
     pulse: String,
     accuracy: Option<f64>,
     scattering: bool,
-    /// Of station gains: constant, a scan, and whether phases are random.
+    /// Station gains: constant, a scan, and whether phases are random.
     gains: (f64, f64, bool),
     thermal: bool,
     seed: u64,
@@ -107,7 +107,7 @@ impl Plan {
         Ok(observation)
     }
 
-    /// In the order of light's way.
+    /// Corrupts an observation in the order of light's way.
     fn spoil(&self, observation: &mut Observation) -> Result<(), Error> {
         if self.scattering {
             scatter(observation, &ScatteringKernel::sgr_a())?;

@@ -62,7 +62,7 @@ fn sent(said: Said<'_>, to: &Sender<(Message, Sender<()>)>) {
     }
 }
 
-/// How long a signal may wait to be seen.
+/// Longest time that a signal may wait to be seen.
 const MOMENT: Duration = Duration::from_millis(50);
 
 /// Does the same on threads of its own, and calls methods of `listener` on this one: `words(text)`, `line(json)` and

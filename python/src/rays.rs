@@ -17,7 +17,7 @@ pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(integrators, module)?)
 }
 
-/// Where an observer sits: inclination, whether that is in degrees, radius (M) and azimuth (radians).
+/// Place of an observer: inclination, whether that is in degrees, radius (M) and azimuth (radians).
 #[derive(Clone, Copy, FromPyObject)]
 pub struct Place(f64, bool, f64, f64);
 

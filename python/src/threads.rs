@@ -16,7 +16,7 @@ pub struct Pool {
     stop: &'static AtomicBool,
 }
 
-/// That of Python's main thread, whose work signals stop, and that of all other threads. No lock that a fork could copy.
+/// Pool of Python's main thread, whose work signals stop, and that of all other threads. No lock that a fork could copy.
 static POOLS: [AtomicPtr<Pool>; 2] = [const { AtomicPtr::new(null_mut()) }; 2];
 
 thread_local! {

@@ -14,7 +14,7 @@ use kerrlight_common::toml_file::shown;
 use kerrlight_geodesic::Error as OutOfRange;
 use std::borrow::Cow;
 
-/// Why a function of this crate refuses what it was given, or cannot finish.
+/// Reason why a function of this crate refuses its input, or cannot finish.
 ///
 /// The message is complete in itself and names the field, its value and what is allowed; an error in
 /// a text or a file also names the line or the byte. Match on a variant to treat one kind in a way of
@@ -83,7 +83,7 @@ impl From<NumpyError> for Error {
 }
 
 impl Error {
-    /// That `field` cannot be `value`, with the allowed range in words.
+    /// States that `field` cannot be `value`, with the allowed range in words.
     pub const fn out_of_range(field: &'static str, value: f64, allowed: &'static str) -> Self {
         Self::Range(OutOfRange::out_of_range(field, value, allowed))
     }

@@ -66,7 +66,7 @@ pub struct CoordinatesMut<'a, T> {
 }
 
 impl<'a, T> CoordinatesMut<'a, T> {
-    /// Of points in space.
+    /// Takes points in space.
     ///
     /// # Panics
     /// If the columns are of different length.
@@ -75,7 +75,7 @@ impl<'a, T> CoordinatesMut<'a, T> {
         Self { columns: [x, y, z, &mut []], dimension: 3 }
     }
 
-    /// Of points in time and space.
+    /// Takes points in time and space.
     ///
     /// # Panics
     /// If the columns are of different length.

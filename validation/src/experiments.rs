@@ -20,19 +20,19 @@ pub struct Expected {
 /// Factors and their levels; those that are not named may be any.
 pub type Levels = BTreeMap<String, String>;
 
-/// Where a result of every single case lies.
+/// Range of a result of every single case.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Range {
-    /// Which cases.
+    /// Cases.
     pub r#where: Levels,
-    /// Which result.
+    /// Name of the result.
     pub value: String,
     /// Least.
     pub at_least: Option<f64>,
     /// Most.
     pub at_most: Option<f64>,
-    /// Who says so.
+    /// Source of the expectation.
     pub source: String,
 }
 
@@ -42,16 +42,16 @@ pub struct Range {
 pub struct Order {
     /// The best first.
     pub falling: Vec<Levels>,
-    /// Which result.
+    /// Name of the result.
     pub value: String,
-    /// By how much one may still exceed the one before it.
+    /// Excess of one over the one before it that is allowed.
     #[serde(default)]
     pub slack: f64,
-    /// Who says so.
+    /// Source of the expectation.
     pub source: String,
 }
 
-/// How one expectation fared.
+/// Outcome of one expectation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
     /// Quantity, case and source of the expectation.

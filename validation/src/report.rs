@@ -5,7 +5,7 @@ use std::fmt::Write;
 /// One comparison.
 #[derive(Debug, Clone)]
 pub struct Case {
-    /// Who says so.
+    /// Source of the reference.
     pub authority: &'static str,
     /// Quantity that is compared.
     pub name: String,

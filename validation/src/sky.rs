@@ -20,7 +20,7 @@ pub struct Arc {
     pub radius: f64,
     /// Azimuth of its middle, radians from the observer's meridian.
     pub azimuth: f64,
-    /// By what its distance grows with azimuth, M a radian.
+    /// Growth of its distance with azimuth, M a radian.
     pub pitch: f64,
     /// Standard deviation along it, M: for a spot that across it.
     pub length: f64,
@@ -52,9 +52,9 @@ pub fn shining(arcs: &[Arc]) -> impl Fn([f64; 3]) -> f64 + Sync {
 pub struct Sky {
     /// Spin, M: below 0 where matter is retrograde.
     pub spin: f64,
-    /// From the spin axis, degrees.
+    /// Inclination from the spin axis, degrees.
     pub inclination_deg: f64,
-    /// Of the spin axis, degrees east of north.
+    /// Position angle of the spin axis, degrees east of north.
     pub position_angle_deg: f64,
     /// Power of the redshift factor that emission goes with.
     pub power: f64,
@@ -75,7 +75,7 @@ impl Sky {
 /// A square screen.
 #[derive(Clone, Copy, Debug)]
 pub struct Screen {
-    /// Between its edges, M.
+    /// Width between its edges, M.
     pub width: f64,
     /// Pixels a side.
     pub pixels: usize,
@@ -83,13 +83,13 @@ pub struct Screen {
     pub rays: usize,
 }
 
-/// Where a ray meets matter.
+/// Intersection of a ray with matter.
 struct Point {
     /// ρ, φ and z.
     place: [f64; 3],
     /// Angular velocity there, M⁻¹.
     rate: f64,
-    /// How long before it arrives its light was there, M, less what the whole way takes.
+    /// Time before its arrival at which its light was there, M, less that of the whole way.
     before: f64,
     /// g to the sky's power, times dλ, M.
     weight: f64,

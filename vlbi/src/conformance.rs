@@ -8,7 +8,7 @@ use rand_pcg::Pcg64Mcg;
 
 /// A number of the data, real or complex, with the inner product Re Σ x̄ y.
 pub(super) trait Datum<T: Float>: Copy {
-    /// Of two numbers.
+    /// Makes a value of two numbers.
     fn of(parts: [f64; 2]) -> Self;
     /// Real and imaginary part.
     fn parts(self) -> [f64; 2];

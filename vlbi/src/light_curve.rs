@@ -97,7 +97,7 @@ impl LightCurve {
         Self { samples: bins.iter().map(|bin| mean(bin)).collect() }
     }
 
-    /// Without samples that are later than so many seconds after the one before.
+    /// Drops samples that are later than so many seconds after the one before.
     #[must_use]
     pub fn without_gaps(self, most_s: f64) -> Self {
         let late = |k: usize| {
@@ -119,8 +119,8 @@ impl LightCurve {
         self
     }
 
-    /// With position angles that are larger by `degrees` (east of north): Q + iU times e^{2iχ}, as for Faraday rotation
-    /// that is taken back. Samples with one of Q and U lose it.
+    /// Adds `degrees` (east of north) to position angles: Q + iU times e^{2iχ}, as for Faraday rotation that is taken back.
+    /// Samples with one of Q and U lose it.
     #[must_use]
     pub fn turned(mut self, degrees: f64) -> Self {
         let (sin, cos) = (2.0 * degrees.to_radians()).sin_cos();
@@ -134,7 +134,7 @@ impl LightCurve {
         self
     }
 
-    /// With the same standard deviations (Jy) at all times of the parameters that have one here.
+    /// Sets the same standard deviations (Jy) at all times of the parameters that have one here.
     #[must_use]
     pub fn with_sigmas(mut self, sigmas: [Option<f64>; 4]) -> Self {
         for sample in &mut self.samples {
@@ -145,7 +145,7 @@ impl LightCurve {
         self
     }
 
-    /// With this I (Jy) at all times.
+    /// Sets this I (Jy) at all times.
     #[must_use]
     pub fn with_intensity(mut self, jy: f64) -> Self {
         for sample in &mut self.samples {

@@ -1,4 +1,4 @@
-//! When an array observes, and the baselines that then see the source.
+//! Schedules of an array, and the baselines that then see the source.
 
 use super::Complex64;
 use super::array::{Array, ArrayError};
@@ -18,7 +18,7 @@ pub enum Clock {
     Gmst,
 }
 
-/// When to observe: `scans` times start + k·(stop − start)/scans, k = 0, 1, …
+/// Schedule: `scans` times start + k·(stop − start)/scans, k = 0, 1, …
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Schedule {
     /// Modified Julian date whose 0 h UTC hours count from.
@@ -27,9 +27,9 @@ pub struct Schedule {
     pub clock: Clock,
     /// First scan, in hours.
     pub start_h: f64,
-    /// Where the scan after the last one would be, in hours.
+    /// Time at which the scan after the last one would be, in hours.
     pub stop_h: f64,
-    /// How many scans.
+    /// Number of scans.
     pub scans: u32,
 }
 
@@ -51,7 +51,7 @@ pub struct Setup {
     pub frame: Frame,
 }
 
-/// Why there is no observation.
+/// Reason why there is no observation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScheduleError {

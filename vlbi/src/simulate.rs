@@ -16,14 +16,14 @@ const MEMORY: usize = 256 << 20;
 /// Images in Jy/pixel that follow each other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Movie {
-    /// Where pixels are.
+    /// Grid of pixels.
     pub grid: ImageGrid,
     /// Jy per pixel: image after image, row by row from the north, each row from the east.
     pub pixels: Vec<f64>,
 }
 
 impl Movie {
-    /// How many images.
+    /// Returns the number of images.
     pub fn frames(&self) -> usize {
         self.pixels.len() / self.grid.pixels().max(1)
     }

@@ -8,7 +8,7 @@ use std::str::FromStr;
 pub struct Source {
     /// Its name.
     pub name: String,
-    /// Where it is on the sky.
+    /// Position on the sky.
     pub position: SourcePosition,
 }
 

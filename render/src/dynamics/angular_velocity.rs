@@ -1,4 +1,4 @@
-//! How matter moves: how fast it turns, and whether it falls.
+//! Motion of matter: how fast it turns, and whether it falls.
 
 use super::Axis;
 use super::infall::{Falling, Origin, Profile};
@@ -15,12 +15,12 @@ pub enum AngularVelocity {
     /// 1/(r^{3/2} + drag), circular geodesics (Bardeen, Press & Teukolsky 1972): the drag is the spin for
     /// orbits about it, spin · ξ_z for tilted ones, 0 in the paper.
     Keplerian {
-        /// In M^{3/2}.
+        /// Spin as the flow sees it, in M^{3/2}.
         drag: f64,
     },
     /// rate · (radius/r)^exponent.
     PowerLaw {
-        /// Where the rate is reached, M.
+        /// Radius at which the rate is reached, M.
         radius: f64,
         /// Radians a unit of time.
         rate: f64,
@@ -41,13 +41,13 @@ pub enum AngularVelocity {
         /// Dimensionless.
         factor: f64,
     },
-    /// Between knots, of matter that stays at its radius.
+    /// Linear between knots, of matter that stays at its radius.
     Profile(Profile),
-    /// Of matter that changes its radius.
+    /// Matter that changes its radius.
     Falling(Arc<Falling>),
 }
 
-/// Below this |dr/dt| matter is on a circle.
+/// Least |dr/dt|: below it matter is on a circle.
 const STILL: f64 = 1e-12;
 
 impl AngularVelocity {
@@ -131,7 +131,7 @@ impl AngularVelocity {
         }
     }
 
-    /// Where the matter at a point (M) was `elapsed` (M) before, if it moves like this about an axis.
+    /// Returns the place of the matter at a point (M) `elapsed` (M) before, if it moves like this about an axis.
     pub fn before(&self, axis: Axis, point: [f64; 3], elapsed: f64) -> [f64; 3] {
         self.way_back(axis, point).before(elapsed)
     }
@@ -208,7 +208,7 @@ enum Speed<'a> {
 }
 
 impl WayBack<'_> {
-    /// Where it was `elapsed` (M) before, M.
+    /// Returns the place `elapsed` (M) before, M.
     pub fn before(&self, elapsed: f64) -> [f64; 3] {
         let (stretch, angle) = match &self.speed {
             Speed::Circular(rate) => (1.0, -rate * elapsed),
@@ -231,7 +231,7 @@ fn first_wrong(ranges: impl IntoIterator<Item = Range>) -> Result<(), Error> {
     })
 }
 
-/// When matter begins to shine: nothing is seen of what left a point before.
+/// Injection: the time when matter begins to shine; nothing is seen of what left a point before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Injection {
     /// Time of emission, in the points' own time (slow light: the frame's time less the delay).

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// How matter moves about an axis, as scenes and fits write it: a law of the angular velocity Ω(r), or one of both Ω and
+/// Motion of matter about an axis, as scenes and fits write it: a law of the angular velocity Ω(r), or one of both Ω and
 /// dr/dt. Numbers of the type `N` are those that a fit may not know.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
@@ -44,7 +44,7 @@ pub enum Velocity<N = f64> {
     },
     /// Another law plus a Gaussian process in radius.
     Perturbed(Perturbed<N>),
-    /// Between circular orbits and free fall (Cárdenas-Avendaño, Lupsasca & Zhu 2023).
+    /// Mixture of circular orbits and free fall (Cárdenas-Avendaño, Lupsasca & Zhu 2023).
     Infall {
         /// ξ: specific angular momentum over that of circular geodesics.
         #[schemars(extend("minimum" = 0.0, "maximum" = 1.0, "unit" = "an angular momentum over that of circular orbits"))]

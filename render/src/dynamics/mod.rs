@@ -1,4 +1,4 @@
-//! Where matter that shines at a point sat at the reference time.
+//! Dynamics: the place at the reference time of matter that shines at a point.
 //!
 //! Matter turns about one axis ξ on spheres, right-handed, with an angular velocity Ω(r) of the
 //! radius alone; emission is carried along: e(t, x) = e₀(R(ξ, angle) x) with angle = −Ω(|x|)(t − t₀).

@@ -30,7 +30,7 @@ impl<'a, T> Turned<'a, T> {
 
 /// `pulled` = R(axis, angle) x of each point; overwritten.
 ///
-/// By all threads; a point's result depends on nothing else.
+/// Pulls points back on all threads; a point's result depends on nothing else.
 ///
 /// # Panics
 /// If lengths differ or points are not in space.
@@ -55,9 +55,9 @@ fn check<T>(turned: &Turned<'_, T>, length: usize, dimension: usize) {
 /// Gradients that [`pull_back_vjp`] adds to, if wanted.
 #[derive(Debug, Default)]
 pub struct Cotangents<'a, T> {
-    /// With respect to the angles.
+    /// Gradient with respect to the angles.
     pub angles: Option<&'a mut [T]>,
-    /// With respect to the points, angles held.
+    /// Gradient with respect to the points, angles held.
     pub points: Option<CoordinatesMut<'a, T>>,
 }
 
@@ -73,9 +73,9 @@ impl<T> Cotangents<'_, T> {
 /// Gradient along the sphere with respect to the axis of a loss whose gradient with respect to the
 /// pulled-back points is `gradient`; adds the other gradients that are wanted.
 ///
-/// Where the angle depends on the radius, the gradient with respect to the points has
-/// dL/dangle · dangle/dr · x/r besides. Sums are in double precision and do not depend on the
-/// number of threads.
+/// Pulls gradients back. Where the angle depends on the radius, the gradient with respect to the
+/// points has dL/dangle · dangle/dr · x/r besides. Sums are in double precision and do not depend
+/// on the number of threads.
 ///
 /// # Panics
 /// If lengths differ or points are not in space.

@@ -55,7 +55,7 @@ impl BlackBody {
     }
 }
 
-/// From CIE XYZ to linear light in the primaries of sRGB.
+/// Converts from CIE XYZ to linear light in the primaries of sRGB.
 fn linear_srgb([x, y, z]: [f64; 3]) -> [f64; 3] {
     [
         3.240_625_5 * x - 1.537_208_0 * y - 0.498_628_6 * z,

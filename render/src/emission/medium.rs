@@ -42,7 +42,7 @@ impl Part {
 
 /// Something that shines, and may absorb, all over a sphere.
 pub trait Medium: core::fmt::Debug + Send + Sync {
-    /// Whose cost it is part of.
+    /// Returns the part of the plan that its cost belongs to.
     fn part(&self) -> Part;
     /// Radius in M of the sphere outside of which there is nothing.
     fn sphere(&self) -> f64;
@@ -84,7 +84,7 @@ pub struct PathSegment {
     pub radii: [f64; 2],
     /// Its largest and its least delay, in M; 0 where delays are not requested.
     pub delays: [f64; 2],
-    /// How far it may lie from its chord, in M; infinite if that is not known.
+    /// Largest distance from its chord, in M; infinite if that is not known.
     pub off: f64,
 }
 
@@ -110,7 +110,7 @@ impl CellSize {
     }
 }
 
-/// When a ray is seen.
+/// Time at which a ray is seen.
 #[derive(Debug, Clone, Copy)]
 pub struct Moment {
     /// Time of observation, in M.

@@ -1,5 +1,5 @@
-//! Where a volume on the nodes of a box shines, in coordinates in which matter on circles about
-//! an axis stays where it is but for its azimuth: the bricks that a ray may meet.
+//! Bricks of a volume on the nodes of a box that shine, in coordinates in which matter on circles about an axis
+//! stays where it is but for its azimuth: those that a ray may meet.
 
 use super::medium::PathSegment;
 use crate::volume::Volume;

@@ -12,8 +12,8 @@ pub struct PageThorne {
     logarithms: Vec<(f64, f64)>,
 }
 
-/// Below this distance of |a| from 1 two roots merge, and their logarithms, whose weights
-/// cancel, are dropped.
+/// Distance of |a| from 1 below which two roots merge, and their logarithms, whose weights cancel,
+/// are dropped.
 const EXTREMAL: f64 = 1e-14;
 
 impl PageThorne {

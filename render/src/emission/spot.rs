@@ -8,7 +8,7 @@ use crate::scene::Spot;
 use kerrlight_geodesic::Kerr;
 use kerrlight_geodesic::vector::{cross, distance, dot, rotate};
 
-/// Where a spot's light is cut off, in units of its σ: exp(−6²/2) = 1.5e-8.
+/// Radius at which a spot's light is cut off, in units of its σ: exp(−6²/2) = 1.5e-8.
 pub const CUT_OFF: f64 = 6.0;
 
 /// A spot around one hole, ready to be evaluated.
@@ -62,7 +62,7 @@ impl SpotModel {
         self.axis.map(|x| x * self.rate(r))
     }
 
-    /// Where the centre is at `time`, both in M.
+    /// Returns the centre at `time`, both in M.
     pub fn center(&self, time: f64) -> [f64; 3] {
         rotate(self.axis, self.rate(self.orbit) * time, self.start)
     }
@@ -126,9 +126,9 @@ impl SpotModel {
         (radius - self.orbit).abs().max(above)
     }
 
-    /// How many times as long as in the affine parameter a piece of a ray within the spot's shell is
-    /// at most in the coordinates r n. (|dx/dσ|² = 1 + B w³ + … of
-    /// `transport::chord`, where B w² ≤ 2/(1 − 2w) next to the turning point, and frame dragging.)
+    /// Returns the largest ratio of the length of a piece of a ray within the spot's shell in the coordinates r n
+    /// to that in the affine parameter. (|dx/dσ|² = 1 + B w³ + … of `transport::chord`, where B w² ≤ 2/(1 − 2w)
+    /// next to the turning point, and frame dragging.)
     pub fn stretch(&self) -> f64 {
         let w = 1.0 / self.shell()[0];
         if w < 0.25 { 1.2 * (1.0 + 2.0 * w / (1.0 - 2.0 * w)).sqrt() } else { f64::INFINITY }
@@ -176,7 +176,7 @@ impl SpotModel {
         self.orbit * self.rate(self.orbit).abs()
     }
 
-    /// Since when it is sheared.
+    /// Returns the time since when it is sheared.
     pub(super) fn sheared_since(&self) -> Option<f64> {
         self.sheared_since
     }
@@ -218,9 +218,9 @@ pub struct Comoving {
 /// Matter at a radius and a time.
 #[derive(Debug, Clone, Copy)]
 pub struct MatterPoint {
-    /// In M.
+    /// Radius, M.
     pub radius: f64,
-    /// In M.
+    /// Time, M.
     pub time: f64,
     /// Angular velocity of a spot's matter there.
     rate: f64,

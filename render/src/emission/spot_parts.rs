@@ -1,4 +1,4 @@
-//! Where a hot spot can shine at all: its orbit cut into parts with boxes around them.
+//! Parts of a hot spot's orbit from which it can shine at all, with boxes around them.
 //!
 //! A part holds the points that matter of some radii reaches after having turned by some angles.
 //! A rigid spot is one shell of radii; of a sheared one every radius turns by its own angle, so it

@@ -116,7 +116,7 @@ impl VolumeModel {
         origin.map_or(0.0, |origin| self.factor * self.volume.at(origin))
     }
 
-    /// Where falling matter came from; `None` where that is outside of the region.
+    /// Returns the origin of falling matter; `None` where that is outside of the region.
     fn origin(&self, flow: &Falling, x: [f64; 3], r: f64, elapsed: f64) -> Option<[f64; 3]> {
         let [stretch, angle] = flow.before(&flow.origin(r), elapsed);
         let inside =

@@ -5,7 +5,7 @@ use color_quant::NeuQuant;
 use image::RgbImage;
 use std::collections::{BTreeSet, HashMap};
 
-/// Why there is no animation.
+/// Reason why there is no animation.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AnimationError {

@@ -20,7 +20,7 @@ pub const BLACK: Rgb = [0; 3];
 /// pixel is at (0.5, 0.5).
 pub struct Canvas(Pixmap);
 
-/// Where a text stands against its place.
+/// Alignment of a text to its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Align {
     /// It begins there.
@@ -151,8 +151,8 @@ pub fn text_width(text: &str, size: f64) -> f64 {
     text.chars().map(|c| f64::from(font.metrics(c, size as f32).advance_width)).sum()
 }
 
-/// How much of each pixel a letter covers, 0 to 255, and the width of that picture, whose edges are the
-/// letter's; `None` without a font. A capital letter is about `size` pixels high.
+/// Returns the cover of each pixel by a letter, 0 to 255, and the width of that picture, whose edges
+/// are the letter's; `None` without a font. A capital letter is about `size` pixels high.
 pub fn coverage(letter: char, size: usize) -> Option<(usize, Vec<u8>)> {
     let font = font()?;
     // Capitals of this font are seven tenths of its nominal size high.

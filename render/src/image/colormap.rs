@@ -62,7 +62,8 @@ impl Colormap {
     }
 }
 
-/// Where a map whose lightness rises from 0 to 100 reaches the lightness 100 x.
+/// Returns the place at which a map whose lightness rises from 0 to 100 reaches the lightness 100
+/// x.
 fn even_lightness(map: impl Fn(f64) -> [f64; 3], x: f64) -> f64 {
     let (mut lo, mut hi) = (0.0, 1.0);
     for _ in 0..40 {

@@ -14,11 +14,11 @@ pub enum Look {
     Color,
 }
 
-/// How intensity is stretched over the colour map.
+/// Stretch of intensity over the colour map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Stretch {
-    /// In proportion, as the EHT shows brightness temperature.
+    /// Proportional, as the EHT shows brightness temperature.
     Linear,
     /// Square root: shows faint light beside bright.
     Sqrt,

@@ -11,7 +11,7 @@ const PRIMARIES: [[f64; 8]; 2] = [
     [0.64, 0.33, 0.29, 0.6, 0.15, 0.06, 0.3333, 0.3333],
 ];
 
-/// How far from them colours look the same.
+/// Largest difference of colours that look the same.
 const ALIKE: f64 = 0.002;
 
 /// Colours other than those of sRGB, as the header of a picture states them.

@@ -11,7 +11,7 @@ pub struct Reduction {
     height: usize,
     /// Rows that have come in.
     rows: usize,
-    /// Of every incoming channel: where it goes, if it is wanted.
+    /// Destination of every incoming channel, if it is wanted.
     wanted: Vec<Option<usize>>,
     /// Sums of the boxes that are open, channel after channel.
     sums: Vec<Vec<f64>>,
@@ -19,8 +19,8 @@ pub struct Reduction {
 }
 
 impl Reduction {
-    /// Of a picture with the channels `names`, of which `wanted` are kept, by the least
-    /// factor with which at most `most` pixels are left.
+    /// Reduces a picture with the channels `names`, of which `wanted` are kept, by the least factor
+    /// with which at most `most` pixels are left.
     pub fn new(width: usize, height: usize, names: &[&str], wanted: &[&str], most: usize) -> Self {
         let pixels = |factor: usize| width.div_ceil(factor) * height.div_ceil(factor);
         let factor = (1..width.max(height)).find(|f| pixels(*f) <= most);

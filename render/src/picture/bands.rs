@@ -19,7 +19,7 @@ pub(super) struct Band {
     pub index: usize,
     /// Row by row, of each channel; intensities in the raster's unit.
     pub channels: Vec<Vec<f32>>,
-    /// In the scene's unit.
+    /// Tally in the scene's unit.
     pub tally: Tally,
 }
 

@@ -23,7 +23,7 @@ pub struct ChannelKind {
     pub meaning: &'static str,
     /// Tests whether a scene has it, with pixels refined or not.
     pub(super) present: Present,
-    /// How it is taken from a pixel.
+    /// Source of its values in a pixel.
     value: Value,
     /// True if pictures have it only where `screen.channels` names it or its layer.
     pub on_request: bool,
@@ -31,7 +31,7 @@ pub struct ChannelKind {
     pub(super) scales: bool,
 }
 
-/// How a channel is taken from a pixel: from its light and its central ray, or from what is kept besides.
+/// Source of a channel in a pixel: its light and its central ray, or what is kept besides.
 #[derive(Clone, Copy)]
 enum Value {
     Pixel(fn(&Pixel) -> f64),

@@ -99,7 +99,7 @@ impl Film {
         self.raster.legend()
     }
 
-    /// Where a frame is taken from: see [`Raster::camera`].
+    /// Returns the camera of a frame: see [`Raster::camera`].
     ///
     /// # Errors
     /// If the camera is impossible there.

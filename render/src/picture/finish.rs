@@ -1,4 +1,4 @@
-//! From bands to files.
+//! Last pass: from bands to files.
 
 use super::bands::{Band, render_bands};
 use super::journal::AnyJournal;
@@ -120,7 +120,7 @@ impl Raster {
         Ok(())
     }
 
-    /// From the raster's unit of intensity to that of the file, which is `factor` times the scene's.
+    /// Converts from the raster's unit of intensity to that of the file, which is `factor` times the scene's.
     pub(super) fn rescale(&self, channels: &mut [Vec<f32>], factor: f64) {
         let factor = factor / self.unit;
         if factor == 1.0 {

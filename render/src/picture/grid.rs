@@ -1,4 +1,4 @@
-//! Where rays go.
+//! Grid of rays.
 
 use crate::scene::Scene;
 

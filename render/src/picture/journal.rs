@@ -18,7 +18,7 @@ pub struct Journal<F: ?Sized> {
     /// picture is never taken for one of this.
     salt: u32,
     records: Vec<Option<Record>>,
-    /// Where the next record goes.
+    /// Place of the next record.
     end: u64,
     file: F,
 }

@@ -1,6 +1,6 @@
-//! From a scene to a picture: bands of rows, tile by tile on all cores, kept in a journal until
-//! the whole picture is there. Every pixel is computed on its own, so the picture depends
-//! neither on the number of threads nor on the size of tiles nor on interruptions.
+//! Pictures of scenes: bands of rows, tile by tile on all cores, kept in a journal until the whole picture is there.
+//! Every pixel is computed on its own, so the picture depends neither on the number of threads nor on the size of tiles
+//! nor on interruptions.
 
 mod adaptive;
 mod bands;
@@ -43,7 +43,7 @@ use tally::{Tally, own_unit};
 /// Told how many more rows of pixels are done; returns whether to go on.
 pub type Progress<'a> = dyn Fn(usize) -> bool + Sync + 'a;
 
-/// Why there is no picture.
+/// Reason why there is no picture.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
@@ -186,8 +186,8 @@ impl Raster {
         Ok(scratch.meter)
     }
 
-    /// About how many rays photon rings take besides those of the regular grid, what hides them left out
-    /// of account: counted in up to 256 rows.
+    /// Returns about the number of rays that photon rings take besides those of the regular grid, what hides them left
+    /// out of account: counted in up to 256 rows.
     pub fn ring_rays(&self) -> u64 {
         let every = self.grid.height.div_ceil(256);
         self.rings.as_ref().map_or(0, |rings| rings.rays(&self.grid, every))

@@ -35,7 +35,7 @@ pub(super) struct Pixels {
 }
 
 impl Pixels {
-    /// Without anything besides.
+    /// Takes pixels without other layers.
     pub fn plain(pixels: Vec<Pixel>) -> Self {
         Pixels { pixels, layers: Vec::new() }
     }

@@ -1,4 +1,4 @@
-//! Where a picture is taken from, for other programs: matrices in flat space.
+//! Placement of the camera, for other programs: matrices in flat space.
 
 use super::Raster;
 use super::grid::Grid;
@@ -11,7 +11,7 @@ use kerrlight_geodesic::{Camera, Observer, View};
 /// Range of distances of a camera's view, in M.
 const DEPTHS: [f64; 2] = [0.1, 1e5];
 
-/// Where a view is in flat space: its place (M), and its axes to the right, up and back.
+/// Placement of a view in flat space: its place (M), and its axes to the right, up and back.
 struct Placement {
     place: [f64; 3],
     axes: [[f64; 3]; 3],
@@ -43,7 +43,7 @@ impl Placement {
         Placement { place, axes: [right, up, forward.map(|x| -x)] }
     }
 
-    /// From the world to the camera's coordinates, for row vectors.
+    /// Returns the matrix from the world to the camera's coordinates, for row vectors.
     fn world_to_camera(&self) -> [[f64; 4]; 4] {
         let row = |k: usize| [self.axes[0][k], self.axes[1][k], self.axes[2][k], 0.0];
         let [x, y, z] = self.axes.map(|axis| -dot(axis, self.place));
@@ -51,7 +51,8 @@ impl Placement {
     }
 }
 
-/// From the camera's coordinates to normalised device coordinates, for row vectors: in perspective, or orthographic.
+/// Returns the matrix from the camera's coordinates to normalised device coordinates, for row vectors: in perspective, or
+/// orthographic.
 fn projection([width, height]: [f64; 2], perspective: bool) -> [[f64; 4]; 4] {
     let ([near, far], [x, y]) = (DEPTHS, [2.0 / width, 2.0 / height]);
     let depth = far - near;
@@ -83,8 +84,8 @@ fn matrices(view: &View, size: [f64; 2]) -> CameraMatrices {
 }
 
 impl Raster {
-    /// Where the picture is taken from, in the flat space of the coordinates r n: an observer's screen is orthographic, at
-    /// the observer's radius or at 1000 M; a camera's motion does not count.
+    /// Returns the camera, in the flat space of the coordinates r n: an observer's screen is orthographic, at the
+    /// observer's radius or at 1000 M; a camera's motion does not count.
     pub fn camera(&self) -> CameraMatrices {
         let size = [self.grid.width, self.grid.height].map(|pixels| pixels as f64 * self.grid.size);
         matrices(self.prepared.view(), size)

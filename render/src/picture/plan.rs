@@ -9,7 +9,7 @@ use kerrlight_geodesic::Method;
 /// A line of a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Step {
-    /// Whose cost it is part of.
+    /// Part of the plan that its cost belongs to.
     pub part: Part,
     /// Effect or quantity that is computed, or not.
     pub what: String,
@@ -177,7 +177,7 @@ impl Plan {
     }
 }
 
-/// How rays are traced.
+/// Describes how rays are traced.
 fn how(prepared: &PreparedScene) -> &'static str {
     let (tracer, request) = (prepared.tracer(), prepared.request());
     if !prepared.has_lensing() {

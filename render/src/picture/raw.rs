@@ -23,7 +23,7 @@ impl Raw {
         self.tally.unresolved
     }
 
-    /// Of bands in their order.
+    /// Joins bands in their order.
     fn of(bands: Vec<Band>, channels: usize, pixels: usize) -> Self {
         let tally = bands.iter().map(|band| band.tally).fold(Tally::default(), Tally::plus);
         let mut values = vec![Vec::with_capacity(pixels); channels];

@@ -32,8 +32,8 @@ impl Tally {
         }
     }
 
-    /// Of the pixels of a band, row by row; `side`² rays a pixel on a regular grid, or
-    /// none where every pixel knows its error.
+    /// Adds up the pixels of a band, row by row; `side`² rays a pixel on a regular grid, or none where
+    /// every pixel knows its error.
     pub fn of_band(pixels: &[Pixel], width: usize, side: Option<usize>) -> Self {
         let mut tally = Tally::default();
         for pixel in pixels {
@@ -81,11 +81,11 @@ impl Tally {
 /// Sum over pixels of the error of their means, estimated from second differences D between
 /// neighbours (one-sided at the edges of the band).
 ///
-/// With one ray at its centre a pixel of a smooth picture is off by (D_xx + D_yy)/24; one with an
-/// edge somewhere in it by up to half the edge's height, a quarter on average, where
-/// |D_xx| + |D_yy| is one to two heights. Hence (|D_xx| + |D_yy|)/8. `side`² rays see edges
-/// in `side` of their cells, whose errors are independent: a factor `side`^(−3/2). Where photon rings are
-/// resolved the rays along them know the error.
+/// Returns the sampling error. With one ray at its centre a pixel of a smooth picture is off by (D_xx +
+/// D_yy)/24; one with an edge somewhere in it by up to half the edge's height, a quarter on average, where
+/// |D_xx| + |D_yy| is one to two heights. Hence (|D_xx| + |D_yy|)/8. `side`² rays see edges in `side` of
+/// their cells, whose errors are independent: a factor `side`^(−3/2). Where photon rings are resolved the
+/// rays along them know the error.
 fn sampling_error(pixels: &[Pixel], width: usize, side: usize) -> f64 {
     let rows = pixels.len() / width.max(1);
     let second = |k: usize, count: usize, at: &dyn Fn(usize) -> f64| {
@@ -148,7 +148,7 @@ impl Summary {
         if factor.is_normal() { Ok(factor) } else { Err(tally.intensity) }
     }
 
-    /// From the sums over all pixels of a scene's picture that is scaled by `factor`.
+    /// Takes the sums over all pixels of a scene's picture that is scaled by `factor`.
     pub(super) fn new(scene: &Scene, tally: &Tally, factor: f64) -> Result<Self, Error> {
         let largest = tally.largest * factor;
         if !(largest as f32).is_finite() {
@@ -188,8 +188,8 @@ fn pixel_angle(scene: &Scene) -> Option<f64> {
     scene.camera.as_ref().map_or_else(|| scene.hole.angle_uas(), |_| Some(1.0 / MICROARCSECOND))
 }
 
-/// Of a pixel, in µas²; a camera's in the middle of the picture. In M² where the hole's angular size is not
-/// known, which a scene with a flux in Jy never leaves out.
+/// Returns the area of a pixel, in µas²; a camera's in the middle of the picture. In M² where the hole's
+/// angular size is not known, which a scene with a flux in Jy never leaves out.
 fn pixel_area(scene: &Scene) -> f64 {
     (scene.pixel_size() * pixel_angle(scene).unwrap_or(1.0)).powi(2)
 }

@@ -56,7 +56,7 @@ impl Workspace {
         Ok(&self.seen)
     }
 
-    /// How many rays there are.
+    /// Returns the number of rays.
     pub fn len(&self) -> usize {
         self.alpha.len()
     }

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MagneticField {
-    /// Along +z: cos θ e_r − sin θ e_θ.
+    /// Component along +z: cos θ e_r − sin θ e_θ.
     pub vertical: f64,
     /// Away from the hole, e_r.
     pub radial: f64,

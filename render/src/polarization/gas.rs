@@ -1,4 +1,4 @@
-//! How the gas moves that radiates.
+//! Motion of the gas that radiates.
 
 use kerrlight_geodesic::vector::dot;
 use kerrlight_geodesic::{Kerr, PathPoint, ZamoFrame, orbits};

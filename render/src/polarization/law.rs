@@ -16,7 +16,7 @@ pub enum Components {
     Orthonormal,
 }
 
-/// Whose the components of a field are.
+/// Frame of the components of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FieldFrame {
@@ -42,7 +42,7 @@ pub enum Normalisation {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MixedField {
-    /// Along +z.
+    /// Component along +z.
     #[schemars(range(min = -1e12, max = 1e12), extend("unit" = "a share of the field"))]
     pub vertical: f64,
     /// Away from the hole.
@@ -56,8 +56,8 @@ pub struct MixedField {
     pub radial_sine_power: f64,
 }
 
-/// How much light gas gives off, and how it is polarised: I ∝ g^a |b|^c sin^s θ_B per unit of emission, a linearly
-/// polarised part Π with the electric vector along k × b, and no V.
+/// Law of the light of gas, and of its polarisation: I ∝ g^a |b|^c sin^s θ_B per unit of emission, a linearly polarised
+/// part Π with the electric vector along k × b, and no V.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PolarizationLaw {
@@ -65,7 +65,7 @@ pub struct PolarizationLaw {
     pub field: MixedField,
     /// Directions of the components.
     pub components: Components,
-    /// Whose components they are.
+    /// Frame of the components.
     pub frame: FieldFrame,
     /// Exponent of g: 2 + spectral index in the textbook.
     #[schemars(range(min = -20.0, max = 20.0), extend("unit" = "an exponent"))]

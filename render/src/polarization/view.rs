@@ -3,7 +3,7 @@
 use super::{Gas, MagneticField};
 use kerrlight_geodesic::{Kerr, ScreenPoint, ZamoFrame};
 
-/// How gas and field at a point look along the ray that reaches the screen.
+/// View of gas and field at a point along the ray that reaches the screen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SynchrotronView {
     /// g = ν_obs/ν_em, dimensionless.
@@ -27,9 +27,9 @@ pub struct SynchrotronView {
 /// components of `frame` ([`ZamoFrame::covariant`], [`Gas`]). `None` where the photon has no
 /// positive energy in the gas frame or something is not finite.
 ///
-/// In the gas frame the electric vector is along k × B. On the screen it is normal to the
-/// parallel-transported projection of B, h = b + (k·b)/ω u with ω = −k·u, a vector normal to k of
-/// length |B| sin θ_B: no cross product is needed.
+/// Returns the view. In the gas frame the electric vector is along k × B. On the screen it is
+/// normal to the parallel-transported projection of B, h = b + (k·b)/ω u with ω = −k·u, a vector
+/// normal to k of length |B| sin θ_B: no cross product is needed.
 #[inline]
 pub fn view(
     frame: &ZamoFrame,

@@ -87,15 +87,15 @@ pose_table! {
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum CameraMotion {
-    /// At rest with respect to infinity.
+    /// Rest with respect to infinity.
     Static,
-    /// Without angular momentum.
+    /// No angular momentum.
     Zamo,
-    /// On the circular geodesic of its radius.
+    /// Circular geodesic of its radius.
     Keplerian,
     /// Falling from rest at infinity.
     FreeFall,
-    /// As the keyframes lead it.
+    /// Motion along the keyframes.
     Path,
 }
 

@@ -5,7 +5,7 @@ use kerrlight_common::toml_file::ReadError;
 use kerrlight_common::toml_file::{OutOfRange, shown};
 use toml_edit::{Document, Item};
 
-/// Why a scene text is not a scene.
+/// Reason why a text is not a scene.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
@@ -29,7 +29,7 @@ pub enum SceneError {
     Missing {
         /// Dotted path of the key.
         key: String,
-        /// Why it is needed.
+        /// Reason why it is needed.
         why: String,
     },
     /// An override that cannot be applied.

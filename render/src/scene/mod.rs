@@ -66,7 +66,7 @@ static KEYS: LazyLock<Keys> = LazyLock::new(Keys::of::<Scene>);
 pub struct Scene {
     /// The black hole.
     pub hole: Hole,
-    /// Where the scene is seen from, and when.
+    /// Place and time of the observer.
     #[serde(default)]
     pub observer: ObserverConfig,
     /// A camera in place of the observer, except its time, and of the field of view of the screen.
@@ -77,7 +77,7 @@ pub struct Scene {
     /// Effects that are simulated. What is off is not computed.
     #[serde(default)]
     pub effects: Effects,
-    /// How rays are traced.
+    /// Method by which rays are traced.
     pub tracer: TracerConfig,
     /// A thin disc in the equatorial plane with the flux profile of Page & Thorne (1974).
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -131,7 +131,7 @@ impl Hole {
     }
 }
 
-/// Where the scene is seen from, and when.
+/// Place and time of the observer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ObserverConfig {
@@ -219,7 +219,7 @@ fn one() -> u32 {
     1
 }
 
-/// How images of higher order, next to the critical curve, are sampled.
+/// Sampling of images of higher order, next to the critical curve.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rings {
@@ -230,7 +230,7 @@ pub enum Rings {
     RegularGrid,
 }
 
-/// Which effects are simulated. What is off is not computed.
+/// Effects that are simulated. What is off is not computed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Effects {
@@ -300,7 +300,7 @@ impl Effects {
     }
 }
 
-/// How rays are traced.
+/// Method by which rays are traced.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TracerConfig {

@@ -1,4 +1,4 @@
-//! How the matter of a volume moves.
+//! Motion of the matter of a volume.
 
 use super::invalid::Invalid;
 use crate::Error;
@@ -9,11 +9,11 @@ use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// How matter moves about an axis ξ: a name, or a law with numbers.
+/// Motion of matter about an axis ξ: a name, or a law with numbers.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Rotation {
-    /// At rest in Boyer–Lindquist coordinates.
+    /// Rest in Boyer–Lindquist coordinates.
     None,
     /// 1/(r^{3/2} + a ξ_z).
     Keplerian,
@@ -25,7 +25,7 @@ pub enum Rotation {
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Word {
-    /// At rest.
+    /// Rest.
     None,
     /// Ω = 1/(r^{3/2} + a ξ_z).
     Keplerian,
@@ -86,7 +86,7 @@ impl<'de> Visitor<'de> for WordOrLaw {
 }
 
 impl Rotation {
-    /// About `axis` through `hole`; `None` if nothing turns.
+    /// Returns the motion about `axis` through `hole`; `None` if nothing turns.
     ///
     /// # Errors
     /// Names the number that is out of its range.

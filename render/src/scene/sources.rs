@@ -19,7 +19,7 @@ pub struct Gas {
     pub flatness: f64,
     /// Motion of the gas.
     pub motion: GasMotion,
-    /// At density 1 and the observed frequency, erg s⁻¹ cm⁻³ Hz⁻¹ sr⁻¹; scales as ν^−α.
+    /// Emissivity at density 1 and the observed frequency, erg s⁻¹ cm⁻³ Hz⁻¹ sr⁻¹; scales as ν^−α.
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "erg s⁻¹ cm⁻³ Hz⁻¹ sr⁻¹"))]
     pub emissivity: f64,
     /// Absorption coefficient, cm⁻¹, over the emissivity; scales as ν^(−5/2 − α).
@@ -35,7 +35,7 @@ pub struct Gas {
     pub color: [f32; 3],
 }
 
-/// How the density of a gas falls with x = r/scale.
+/// Profile of the density of a gas with x = r/scale.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
@@ -50,19 +50,18 @@ pub enum GasProfile {
     },
 }
 
-/// How a gas moves.
+/// Motion of a gas.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum GasMotion {
-    /// On circles with −u_φ/u_t = l₀ R^{3/2}/(1 + R), R = r sin θ, down to the horizon.
+    /// Circles with −u_φ/u_t = l₀ R^{3/2}/(1 + R), R = r sin θ, down to the horizon.
     AngularMomentum {
         /// l₀.
         #[schemars(range(min = -10.0, max = 10.0), extend("unit" = "M"))]
         l0: f64,
     },
-    /// On circles about +z with Ω = 1/(R^{3/2} + a), R = r sin θ; dark where that is not slower
-    /// than light.
+    /// Circles about +z with Ω = 1/(R^{3/2} + a), R = r sin θ; dark where that is not slower than light.
     Keplerian,
     /// Falling from rest at infinity without angular momentum.
     FreeFall,
@@ -186,14 +185,14 @@ pub struct Mesh {
     pub velocity: Option<MeshVelocity>,
 }
 
-/// How the matter of a mesh moves, for its redshift: the surface itself stays where it is.
+/// Motion of the matter of a mesh, for its redshift: the surface itself stays where it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum MeshVelocity {
-    /// At rest in Boyer–Lindquist coordinates.
+    /// Rest in Boyer–Lindquist coordinates.
     Static,
-    /// About +z with Ω(r) = 1/(r^{3/2} + a).
+    /// Rotation about +z with Ω(r) = 1/(r^{3/2} + a).
     Keplerian,
 }
 
@@ -250,7 +249,7 @@ pub(super) fn with_own_names(mut scene: toml::Table) -> toml::Table {
     scene
 }
 
-/// Where a volume shines: r_min ≤ r < r_max, |z| ≤ z_width, as the region of a fit.
+/// Region in which a volume shines: r_min ≤ r < r_max, |z| ≤ z_width, as the region of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VolumeRegion {

@@ -1,4 +1,4 @@
-//! How far a piece of a curved ray can lie from its chord: a proven bound.
+//! Largest distance of a piece of a curved ray from its chord: a proven bound.
 //!
 //! With w = 1/r, the direction n on the unit sphere less its frame dragging, and Mino time τ,
 //! the backward ray obeys
@@ -46,7 +46,7 @@ pub struct ChordBound {
     inverse_impact: f64,
 }
 
-/// Below this Δ/r² a piece winds around the hole so much that its chord says nothing.
+/// Least Δ/r²: below it a piece winds around the hole so much that its chord says nothing.
 const NEXT_TO_HORIZON: f64 = 0.02;
 
 /// Errors of positions on a path, in units of the tracer's tolerance for a local error.

@@ -80,7 +80,7 @@ impl Mixed {
     }
 }
 
-/// Where light comes from.
+/// Origin of light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Origin {
     /// Number of the source: see [`Numbering`].
@@ -98,8 +98,8 @@ pub(crate) struct Layers {
     pub origin: Option<Origin>,
     /// The direction in which it escapes, if it does.
     pub exit: Option<[f64; 3]>,
-    /// Of the central ray of a pixel: path length up to its origin (M), motion of the origin's image (pixels to the
-    /// right and up per M), and the solid angle (sr) of the sky that the pixel covers.
+    /// Path length of the central ray of a pixel up to its origin (M), motion of the origin's image (pixels to the right
+    /// and up per M), and the solid angle (sr) of the sky that the pixel covers.
     pub depth: Option<f64>,
     /// See `depth`.
     pub motion: [f64; 2],
@@ -108,7 +108,7 @@ pub(crate) struct Layers {
 }
 
 impl Layers {
-    /// Of a ray with emission of some intensity, which lets a share of light from behind it `through`.
+    /// Makes the layers of a ray with emission of some intensity, which lets a share of light from behind it `through`.
     pub(super) fn of(ray: &TracedRay, record: &Record, (intensity, through): (f64, f32)) -> Self {
         let whole = ray.surface.is_none() && ray.until >= ray.mino_total;
         let is_open = whole && ray.outcome == Outcome::Escaped;
@@ -142,7 +142,7 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// Of a ray whose images change at `cuts`.
+    /// Starts a ray whose images change at `cuts`.
     pub fn new(cuts: [f64; ORDERS - 1]) -> Self {
         Record { cuts, orders: Default::default(), sky: [0.0; 3], origin: None }
     }
@@ -179,7 +179,7 @@ pub(super) struct Numbering {
 pub(super) const HOLE: u32 = 1;
 
 impl Numbering {
-    /// Of a scene.
+    /// Takes the settings of a scene.
     pub fn new(scene: &Scene) -> Self {
         let disc = HOLE + 1;
         let media = disc + u32::from(scene.disc.is_some());

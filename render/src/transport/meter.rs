@@ -1,4 +1,4 @@
-//! Where the time of a picture goes.
+//! Meter of the time that a picture takes.
 
 use crate::emission::medium::Part;
 use std::time::{Duration, Instant};
@@ -23,7 +23,7 @@ impl Meter {
         self.spent[part as usize]
     }
 
-    /// From now on time is spent on a part.
+    /// Starts to count time for a part.
     #[inline]
     pub(super) fn switch(&mut self, part: Part) {
         if self.on {
@@ -32,7 +32,7 @@ impl Meter {
         }
     }
 
-    /// From now on time is spent on nothing here.
+    /// Stops counting time.
     pub(super) fn stop(&mut self) {
         if let Some((part, since)) = self.current.take() {
             self.spent[part as usize] += since.elapsed();

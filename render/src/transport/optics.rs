@@ -29,7 +29,7 @@ pub(super) struct Optics {
 }
 
 impl Optics {
-    /// When the light that is seen at `time` passed a point.
+    /// Returns the time at which the light that is seen at `time` passed a point.
     pub fn emission_time(&self, time: f64, point: &PathPoint) -> f64 {
         if self.slow_light { time - point.delay } else { time }
     }

@@ -17,7 +17,7 @@ pub(super) struct Polarization {
 }
 
 impl Polarization {
-    /// That of a scene, if it is simulated.
+    /// Takes the polarisation of a scene, if it is simulated.
     pub fn new(scene: &Scene) -> Result<Option<Self>, Error> {
         let effects = &scene.effects;
         let (Some(field), true) = (scene.magnetic_field, effects.polarization) else {
@@ -40,7 +40,7 @@ impl Polarization {
 pub(super) struct PolarizedRay<'a> {
     pub hole: &'a Kerr,
     pub polarization: &'a Polarization,
-    /// Where it arrives.
+    /// Place of arrival.
     pub screen: ScreenPoint,
     /// λ = L/E, in M.
     pub lambda: f64,

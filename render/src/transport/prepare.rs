@@ -1,4 +1,4 @@
-//! From a scene to everything that can be computed before any ray.
+//! Preparation of a scene: everything that can be computed before any ray.
 
 use super::layers::{Numbering, Wanted};
 use super::optics::Optics;

@@ -5,7 +5,7 @@ use crate::emission::medium::Emission;
 use kerrlight_geodesic::legendre;
 use kerrlight_geodesic::simd::{PanelRule, RayNodes};
 
-/// Beyond this optical depth nothing is seen.
+/// Optical depth beyond which nothing is seen.
 const DARK: f64 = 45.0;
 
 /// A quadrature rule with what sums over its panels need.
@@ -67,7 +67,7 @@ impl Quadrature {
         whole - before.clamp(0.0, whole)
     }
 
-    /// Where in a panel, from 0 to 1, a Mino time lies: linear between the nodes and beyond them.
+    /// Returns the place in a panel, from 0 to 1, of a Mino time: linear between the nodes and beyond them.
     fn place(&self, times: &[f64], cut: f64) -> f64 {
         let last = times.len() - 1;
         let k = times.partition_point(|time| *time < cut).clamp(1, last);

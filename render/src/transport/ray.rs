@@ -38,7 +38,7 @@ pub struct Scratch {
     pub(super) rays: RayBlock,
     pub(super) sources: SourceScratch,
     pub(super) central: CentralScratch,
-    /// Where the time goes; off unless it is replaced.
+    /// Meter of time; off unless it is replaced.
     pub meter: Meter,
 }
 
@@ -50,7 +50,7 @@ pub(super) struct SourceScratch {
     spots: SpotScratch,
     /// Mino times from which on light of each ray is of the next image; empty unless images are kept apart.
     cuts: Vec<[f64; 2]>,
-    /// Where the beam of the present ray ends on the sky.
+    /// End of the beam of the present ray on the sky.
     beam: Option<footprint::Sky>,
 }
 
@@ -148,7 +148,7 @@ pub(super) struct Sum<'a> {
     pub sources: &'a mut SourceScratch,
     pub meter: &'a mut Meter,
     seen: &'a mut [RayResult],
-    /// As many, or none.
+    /// Other layers: as many, or none.
     layers: &'a mut [Layers],
 }
 

@@ -15,8 +15,8 @@ pub struct RayResult {
     pub redshift: f64,
     /// Number of crossings of the equatorial plane outside the horizon, along the whole ray.
     pub crossings: u32,
-    /// Which crossings of the equatorial plane are on the disc and seen: bit n for number n, counted
-    /// from 0 (bit 15 for all from there on), and bit 16 + n where its matter plunges.
+    /// Crossings of the equatorial plane that are on the disc and seen: bit n for number n, counted from 0 (bit 15 for all
+    /// from there on), and bit 16 + n where its matter plunges.
     pub disc_images: u32,
     /// Radius in M of the brightest contribution; 0 where there is none.
     pub radius: f64,
@@ -30,25 +30,25 @@ pub struct RayResult {
     pub optical_depth: f64,
     /// Outcome of the ray.
     pub outcome: Outcome,
-    /// Where it passes the disc.
+    /// Passage by the disc.
     pub(crate) passes: Passes,
 }
 
 /// Crossings of the equatorial plane of which is known where they pass the disc.
 pub(super) const PASSES: usize = 4;
 
-/// Where a ray passes the disc: what lies between two rays neither of which meets it.
+/// Passage of a ray by the disc: what lies between two rays neither of which meets it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Passes {
     /// 1/r of each crossing, from 0 at the outer edge to 1 at the inner one; that of infinity or of the horizon where the
     /// ray ends before, 0 where it is not known or hidden.
     pub places: [f32; PASSES],
-    /// How many crossings there are.
+    /// Number of crossings.
     pub count: u32,
 }
 
 impl Passes {
-    /// Which crossings pass inside and outside the disc: two bits each.
+    /// Returns the crossings that pass inside and outside the disc: two bits each.
     pub fn sides(&self) -> u8 {
         let side = |place: f32| u8::from(place < 0.0) + 2 * u8::from(place > 1.0);
         self.places.iter().fold(0, |sides, place| sides << 2 | side(*place))
@@ -223,7 +223,7 @@ pub(super) struct Light {
     pub error: f64,
 }
 
-/// Where light comes from; zeros where it has not been asked.
+/// Origin of light; zeros where it has not been asked.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Place {
     pub radius: f64,
@@ -251,7 +251,7 @@ impl Place {
     }
 }
 
-/// Into \[−π, π\].
+/// Wraps into \[−π, π\].
 pub(super) fn wrap(angle: f64) -> f64 {
     use core::f64::consts::{PI, TAU};
     if angle.abs() <= PI {

@@ -203,7 +203,7 @@ pub struct Walk<'a> {
     pub tree: &'a Tree,
     /// The ray's path.
     pub path: &'a Path,
-    /// How far it can be from its chords.
+    /// Largest distance from its chords.
     pub bound: &'a ChordBound,
     /// Pieces are halved until they are at most this many times as long as the smallest box.
     pub longest: f64,

@@ -39,7 +39,7 @@ impl Feature {
     }
 }
 
-/// How often a truth lies within standard deviations of the mean.
+/// Share of truths that lie within standard deviations of the mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coverage {
     /// Nodes that were looked at.
@@ -56,7 +56,7 @@ const FAINT: f64 = 0.25;
 const EDGE: f64 = 0.3;
 
 impl Ensemble {
-    /// Of two volumes or more.
+    /// Takes two volumes or more.
     ///
     /// # Errors
     /// If their nodes differ, or there are fewer.
@@ -91,7 +91,7 @@ impl Ensemble {
         Volume::new(self.mean.nodes(), self.mean.low(), self.mean.high(), values)
     }
 
-    /// How often a truth lies within the intervals, at the nodes that are wanted.
+    /// Returns the share of truths within the intervals, at the nodes that are wanted.
     ///
     /// # Errors
     /// If its nodes are others.

@@ -13,7 +13,7 @@ pub struct VolumeArrays {
     axis: Option<[f64; 3]>,
 }
 
-/// Why a file holds no volume.
+/// Reason why a file holds no volume.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VolumeFileError {
@@ -49,7 +49,7 @@ fn finite(nodes: [usize; 3], values: &[f64]) -> std::result::Result<Vec<f32>, St
     }
 }
 
-/// Where the k-th value of an array in C's order stands.
+/// Returns the node of the k-th value of an array in C's order.
 fn node(k: usize, nodes: [usize; 3]) -> (usize, usize, usize) {
     (k / (nodes[1] * nodes[2]), k / nodes[2] % nodes[1], k % nodes[2])
 }
@@ -209,7 +209,7 @@ mod tests {
     use super::*;
     use kerrlight_common::numpy::{write_archive, write_array};
 
-    /// As a file of this name is read.
+    /// Reads a file of this name.
     fn read(name: &str, bytes: &[u8], source: &VolumeSource) -> Result<VolumeFile> {
         if name.ends_with(".npz") {
             VolumeArrays::from_npz(bytes)?.placed(source)

@@ -1,4 +1,4 @@
-//! How close an estimate comes to the truth.
+//! Distance of an estimate from the truth.
 //!
 //! An empty estimate of a few small spots already has a large signal-to-noise ratio, because most nodes
 //! are dark: beside it stand the same inside a mask, the relative error and the correlation.
@@ -6,7 +6,7 @@
 use super::Volume;
 use crate::Error;
 
-/// Where an estimate is compared: r_min ≤ r ≤ r_max and |z| ≤ z_width, in M.
+/// Region in which an estimate is compared: r_min ≤ r ≤ r_max and |z| ≤ z_width, in M.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mask {
     r_min: f64,
@@ -46,11 +46,11 @@ impl Mask {
     "{field} = {first:?} and {second:?} differ: volumes can be compared only on the same nodes"
 )]
 pub struct Mismatch {
-    /// Which property differs: `nodes`, `low` or `high`.
+    /// Property that differs: `nodes`, `low` or `high`.
     pub field: &'static str,
-    /// That of the first volume: a count of nodes, or M.
+    /// Value of the first volume: a count of nodes, or M.
     pub first: [f64; 3],
-    /// That of the other one, in the same unit.
+    /// Value of the other one, in the same unit.
     pub second: [f64; 3],
 }
 
@@ -80,7 +80,7 @@ pub struct Comparison {
     /// scale and offset (ρ_NX of Event Horizon Telescope Collaboration 2019, ApJL 875, L4). None if either is
     /// constant.
     pub correlation: Option<f64>,
-    /// How many nodes were compared.
+    /// Number of nodes that were compared.
     pub nodes: usize,
 }
 

@@ -59,22 +59,22 @@ pub struct VolumeFile {
     pub axis: Option<[f64; 3]>,
 }
 
-/// Why there is no such volume.
+/// Reason why there is no such volume.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VolumeError {
-    /// As many values as nodes are needed.
+    /// There are not as many values as nodes.
     #[error("{found} values are not allowed: {wanted} are needed, one per node")]
     Length {
-        /// How many there are.
+        /// Number of values.
         found: usize,
-        /// How many there should be.
+        /// Number of nodes.
         wanted: usize,
     },
     /// A value that is not a finite number.
     #[error("value = {value} of node ({}, {}, {}) is not allowed: finite", node[0], node[1], node[2])]
     Value {
-        /// Which node, counted from 0 along x, y and z.
+        /// Index of the node, counted from 0 along x, y and z.
         node: [usize; 3],
         /// Its value.
         value: f32,
@@ -168,7 +168,7 @@ impl Volume {
         (0..self.values.len()).map(move |k| self.values[index(k)])
     }
 
-    /// Where node number k is, M.
+    /// Returns the place of node number k, M.
     pub fn position(&self, k: usize) -> [f64; 3] {
         let indices = self.indices(k);
         core::array::from_fn(|axis| {

@@ -1,4 +1,4 @@
-//! How close estimates at several times come to the truth.
+//! Distance of estimates at several times from the truth.
 
 use super::Volume;
 use super::metrics::same_nodes;

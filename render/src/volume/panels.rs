@@ -8,7 +8,7 @@ use image::RgbImage;
 /// A volume and what it is called on pictures.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown<'a> {
-    /// For instance `recovered`.
+    /// Name, for instance `recovered`.
     pub name: &'a str,
     /// Its emission.
     pub volume: &'a Volume,
@@ -121,7 +121,7 @@ impl Panel {
     }
 }
 
-/// Where between two ends a number is.
+/// Returns the place of a number between two ends.
 fn part([low, high]: [f64; 2], value: f64) -> f64 {
     (value - low) / (high - low)
 }

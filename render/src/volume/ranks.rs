@@ -1,4 +1,4 @@
-//! Where truths lie among draws: uniformly, if the draws are those of the posterior (Talts et al. 2018).
+//! Ranks of truths among draws: uniform, if the draws are those of the posterior (Talts et al. 2018).
 
 use super::Volume;
 use super::metrics::same_nodes;
@@ -11,13 +11,13 @@ pub const BINS: usize = 10;
 /// Ranks of true values among draws of them, each as a part of all places, 0 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ranks {
-    /// How many values.
+    /// Number of values.
     pub count: usize,
     /// Part of them within the middle 68 % of the draws.
     pub within_68: f64,
     /// Part of them within the middle 95 %.
     pub within_95: f64,
-    /// How many have a rank in each tenth.
+    /// Numbers of ranks in each tenth.
     pub histogram: [usize; BINS],
 }
 
@@ -34,7 +34,7 @@ pub fn rank(truth: f64, draws: impl Iterator<Item = f64>, random: &mut impl Rng)
 }
 
 impl Ranks {
-    /// Of some ranks.
+    /// Counts some ranks.
     pub fn of(ranks: impl Iterator<Item = f64>) -> Self {
         let mut all = Self::default();
         for rank in ranks {
@@ -49,7 +49,7 @@ impl Ranks {
         all
     }
 
-    /// Of a truth among draws of it, at the nodes that are wanted.
+    /// Returns the ranks of a truth among draws of it, at the nodes that are wanted.
     ///
     /// # Errors
     /// If nodes differ.

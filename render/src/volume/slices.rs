@@ -17,7 +17,7 @@ pub enum Through {
 }
 
 impl Through {
-    /// Where that is in a volume, M; an empty volume has its middle for all of them.
+    /// Returns the point in a volume, M; an empty volume has its middle for all of them.
     pub fn point(self, volume: &Volume) -> [f64; 3] {
         let middle = core::array::from_fn(|k| 0.5 * (volume.low[k] + volume.high[k]));
         match self {

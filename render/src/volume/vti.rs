@@ -17,7 +17,7 @@ pub struct Field<'a> {
     pub volume: &'a Volume,
 }
 
-/// Why a file is not written.
+/// Reason why a file is not written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VtiError {

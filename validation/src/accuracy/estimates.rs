@@ -25,15 +25,15 @@ pub enum Class {
     NearCritical,
     /// The same from an observer at 20 M.
     NearCriticalFrom20,
-    /// From an observer at 6 M.
+    /// Observer at 6 M.
     From6,
-    /// From an observer at 20 M.
+    /// Observer at 20 M.
     From20,
-    /// From an observer at 1000 M.
+    /// Observer at 1000 M.
     From1000,
-    /// From an observer at 10 M, a relative 1e-10 to 0.1 inside the ray that turns there.
+    /// Observer at 10 M; rays a relative 1e-10 to 0.1 inside the one that turns there.
     Tangential,
-    /// From 1e-10 to 0.1 rad off the axis.
+    /// Inclination of 1e-10 to 0.1 rad off the axis.
     NearAxis,
     /// Impact parameters of 1e2 to 1e6 M.
     Far,
@@ -153,7 +153,7 @@ fn beside_edge(
     Ok([b * x, b * y])
 }
 
-/// Which points of a ray are judged.
+/// Points of a ray that are judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum At {
     /// 20 samples equidistant in Mino time.
@@ -175,7 +175,7 @@ pub fn settings() -> Vec<(Integrator, f64)> {
 /// One quantity of one row.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Held {
-    /// How many rays had an error beyond their estimate.
+    /// Number of rays with an error beyond their estimate.
     pub beyond: usize,
     /// Largest error over its estimate.
     pub worst: f64,
@@ -190,7 +190,7 @@ pub struct Held {
 pub struct Row {
     /// Class of rays.
     pub class: Class,
-    /// Which points.
+    /// Points that are judged.
     pub at: At,
     /// Integrator.
     pub integrator: Integrator,
@@ -205,9 +205,9 @@ pub struct Row {
 }
 
 impl Row {
-    /// As a row of a table: rays, those that come out wrong, and of r, θ, φ and delay the rays
-    /// beyond their estimate, the largest error over its estimate, the median estimate over
-    /// error, and the largest error.
+    /// Returns a row of a table: rays, those that come out wrong, and of r, θ, φ and delay the rays
+    /// beyond their estimate, the largest error over its estimate, the median estimate over error,
+    /// and the largest error.
     pub fn line(&self) -> String {
         let at = if self.at == At::Samples { "samples" } else { "crossings" };
         let setting = format!("{} {:.0e}", self.integrator.name(), self.tolerance);

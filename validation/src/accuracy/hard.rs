@@ -44,19 +44,19 @@ impl Kind {
 pub struct Tally {
     /// The kind.
     pub kind: Kind,
-    /// How many rays.
+    /// Number of rays.
     pub rays: u64,
-    /// How many were captured, and how many escaped.
+    /// Numbers of rays that were captured, and that escaped.
     pub fates: [u64; 2],
-    /// How many were given up on a photon orbit, and how many at the step limit.
+    /// Numbers of rays that were given up on a photon orbit, and at the step limit.
     pub unresolved: [u64; 2],
-    /// How many had another fate than the oracle says.
+    /// Number of rays with another fate than the oracle's.
     pub wrong_fates: u64,
-    /// How many had another number of equatorial crossings.
+    /// Number of rays with another number of equatorial crossings.
     pub wrong_crossings: u64,
-    /// How many had a number that is not one, or an infinite one.
+    /// Number of rays with a number that is not one, or an infinite one.
     pub not_finite: u64,
-    /// How many positions were within their estimates of r, θ and φ, delay included.
+    /// Number of positions within their estimates of r, θ and φ, delay included.
     pub bounded: u64,
     /// Largest error over its estimate, and the ray it belongs to.
     pub worst: Option<(f64, Draw)>,
@@ -140,7 +140,7 @@ pub fn run(
         .try_reduce(nothing, |a, b| Ok(add(a, &b)))
 }
 
-/// Of no rays.
+/// Tallies of no rays.
 fn nothing() -> Vec<Tally> {
     Kind::ALL.map(Tally::new).to_vec()
 }

@@ -16,13 +16,13 @@ pub struct Oracle {
 /// True errors of a position.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TrueError {
-    /// Of the radius, relative.
+    /// Error of the radius, relative.
     pub radius: f64,
-    /// Of the polar angle, in radians.
+    /// Error of the polar angle, in radians.
     pub theta: f64,
-    /// Of the azimuth, in radians; whole turns do not count.
+    /// Error of the azimuth, in radians; whole turns do not count.
     pub azimuth: f64,
-    /// Of the delay, in M.
+    /// Error of the delay, in M.
     pub delay: f64,
 }
 

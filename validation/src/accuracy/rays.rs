@@ -12,11 +12,11 @@ pub enum Class {
     Generic,
     /// A relative 1e-14 to 0.1 beside the critical curve.
     NearCritical,
-    /// From an inclination 1e-10 to 0.1 rad off the axis.
+    /// Inclination 1e-10 to 0.1 rad off the axis.
     NearPolar,
     /// Captured, and looked at inside 1.2 horizon radii.
     NearHorizon,
-    /// With impact parameters of 1e2 to 1e6 M.
+    /// Impact parameters of 1e2 to 1e6 M.
     Far,
 }
 
@@ -45,14 +45,14 @@ impl Class {
 /// An angle as it was given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Angle {
-    /// In radians.
+    /// Radians.
     Radians(f64),
-    /// In degrees, where 0, 90 and 180 are exact.
+    /// Degrees, where 0, 90 and 180 are exact.
     Degrees(f64),
 }
 
 impl Angle {
-    /// As an inclination.
+    /// Returns the inclination.
     ///
     /// # Errors
     /// If it is out of range.

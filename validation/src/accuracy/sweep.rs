@@ -52,9 +52,9 @@ pub struct Row {
     pub spin: Option<f64>,
     /// Class of rays.
     pub class: Class,
-    /// How many rays.
+    /// Number of rays.
     pub rays: usize,
-    /// How many of them had another fate than the truth; they are left out of the errors.
+    /// Number of rays with another fate than the truth; they are left out of the errors.
     pub wrong_fates: usize,
     /// Median, 99 % quantile and maximum over rays of the largest error of a position: of r
     /// (relative), θ and φ (radians), at the samples of each ray.

@@ -10,7 +10,7 @@ pub use text::{parse, to_text};
 use super::Complex64;
 use crate::Error;
 
-/// Why there is no array, or it is not fit for use.
+/// Reason why there is no array, or why it is not fit for use.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ArrayError {
@@ -44,7 +44,7 @@ pub enum ArrayError {
 /// AIPS numbers the antennas of a baseline in 8 bits, 11 in its long form.
 pub const MOST_STATIONS: usize = 2047;
 
-/// How a feed turns on the sky: φ = parallactic·χ + elevation·el + offset.
+/// Rotation of a feed on the sky: φ = parallactic·χ + elevation·el + offset.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FeedRotation {
     /// Factor on the parallactic angle.
@@ -56,7 +56,7 @@ pub struct FeedRotation {
 }
 
 impl FeedRotation {
-    /// Of its three numbers; `None` for three zeros, with which files and tables say that they do not know.
+    /// Takes its three numbers; `None` for three zeros, with which files and tables say that they do not know.
     pub fn told([parallactic, elevation, offset_deg]: [f64; 3]) -> Option<Self> {
         let rotation = Self { parallactic, elevation, offset_deg };
         (rotation != Self::default()).then_some(rotation)
@@ -81,7 +81,7 @@ pub struct Station {
     /// Least and greatest elevation in degrees at which it observes, where it has limits of its
     /// own.
     pub elevation_deg: Option<[f64; 2]>,
-    /// As a file has it ([`feed_rotation`](super::polarimetry::feed_rotation) knows more).
+    /// Rotation of its feed in its file ([`feed_rotation`](super::polarimetry::feed_rotation) knows more).
     pub feed_rotation: Option<FeedRotation>,
     /// Leakage terms of the R and L feeds; carried along for files; simulations draw their own.
     pub leakage: [Complex64; 2],

@@ -31,8 +31,8 @@ struct Scan<T> {
 }
 
 impl<T: Float> ClosureTerm<T> {
-    /// Of an observation's Stokes I: in every scan a largest set of independent quantities, from
-    /// baselines stronger than `least_snr` times their noise.
+    /// Takes an observation's Stokes I: in every scan a largest set of independent quantities, from baselines stronger
+    /// than `least_snr` times their noise.
     ///
     /// # Errors
     /// If there are none.
@@ -154,8 +154,9 @@ impl<T: Float> DataTerm<T> for ClosureTerm<T> {
         Some(Comparison::Closures { kind, visibilities, scans })
     }
 
-    /// Where a visibility of the model is 0 its phase and logarithm mean nothing: the residual is then π, or 100 for a
-    /// logarithm, so that a dark model is worse than one that shines, and the gradient leaves that quantity out.
+    /// Returns χ² and its gradient. Where a visibility of the model is 0 its phase and logarithm mean nothing: the
+    /// residual is then π, or 100 for a logarithm, so that a dark model is worse than one that shines, and the
+    /// gradient leaves that quantity out.
     fn value_and_gradient(
         &self,
         model: &[Complex<T>],

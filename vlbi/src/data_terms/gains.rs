@@ -15,7 +15,8 @@ use num_complex::Complex;
 /// χ² = min over gains of Σ |g₁ ḡ₂ V − D|²/σ² + Σ (ln|g|/s)²: variable projection (Golub & Pereyra 1973). By the envelope
 /// theorem its gradient is that with the gains held. The data are those of one scan.
 ///
-/// Of amplitudes it is Σ (|g₁ g₂ V| − A)²/σ² + Σ (ln|g|/s)² with debiased A.
+/// Data term of visibilities or amplitudes with free gains. For amplitudes it is Σ (|g₁ g₂ V| − A)²/σ² + Σ (ln|g|/s)²
+/// with debiased A.
 #[derive(Debug, Clone)]
 pub struct GainTerm {
     problem: GainProblem,
@@ -28,7 +29,7 @@ pub struct GainTerm {
 }
 
 impl GainTerm {
-    /// Of the Stokes I of a scan, in its order; `priors` are those of all stations of the observation.
+    /// Takes the Stokes I of a scan, in its order; `priors` are those of all stations of the observation.
     ///
     /// # Errors
     /// If there are no data, or an error is not positive.
@@ -37,7 +38,7 @@ impl GainTerm {
         Self::new(observation, priors, data, false)
     }
 
-    /// Of their amplitudes, which gains' phases do not change.
+    /// Takes the amplitudes of a scan, which gains' phases do not change.
     ///
     /// # Errors
     /// As for [`visibilities`](Self::visibilities).

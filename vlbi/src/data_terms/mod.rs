@@ -1,5 +1,5 @@
-//! How far model visibilities are from data: χ² and its gradient. A data term sees visibilities,
-//! never images; an [`Operator`](super::operator::Operator) carries the gradient on.
+//! Distance of model visibilities from data: χ² and its gradient. A data term sees visibilities, never images; an
+//! [`Operator`](super::operator::Operator) carries the gradient on.
 
 mod closures;
 mod comparison;
@@ -20,14 +20,14 @@ use super::operator::Float;
 use core::f64::consts::{PI, TAU};
 use num_complex::Complex;
 
-/// Why data make no term.
+/// Reason why data make no term.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DataTermError {
     /// A datum with an error of 0, infinity, or so small that its weight is none in single precision.
     #[error("data point {index}: sigma = {sigma} Jy is not allowed: above 0 and finite")]
     Sigma {
-        /// Which datum, counted from 0.
+        /// Index of the datum, counted from 0.
         index: usize,
         /// Its error.
         sigma: f64,
@@ -37,7 +37,7 @@ pub enum DataTermError {
         "data point {index}: sigma = {sigma} Jy is not allowed: its inverse square overflows single precision"
     )]
     Overflow {
-        /// Which datum, counted from 0.
+        /// Index of the datum, counted from 0.
         index: usize,
         /// Its error.
         sigma: f64,
@@ -76,10 +76,10 @@ fn wrapped<T: Float>(angle: T) -> T {
 
 /// A χ² of model visibilities.
 pub trait DataTerm<T: Float>: Sync {
-    /// How many visibilities it expects.
+    /// Returns the number of visibilities that it expects.
     fn visibilities(&self) -> usize;
 
-    /// How many real data it compares with: χ² of the true model has this mean.
+    /// Returns the number of real data it compares with: χ² of the true model has this mean.
     fn degrees_of_freedom(&self) -> usize;
 
     /// Returns whether χ² stays the same when all visibilities are multiplied by one positive number: such data do not

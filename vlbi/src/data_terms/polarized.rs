@@ -45,7 +45,7 @@ impl Compared {
 type Response = [Complex64; MODELLED];
 
 impl PolarizedTerm {
-    /// Of the products of a scan; `gains` are priors of all stations of the observation, `leakage` has a pair for each.
+    /// Takes the products of a scan; `gains` are priors of all stations of the observation, `leakage` has a pair for each.
     ///
     /// # Errors
     /// If there are no data, an error is not positive, or leakage is asked of Stokes parameters or of an observation that

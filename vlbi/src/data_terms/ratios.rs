@@ -13,9 +13,9 @@ use num_complex::Complex;
 ///
 /// χ² = Σ min over I of |I − I_data|²/σ²(I) + Σ |m I − P_data|²/σ²(P), P = Q̃ ± iŨ.
 ///
-/// That is Σ |m I_data − P_data|²/(σ²(P) + |m|² σ²(I)) where one P was measured. No quotient of noisy numbers is formed:
-/// errors stay Gaussian however weak I is. Gains that both hands of a station share cancel in m. Visibilities of the model are I
-/// of all rows, then Q, then U.
+/// Data term of polarimetric ratios: Σ |m I_data − P_data|²/(σ²(P) + |m|² σ²(I)) where one P was measured. No quotient of noisy
+/// numbers is formed: errors stay Gaussian however weak I is. Gains that both hands of a station share cancel in m.
+/// Visibilities of the model are I of all rows, then Q, then U.
 pub struct RatioTerm {
     baselines: Vec<Baseline>,
 }
@@ -29,7 +29,7 @@ struct Baseline {
 }
 
 impl RatioTerm {
-    /// Of the baselines of a scan whose Stokes I is stronger than `least_snr` times its noise.
+    /// Takes the baselines of a scan whose Stokes I is stronger than `least_snr` times its noise.
     ///
     /// # Errors
     /// If there is none, or one has an error that is not above 0 and finite.

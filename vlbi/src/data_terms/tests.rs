@@ -37,7 +37,7 @@ fn terms<T: Float>(data: &Observation) -> Vec<(&'static str, Box<dyn DataTerm<T>
     ]
 }
 
-/// Why there is no term of some data.
+/// Returns the reason why there is no term of some data.
 fn refusal<T>(term: Result<T, Error>) -> DataTermError {
     match term.err() {
         Some(Error::DataTerm(error)) => error,
@@ -73,8 +73,8 @@ fn exact_gradients_in_both_precisions() {
     }
 }
 
-/// From the pixels of a movie, through the Fourier transform, to every term; the data are off by
-/// up to 20 %, so that no closure phase comes near ±π.
+/// Gradients are right from the pixels of a movie, through the Fourier transform, to every term; the data are off by up to 20
+/// %, so that no closure phase comes near ±π.
 #[test]
 fn exact_gradients_with_respect_to_pixels() {
     let mut data = observation(1, 5.0);

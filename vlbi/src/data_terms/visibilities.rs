@@ -16,7 +16,7 @@ pub struct VisibilityTerm<T> {
 }
 
 impl<T: Float> VisibilityTerm<T> {
-    /// Of the Stokes I of an observation, in its order.
+    /// Takes the Stokes I of an observation, in its order.
     ///
     /// # Errors
     /// If there are none, or an error is not positive.
@@ -91,7 +91,7 @@ pub struct AmplitudeTerm<T> {
 }
 
 impl<T: Float> AmplitudeTerm<T> {
-    /// Of the Stokes I of an observation, in its order.
+    /// Takes the Stokes I of an observation, in its order.
     ///
     /// # Errors
     /// If there are none, or an error is not positive.
@@ -121,7 +121,7 @@ impl<T: Float> DataTerm<T> for AmplitudeTerm<T> {
         ))
     }
 
-    /// At V = 0, where |V| has a kink, the gradient is 0.
+    /// Returns χ² and its gradient. At V = 0, where |V| has a kink, the gradient is 0.
     fn value_and_gradient(
         &self,
         model: &[Complex<T>],

@@ -10,7 +10,7 @@ pub use sidereal::{Moment, gmst_hours, hours_utc_of_gmst};
 pub use ut1::{Ut1, ut1_minus_utc};
 pub use view::{Frame, SourcePosition, View};
 
-/// Why the Earth's attitude is not known.
+/// Reason why the Earth's attitude is not known.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EarthError {

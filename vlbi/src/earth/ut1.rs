@@ -6,7 +6,7 @@ use super::leap_seconds::tai_minus_utc;
 use crate::Error;
 use std::sync::OnceLock;
 
-/// Where UT1 − UTC comes from.
+/// Source of UT1 − UTC.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Ut1 {
     /// The built-in table.

@@ -6,7 +6,7 @@ use core::f64::consts::PI;
 use kerrlight_common::units::SPEED_OF_LIGHT;
 use kerrlight_geodesic::vector::dot;
 
-/// Where a source is: catalogue coordinates (ICRS, J2000).
+/// Position of a source: catalogue coordinates (ICRS, J2000).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SourcePosition {
     /// Right ascension in hours, in \[0, 24).
@@ -40,11 +40,11 @@ impl SourcePosition {
     }
 }
 
-/// How the Earth's attitude is taken.
+/// Earth-orientation model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Frame {
-    /// As eht-imaging does: catalogue coordinates as if they were of date, mean sidereal time.
+    /// Catalogue coordinates as if they were of date, and mean sidereal time, as eht-imaging has it.
     #[default]
     Catalogue,
     /// Precession and nutation to date (IAU 2006/2000A) and the annual aberration, u and v along east

@@ -5,7 +5,7 @@ use crate::Error;
 use crate::observation::{MissingMetadata, Observation};
 use core::fmt::Write;
 
-/// How columns are set.
+/// Columns of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum EhtTable {

@@ -7,13 +7,13 @@ use crate::operator::ImageGrid;
 /// Names of Stokes parameters, in the order of their numbers in FITS (1 to 4).
 pub const STOKES: [&str; 4] = ["I", "Q", "U", "V"];
 
-/// Where pixels are, and what.
+/// Position of pixels, and their Stokes parameters.
 pub struct Place {
     /// The grid, its middle being the phase centre.
     pub grid: ImageGrid,
     /// True if columns run from east to west.
     pub east_to_west: bool,
-    /// Which of [`STOKES`] each plane is; none where the header does not say.
+    /// Index in [`STOKES`] of each plane; none where the header does not say.
     pub stokes: Option<Vec<usize>>,
 }
 

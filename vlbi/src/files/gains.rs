@@ -65,7 +65,7 @@ pub fn parse(text: &str) -> Result<GainTable, Error> {
     Ok(GainTable { gains })
 }
 
-/// Where each of [`COLUMNS`] is.
+/// Place of each of [`COLUMNS`].
 type Places = [Option<usize>; COLUMNS.len()];
 
 fn heading(cells: &[&str]) -> Result<Places, String> {

@@ -28,11 +28,11 @@ pub struct Pixels {
     pub polarized: [Option<Vec<f64>>; 3],
     /// Width of the field in µas, where the file tells.
     pub field_uas: Option<f64>,
-    /// When the images show the source.
+    /// Times of the images.
     pub times: OwnTimes,
 }
 
-/// When the images of a file show the source, as far as it tells.
+/// Times of the images of a file, as far as it tells.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub enum OwnTimes {
     /// It does not tell.
@@ -260,7 +260,7 @@ pub struct MovieWriter<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> MovieWriter<W> {
-    /// Of images of `side` × `side` pixels, into this file.
+    /// Writes images of `side` × `side` pixels into this file.
     pub fn new(out: W, side: usize) -> Self {
         Self { archive: ArchiveWriter::new(out), side }
     }

@@ -16,7 +16,7 @@ const JULIAN: f64 = 2_400_000.5;
 /// Columns that are looked at.
 const MOST_COLUMNS: usize = 64;
 
-/// Where times are, and what they are.
+/// Place of times, and their unit.
 #[derive(Clone, Copy)]
 struct TimeColumn {
     at: usize,
@@ -24,9 +24,9 @@ struct TimeColumn {
     days: bool,
 }
 
-/// Where the columns are.
+/// Places of the columns.
 struct Heading {
-    /// How many there are in all.
+    /// Number in all.
     count: usize,
     time: TimeColumn,
     values: [Option<usize>; 4],

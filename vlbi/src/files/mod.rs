@@ -33,11 +33,11 @@ use super::observation::{MissingMetadata, Observation};
 use crate::Error;
 use std::collections::HashMap;
 
-/// Why a file cannot be read, or data not be written.
+/// Reason why a file cannot be read, or data not be written.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {
-    /// At a line of a text.
+    /// An error at a line of a text.
     #[error("line {line}: {message}")]
     Line {
         /// Counted from 1.
@@ -45,7 +45,7 @@ pub enum FileError {
         /// Reason for the refusal.
         message: String,
     },
-    /// At a byte of a binary file.
+    /// An error at a byte of a binary file.
     #[error("byte {offset}: {message}")]
     Byte {
         /// Counted from 0.
@@ -53,7 +53,7 @@ pub enum FileError {
         /// Reason for the refusal.
         message: String,
     },
-    /// With the file as a whole.
+    /// An error of the file as a whole.
     #[error("{0}")]
     Whole(String),
     /// The data lack what the format needs.
@@ -187,7 +187,7 @@ impl Names {
     }
 }
 
-/// How many rows a text may hold: as many as lines, which are 16 bytes at least.
+/// Returns the largest number of rows that a text may hold: as many as lines, which are 16 bytes at least.
 fn rows_at_most(text: &str) -> usize {
     text.lines().count().min(text.len() / 16)
 }
@@ -224,7 +224,7 @@ fn sigma(cell: &str, name: &str) -> Result<f64, String> {
     Ok(value)
 }
 
-/// At most 20 characters of a cell.
+/// Returns at most 20 characters of a cell.
 fn shortened(cell: &str) -> String {
     cell.chars().take(20).collect()
 }

@@ -30,9 +30,9 @@ fn cells(line: &str) -> Vec<&str> {
     }
 }
 
-/// Where the eight columns are, and whether visibilities are polar.
+/// Places of the eight columns, and whether visibilities are polar.
 struct Heading {
-    /// How many there are in all.
+    /// Number in all.
     count: usize,
     columns: [usize; 8],
     polar: bool,

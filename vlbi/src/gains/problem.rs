@@ -18,7 +18,7 @@ pub struct GainProblem {
     weight: Vec<f64>,
     /// 1/s² of ln|g|, 0 where it is fixed.
     precision: Vec<f64>,
-    /// Which of ln|g| of all stations, then arg g of all, are fixed.
+    /// Fixed ones among ln|g| of all stations, then arg g of all.
     is_fixed: Vec<bool>,
 }
 
@@ -70,7 +70,7 @@ const SWEEPS: usize = 12;
 const ENOUGH: f64 = 1e-13;
 
 impl GainProblem {
-    /// Of visibilities of a scan with the variances of their parts, on baselines of `priors`' stations.
+    /// Takes visibilities of a scan with the variances of their parts, on baselines of `priors`' stations.
     ///
     /// # Panics
     /// If the numbers of baselines, data and variances differ, or a baseline has no station.
@@ -248,8 +248,8 @@ fn shifted(mut bends: DMatrix<f64>, part: f64) -> DMatrix<f64> {
     bends
 }
 
-/// Of each set of stations that baselines connect, the one with the strongest data: its phase is 0, as data know only
-/// differences.
+/// Returns for each set of stations that baselines connect the one with the strongest data: its phase is 0, as data know
+/// only differences.
 fn references(n: usize, pairs: &[[usize; 2]], data: &[Complex64], weight: &[f64]) -> Vec<bool> {
     let mut set: Vec<usize> = (0..n).collect();
     let mut strength = vec![0.0; n];

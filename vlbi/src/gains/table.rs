@@ -9,7 +9,7 @@ use std::collections::HashMap;
 pub struct StationGain {
     /// Hours of UTC since 0 h of the observation's day.
     pub time_h: f64,
-    /// For how long it holds, seconds: half of it before that time, half after.
+    /// Duration for which it holds, seconds: half of it before that time, half after.
     pub span_s: f64,
     /// Name of the station.
     pub station: String,
@@ -22,7 +22,7 @@ pub struct StationGain {
 /// Gains of stations over time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct GainTable {
-    /// In order of time.
+    /// Gains in order of time.
     pub gains: Vec<StationGain>,
 }
 
@@ -77,7 +77,7 @@ impl GainsByStation<'_> {
 /// Times closer than this many seconds are one.
 const SAME_S: f64 = 0.5;
 
-/// How far gains are from true ones, apart from what no data know: one factor on all amplitudes, which the flux takes up,
+/// Distance of gains from true ones, apart from what no data know: one factor on all amplitudes, which the flux takes up,
 /// and a phase that all stations of a time share.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GainDistance {
@@ -92,7 +92,7 @@ pub struct GainDistance {
 }
 
 impl GainTable {
-    /// How far these gains are from true ones; none if no gain is in both.
+    /// Returns the distance of these gains from true ones; none if no gain is in both.
     pub fn distance(&self, truth: &GainTable) -> Option<GainDistance> {
         let truth: HashMap<(u64, &str), Complex64> = truth
             .gains

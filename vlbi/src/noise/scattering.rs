@@ -14,7 +14,7 @@ use kerrlight_common::units::{MICROARCSECOND, SPEED_OF_LIGHT};
 /// D grows as |b|^α. Between them, D is the closed form of these papers along each axis. Refraction is left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScatteringKernel {
-    /// Along the major axis, and along the minor axis.
+    /// Kernels along the major axis, and along the minor axis.
     axes: [Axis; 2],
     /// Position angle of the major axis in degrees east of north.
     position_angle_deg: f64,
@@ -28,7 +28,7 @@ pub struct ScatteringKernel {
 struct Axis {
     /// Full width at half maximum in µas at 1 cm, of the Gaussian on short baselines.
     fwhm_uas: f64,
-    /// How soon D bends, dimensionless: D ∝ (1 + bend (b/inner)²)^(α/2) − 1.
+    /// Bend of D, dimensionless: D ∝ (1 + bend (b/inner)²)^(α/2) − 1.
     bend: f64,
 }
 

@@ -5,7 +5,7 @@ use super::{Basis, Measured, Observation, Row};
 use crate::Complex64;
 use std::collections::BTreeMap;
 
-/// How rows are averaged over time.
+/// Averaging of rows over time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Averaging {
     /// Length of an interval in seconds; with `in_scans` it may be infinite: whole scans.
@@ -221,7 +221,7 @@ mod tests {
         assert!(rows[0].noise_sigma[1].is_nan());
     }
 
-    /// Of two scans, whose baselines were measured in different parts of them.
+    /// Tests two scans, whose baselines were measured in different parts of them.
     #[test]
     fn exact_one_time_a_scan() {
         let i = Measured { visibility: Complex64::new(1.0, 0.0), noise_sigma: 0.1 };

@@ -40,7 +40,7 @@ pub struct Row {
     pub noise_sigma: [f64; 4],
     /// Zenith opacities at the stations, dimensionless; 0 where a file does not tell.
     pub opacity: [f32; 2],
-    /// Which of [`Observation::channels`]; 0 where there are none.
+    /// Index in [`Observation::channels`]; 0 where there are none.
     pub channel: u16,
 }
 
@@ -139,7 +139,7 @@ impl Row {
 pub struct Observation {
     /// Name of the source.
     pub source: String,
-    /// Where it is.
+    /// Position.
     pub position: Option<SourcePosition>,
     /// Modified Julian date whose 0 h UTC the rows' times count from.
     pub mjd: Option<i32>,
@@ -156,7 +156,7 @@ pub struct Observation {
     pub stations: Vec<Station>,
     /// The measurements.
     pub rows: Vec<Row>,
-    /// How the data came about, in lines of text.
+    /// History of the data, in lines of text.
     pub history: Vec<String>,
 }
 

@@ -8,9 +8,9 @@ use std::collections::HashMap;
 /// Rows that have the baseline, the channel and the time of an earlier one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Repeats {
-    /// How many.
+    /// Number of rows.
     pub rows: usize,
-    /// How many of them are copies of an earlier one, to the last bit.
+    /// Number of copies of an earlier one among them, to the last bit.
     pub copies: usize,
 }
 
@@ -18,7 +18,7 @@ pub struct Repeats {
 type Place = (u64, [u16; 2], u16);
 
 impl Observation {
-    /// How many rows repeat the baseline, channel and time of another.
+    /// Counts the rows that repeat the baseline, channel and time of another.
     pub fn repeats(&self) -> Repeats {
         let Some(groups) = self.groups() else { return Repeats::default() };
         let kept: usize = groups.iter().map(|rows| distinct(rows).len()).sum();

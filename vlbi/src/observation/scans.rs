@@ -32,7 +32,7 @@ fn starts_h(rows: &[Row]) -> Vec<f64> {
 }
 
 impl Observation {
-    /// How many scans there are, told by gaps of a minute.
+    /// Returns the number of scans, told by gaps of a minute.
     pub fn scans(&self) -> usize {
         starts_h(&self.rows).len()
     }
@@ -41,7 +41,7 @@ impl Observation {
 /// The intervals of an average.
 pub(super) struct Intervals {
     averaging: Averaging,
-    /// Of the scans, where intervals belong to scans.
+    /// Starts of the scans, where intervals belong to scans.
     starts_h: Vec<f64>,
 }
 

@@ -21,7 +21,7 @@ pub struct Flags {
 pub struct Selection {
     /// The rest.
     pub observation: Observation,
-    /// How many rows were thrown away.
+    /// Number of rows that were thrown away.
     pub dropped: usize,
 }
 

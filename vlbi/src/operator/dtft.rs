@@ -1,10 +1,10 @@
 //! The direct Fourier transform to any (u, v):
 //! V(u, v) = p(u, v) Σ I(l, m) exp(2πi(u l + v m)), p the transform of a pixel.
 //!
-//! On a grid the exponential is a product of one of the column and one of the row, so that a
-//! block of n visibilities is a matrix product, A = I·X with X(column, k) = p exp(2πi u_k l), and a
-//! sum over rows, V_k = Σ exp(2πi v_k m) A(row, k): as exact as the sum over pixels, and what is
-//! kept are 2(w + h) numbers a visibility instead of 2wh.
+//! Direct Fourier transforms. On a grid the exponential is a product of one of the column and one
+//! of the row, so that a block of n visibilities is a matrix product, A = I·X with X(column, k) = p
+//! exp(2πi u_k l), and a sum over rows, V_k = Σ exp(2πi v_k m) A(row, k): as exact as the sum over
+//! pixels, and what is kept are 2(w + h) numbers a visibility instead of 2wh.
 
 use super::{Float, ImageGrid, Operator, Pulse};
 use core::f64::consts::TAU;
@@ -30,7 +30,7 @@ struct Factors<T> {
 /// A block of visibilities of one frame.
 struct Block<T> {
     uv: Vec<[f64; 2]>,
-    /// Where they are among the data.
+    /// Range among the data.
     data: Range<usize>,
     factors: Option<Factors<T>>,
 }
@@ -75,7 +75,7 @@ impl<T: Float> Dtft<T> {
         operator
     }
 
-    /// Where pixels are, what they look like, and the (u, v) of all data.
+    /// Returns the grid of pixels, their shape, and the (u, v) of all data.
     pub fn baselines(&self) -> (ImageGrid, Pulse, Vec<[f64; 2]>) {
         let uv = self.blocks.iter().flat_map(|block| block.uv.iter().copied()).collect();
         (self.grid, self.pulse, uv)

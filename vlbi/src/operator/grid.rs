@@ -1,4 +1,4 @@
-//! Where pixels are on the sky, and what a pixel looks like.
+//! Grid of pixels on the sky, and their shape.
 
 use crate::Error;
 use core::f64::consts::PI;

@@ -51,7 +51,7 @@ pub trait Operator<T: Float>: Sync {
     /// Pixels of an image.
     fn pixels(&self) -> usize;
 
-    /// How many data.
+    /// Returns the number of data.
     fn data(&self) -> usize;
 
     /// data = F movie; what was in `data` is overwritten.
@@ -60,7 +60,7 @@ pub trait Operator<T: Float>: Sync {
     /// movie += Fᵀ data, the adjoint under the inner products Σ x y of movies and Re Σ x̄ y of
     /// data.
     ///
-    /// With the gradient of a function of the data, defined by df = Re Σ ḡ dV, this adds its
-    /// gradient with respect to the pixels.
+    /// Adds the gradient with respect to the pixels of a function of the data, from that with respect
+    /// to the data, defined by df = Re Σ ḡ dV.
     fn adjoint(&self, data: &[Complex<T>], movie: &mut [T]);
 }

@@ -5,7 +5,7 @@ use super::{Dtft, Float, ImageGrid, Nufft, Operator, Pulse};
 use crate::Error;
 use num_complex::Complex;
 
-/// Which Fourier transform.
+/// Method of the Fourier transform.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Method {
@@ -21,7 +21,7 @@ pub enum Method {
 pub enum Transform<T> {
     /// The sum over pixels.
     Direct(Dtft<T>),
-    /// By way of a fast transform.
+    /// Fast transform.
     Fast(Nufft),
 }
 
@@ -49,7 +49,7 @@ impl<T: Float> Transform<T> {
         }
     }
 
-    /// Which one it is, in words.
+    /// Names it, in words.
     pub fn describe(&self) -> String {
         match self {
             Transform::Direct(_) => "direct transform".to_owned(),
@@ -59,7 +59,7 @@ impl<T: Float> Transform<T> {
         }
     }
 
-    /// Where pixels are, what they look like, and the (u, v) of all data, where sums over pixels are direct.
+    /// Returns the grid of pixels, their shape, and the (u, v) of all data, where sums over pixels are direct.
     pub fn direct(&self) -> Option<(ImageGrid, Pulse, Vec<[f64; 2]>)> {
         match self {
             Transform::Direct(direct) => Some(direct.baselines()),

@@ -1,4 +1,4 @@
-//! How feeds turn on the sky: φ = f_par·ψ + f_el·el + offset, with the parallactic angle ψ and the elevation.
+//! Rotation of feeds on the sky: φ = f_par·ψ + f_el·el + offset, with the parallactic angle ψ and the elevation.
 
 use crate::Complex64;
 use crate::Error;
@@ -9,14 +9,14 @@ use crate::observation::{MissingMetadata, Observation};
 /// Stations of 2017: EHT Collaboration 2021, ApJL 910, L12, table 1.
 const FEEDS: &str = include_str!("feeds.csv");
 
-/// How the feeds of a station turn: what its file says; where that is nothing, as published for the stations of 2017, or
-/// with the parallactic angle.
+/// Returns the rotation of the feeds of a station: what its file says; where that is nothing, as published for the
+/// stations of 2017, or with the parallactic angle.
 pub fn feed_rotation(station: &Station) -> FeedRotation {
     let with_sky = FeedRotation { parallactic: 1.0, ..FeedRotation::default() };
     station.feed_rotation.or_else(|| published_rotation(&station.name)).unwrap_or(with_sky)
 }
 
-/// How the feeds of a station of 2017 turn, as published; `None` of other names.
+/// Returns the rotation of the feeds of a station of 2017, as published; `None` of other names.
 pub fn published_rotation(name: &str) -> Option<FeedRotation> {
     let lines = FEEDS.lines().filter(|line| !line.starts_with('#'));
     lines.filter_map(|line| known(line, name)).next()

@@ -8,7 +8,7 @@ use std::sync::{Arc, PoisonError, RwLock};
 /// d_R and d_L of each station of an observation.
 pub type Leakage = Vec<[Complex64; 2]>;
 
-/// Of a station: rows and columns are R and L.
+/// Jones matrix of a station: rows and columns are R and L.
 pub type Matrix = [[Complex64; 2]; 2];
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
@@ -76,12 +76,12 @@ impl SharedLeakage {
         Self(Arc::new(RwLock::new(vec![[ZERO; 2]; stations])))
     }
 
-    /// As it is now.
+    /// Returns the present value.
     pub fn get(&self) -> Leakage {
         self.0.read().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// From now on.
+    /// Sets the value from now on.
     pub fn set(&self, leakage: Leakage) {
         *self.0.write().unwrap_or_else(PoisonError::into_inner) = leakage;
     }

@@ -14,7 +14,7 @@ pub struct LeakageDatum {
     pub stations: [usize; 2],
     /// e^{2iφ} of their feeds.
     pub turns: [Complex64; 2],
-    /// Which of RR, LL, RL, LR.
+    /// Index of the product among RR, LL, RL, LR.
     pub product: usize,
     /// Measured value, Jy.
     pub value: Complex64,
@@ -54,7 +54,7 @@ const STEPS: usize = 40;
 /// Steps that promise less than this part of χ² + 1 are the last ones.
 const ENOUGH: f64 = 1e-13;
 
-/// About some leakage: slopes and second derivatives of ½χ².
+/// Slopes and second derivatives of ½χ² about some leakage.
 struct Local {
     slope: DVector<f64>,
     bends: DMatrix<f64>,
@@ -156,7 +156,7 @@ impl LeakageProblem {
     }
 }
 
-/// Where the real part of a d is among all numbers; the imaginary part is behind it.
+/// Returns the index of the real part of a d among all numbers; the imaginary part is behind it.
 fn number([station, hand]: [usize; 2]) -> usize {
     4 * station + 2 * hand
 }

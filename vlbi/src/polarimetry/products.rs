@@ -7,7 +7,7 @@ use crate::observation::{Basis, Measured, Observation, Row};
 pub struct Product {
     /// The row among those that have any product.
     pub row: usize,
-    /// Which of the four of the [`Basis`].
+    /// Index of the product among the four of the [`Basis`].
     pub product: usize,
 }
 
@@ -23,7 +23,7 @@ pub struct Products {
 }
 
 impl Products {
-    /// Of an observation; products that were not measured are left out, and Stokes V is.
+    /// Takes an observation; products that were not measured are left out, and Stokes V is.
     pub fn of(observation: &Observation) -> Self {
         let known = match observation.basis {
             Basis::Circular => 0..4,

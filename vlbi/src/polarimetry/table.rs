@@ -23,11 +23,11 @@ pub struct StationLeakage {
 /// Leakage of all stations that observe.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LeakageTable {
-    /// In the order of the observation.
+    /// Leakage of the stations, in the order of the observation.
     pub stations: Vec<StationLeakage>,
 }
 
-/// How far leakage is from the true one.
+/// Distance of leakage from the true one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeakageDistance {
     /// Root mean square of |d − d_true|.
@@ -41,7 +41,7 @@ pub struct LeakageDistance {
 }
 
 impl LeakageTable {
-    /// Of stations for which `observes` holds.
+    /// Takes the stations for which `observes` holds.
     pub fn new(
         stations: &[Station],
         leakage: &Leakage,
@@ -93,7 +93,7 @@ impl LeakageTable {
         Ok(before - observation.rows.len())
     }
 
-    /// How far this leakage is from the true one; none if no station is in both.
+    /// Returns the distance of this leakage from the true one; none if no station is in both.
     pub fn distance(&self, truth: &Self) -> Option<LeakageDistance> {
         let pairs = self.stations.iter().filter_map(|s| Some((s.terms, truth.of(&s.station)?)));
         let all: Vec<(Complex64, Complex64)> =

@@ -73,11 +73,11 @@ struct Candidate<const N: usize> {
 }
 
 impl ClosureSet {
-    /// For every scan of an observation (rows of the same time and channel) a largest set of independent
-    /// closure quantities, chosen with the least noisy first, so that weak baselines are in as few
-    /// of them as possible. Visibility indices count rows that have Stokes I, in the order of
-    /// [`Observation::stokes_i`]. Baselines weaker than `least_snr` times their noise are left
-    /// out, and those without error. Rows that repeat a baseline of their scan make sets of their own.
+    /// Returns for every scan of an observation (rows of the same time and channel) a largest set of independent
+    /// closure quantities, chosen with the least noisy first, so that weak baselines are in as few of them as
+    /// possible. Visibility indices count rows that have Stokes I, in the order of [`Observation::stokes_i`].
+    /// Baselines weaker than `least_snr` times their noise are left out, and those without error. Rows that repeat a
+    /// baseline of their scan make sets of their own.
     pub fn of(observation: &Observation, kind: ClosureKind, least_snr: f64) -> Vec<ClosureSet> {
         let mut scans: HashMap<(u64, u16), Layers<Baseline>> = HashMap::new();
         for (visibility, (row, measured)) in observation.stokes_i().enumerate() {

@@ -1,4 +1,4 @@
-//! How many closure quantities data have.
+//! Numbers of closure quantities of data.
 
 use super::{ClosureKind, ClosureSet};
 use crate::observation::{Averaging, Observation};
@@ -6,17 +6,17 @@ use crate::observation::{Averaging, Observation};
 /// Numbers of independent closure quantities of one kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClosureCount {
-    /// Of baselines that are strong enough.
+    /// Number of those of baselines that are strong enough.
     pub used: usize,
-    /// Of all baselines.
+    /// Number of those of all baselines.
     pub possible: usize,
-    /// Of all baselines, each averaged over its scans, where these are more than `possible`: baselines of a scan have
-    /// times of their own then.
+    /// Number of those of all baselines, each averaged over its scans, where these are more than `possible`:
+    /// baselines of a scan have times of their own then.
     pub of_scans: Option<usize>,
 }
 
 impl ClosureCount {
-    /// Of an observation, with baselines stronger than `least_snr` times their noise.
+    /// Counts those of an observation, with baselines stronger than `least_snr` times their noise.
     pub fn of(observation: &Observation, kind: ClosureKind, least_snr: f64) -> Self {
         let used = count(observation, kind, least_snr);
         let possible = if least_snr > 0.0 { count(observation, kind, 0.0) } else { used };

@@ -1,7 +1,7 @@
 //! Matter that moves along the radius besides, at the same angle to its axis: dr/dt and Ω are functions of the radius.
 //!
-//! With T(r) = ∫dr/v and Φ(r) = ∫Ω dr/v, v = dr/dt, matter at r was at r₀ with T(r₀) = T(r) − Δt a time Δt before, and
-//! has turned by Φ(r) − Φ(r₀) since. One table of r and Φ by T does both.
+//! Infall. With T(r) = ∫dr/v and Φ(r) = ∫Ω dr/v, v = dr/dt, matter at r was at r₀ with T(r₀) = T(r) − Δt a time Δt
+//! before, and has turned by Φ(r) − Φ(r₀) since. One table of r and Φ by T does both.
 
 mod profile;
 #[cfg(test)]
@@ -35,7 +35,7 @@ pub enum Law {
     Family {
         /// a of the hole as the flow sees it, M: negative where it is retrograde.
         spin: f64,
-        /// Where between circles and free fall.
+        /// Mixture of circles and free fall.
         mixture: Mixture,
     },
     /// Values between knots.
@@ -50,11 +50,11 @@ pub struct Falling {
     factor: f64,
     flow: Option<Infall<Along>>,
     table: Trajectory,
-    /// From this radius on matter stays where it is, M.
+    /// Radius from which on matter stays where it is, M.
     circular: f64,
 }
 
-/// Where matter is on its fall, for [`Falling::before`].
+/// Place of matter on its fall, for [`Falling::before`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Origin {
     radius: f64,
@@ -65,7 +65,7 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// Where it is, M.
+    /// Returns its radius, M.
     pub fn radius(&self) -> f64 {
         self.radius
     }
@@ -84,7 +84,7 @@ struct Family {
 }
 
 impl Falling {
-    /// With a table of its own: about a millisecond.
+    /// Makes the flow with a table of its own: about a millisecond.
     ///
     /// # Errors
     /// If a number is out of its range, or a profile's matter does not change its radius.
@@ -173,7 +173,7 @@ impl Family {
         Ok(Infall::new(&Kerr::from_spin(s(spin))?, mixture)?)
     }
 
-    /// From where on matter stays at its radius, M.
+    /// Returns the radius from which on matter stays where it is, M.
     fn circular_from(&self) -> Result<f64, Error> {
         Ok(if self.is_still() { self.flow()?.isco().value } else { f64::INFINITY })
     }

@@ -17,8 +17,8 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// Through these values: monotone cubics (Fritsch & Butland 1984), which have no extrema but those of the knots
-    /// and are flat at both ends.
+    /// Interpolates these values: monotone cubics (Fritsch & Butland 1984), which have no extrema but those of the
+    /// knots and are flat at both ends.
     ///
     /// # Errors
     /// If radii do not grow from above 0, columns are not as long as they are, or radial velocities (dr/dt) are neither

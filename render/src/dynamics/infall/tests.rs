@@ -7,7 +7,7 @@ fn family(spin: f64, [xi, beta_r, beta_phi]: [f64; 3]) -> Falling {
     Falling::new(Law::Family { spin, mixture }).unwrap()
 }
 
-/// Where matter is on its way back.
+/// Matter on its way back.
 struct Back<'a>(&'a Falling);
 
 impl System<f64, Vector2<f64>> for Back<'_> {

@@ -29,7 +29,7 @@ struct Knot {
     turn: [f64; 2],
 }
 
-/// Between two marks: quintic polynomials of the part of the time that has passed.
+/// Interval between two marks: quintic polynomials of the part of the time that has passed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Cell {
     start: f64,
@@ -41,7 +41,7 @@ struct Cell {
 /// Radius (M) and azimuth (radians) of falling or rising matter by time (M).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
-    /// When each cell begins, and when the last one ends.
+    /// Begin of each cell, and end of the last one.
     times: Vec<f64>,
     /// Radii then.
     radii: Vec<f64>,
@@ -51,7 +51,7 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// Of ways that follow each other in time; time and azimuth are 0 where way number `origin` begins.
+    /// Joins ways that follow each other in time; time and azimuth are 0 where way number `origin` begins.
     pub(super) fn new(ways: &[Way<'_>], origin: usize) -> Self {
         let rule = gauss_legendre(8);
         let (mut spans, mut first) = (Vec::new(), 0);
@@ -107,7 +107,7 @@ impl Trajectory {
         }
     }
 
-    /// When matter is at a radius; none if it never is.
+    /// Returns the time at which matter is at a radius; none if it never is.
     pub fn time_at(&self, radius: f64) -> Option<f64> {
         let falls = self.radii.first() > self.radii.last();
         let passed = |start: &f64| if falls { *start >= radius } else { *start <= radius };
@@ -119,9 +119,9 @@ impl Trajectory {
 
 /// The numbers of a [`Trajectory`], for devices.
 pub struct Table {
-    /// Of each cell: when it begins, cells per time, and coefficients of radius and azimuth.
+    /// Cells: begin, cells per time, and coefficients of radius and azimuth.
     pub cells: Vec<(f64, f64, [[f64; 6]; 2])>,
-    /// When the last cell ends.
+    /// End of the last cell.
     pub last: f64,
     /// Radius, azimuth and angular velocity at both ends.
     pub ends: [[f64; 3]; 2],
@@ -214,7 +214,7 @@ impl Cell {
         per_time * (b + part * (2.0 * c + part * (3.0 * d + part * (4.0 * e + part * 5.0 * f))))
     }
 
-    /// By Newton's steps, halved where they would leave what is left of the cell.
+    /// Solves by Newton's steps, halved where they would leave what is left of the cell.
     fn time_at(&self, radius: f64, [mut from, mut to]: [f64; 2]) -> f64 {
         let at = |time: f64| self.at(time)[0] - radius;
         let falls = at(from) > at(to);

@@ -1,6 +1,6 @@
-//! Why bytes are no mesh.
+//! Reasons why bytes are no mesh.
 
-/// Why bytes are no mesh.
+/// Reason why bytes are no mesh.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {

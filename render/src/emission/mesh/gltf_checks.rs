@@ -73,7 +73,7 @@ fn check_transforms(document: &Document) -> Result<(), MeshError> {
     Ok(())
 }
 
-/// How far the length of a quaternion may be from 1: what rounding to a few digits leaves.
+/// Largest difference of the length of a quaternion from 1: what rounding to a few digits leaves.
 const UNIT: f64 = 1e-2;
 
 fn check_views(document: &Document, buffers: &[Vec<u8>]) -> Result<(), MeshError> {

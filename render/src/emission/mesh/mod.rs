@@ -42,7 +42,7 @@ fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
     (length > 0.0 && length.is_finite()).then(|| a.map(|x| x / length))
 }
 
-/// How far outside of a triangle a point counts as inside, in units of its longest edge: so
+/// Distance outside of a triangle up to which a point counts as inside, in units of its longest edge: so
 /// that no light slips through the seam between two triangles.
 const SEAM: f64 = 1e-9;
 

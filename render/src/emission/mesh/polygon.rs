@@ -3,7 +3,7 @@
 use core::f64::consts::TAU;
 use kerrlight_geodesic::vector::{cross, difference, dot};
 
-/// Why a polygon cannot be cut.
+/// Reason why a polygon cannot be cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Uncut {
     /// Its outline crosses itself.

@@ -27,7 +27,7 @@ impl Line<'_> {
         self.text.split_whitespace().skip(1).take_while(|word| !word.starts_with('#'))
     }
 
-    /// So many numbers, the first of them; those that are not given are `otherwise`.
+    /// Returns up to so many numbers; those that are not given are `otherwise`.
     pub fn numbers_up_to<const N: usize>(
         &self,
         what: &str,

@@ -25,12 +25,12 @@ pub enum Wrap {
     Clamp,
 }
 
-/// How coordinates of a mesh become those of a picture.
+/// Map from coordinates of a mesh to those of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Placement {
     /// Rows of a matrix on (u, v, 1); none where nothing is changed.
     affine: Option<[[f64; 3]; 2]>,
-    /// Along u and v.
+    /// Wrapping along u and v.
     pub wrap: [Wrap; 2],
 }
 

@@ -84,7 +84,7 @@ impl Beam {
         if square < REACH * REACH { (-0.5 * square).exp() } else { 0.0 }
     }
 
-    /// How far it reaches across and along the meridian, in radians.
+    /// Returns its extent across and along the meridian, in radians.
     pub fn reach(&self) -> [f64; 2] {
         let [x, y, _] = self.direction;
         let s = x.hypot(y);

@@ -22,7 +22,7 @@ pub struct Catalogue {
     warnings: Vec<String>,
 }
 
-/// Why a text is no catalogue.
+/// Reason why a text is no catalogue.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CatalogueError {
@@ -43,9 +43,9 @@ pub enum CatalogueError {
     Columns {
         /// Line of the file, from 1.
         line: usize,
-        /// How many columns it has.
+        /// Number of columns.
         columns: usize,
-        /// How many the first line names.
+        /// Number of names in the first line.
         names: usize,
     },
     /// A value is no number or out of range.
@@ -128,7 +128,7 @@ impl Line<'_> {
 /// Colour indices B − V for which a temperature is known.
 const COLOR_INDEX: core::ops::RangeInclusive<f64> = -0.6..=6.0;
 
-/// Why a star is left out.
+/// Reason why a star is left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Odd {
     Magnitude,
@@ -199,7 +199,7 @@ impl Catalogue {
         Ok(catalogue)
     }
 
-    /// Which stars are left out.
+    /// Names the stars that are left out.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
@@ -214,7 +214,7 @@ impl Catalogue {
 #[derive(Debug, Clone)]
 pub struct CatalogueSky {
     cells: Cells,
-    /// Where the stars of each cell begin; one more than cells.
+    /// Begin of the stars of each cell; one more than cells.
     starts: Vec<usize>,
     stars: Vec<CatalogueStar>,
     /// Light of magnitude 0, scene units × sr.

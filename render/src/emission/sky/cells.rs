@@ -10,7 +10,7 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// About `count` cells, about as wide as high at the equator.
+    /// Makes about `count` cells, about as wide as high at the equator.
     pub fn about(count: f64) -> Self {
         let rings = (count / PI).sqrt().ceil().max(2.0);
         let sectors = (count / rings).ceil().max(4.0);

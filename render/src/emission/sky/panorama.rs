@@ -21,10 +21,10 @@ pub struct Panorama {
     warnings: Vec<String>,
 }
 
-/// How an OpenEXR file begins.
+/// First bytes of an OpenEXR file.
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
-/// Why a picture cannot be the sky.
+/// Reason why a picture cannot be the sky.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PanoramaError {
@@ -245,7 +245,7 @@ const SMALLEST: usize = 8;
 /// Longer beams are treated as this many times as long as they are wide.
 const LONGEST_BEAM: f64 = 16.0;
 
-/// Which of `many` equal intervals overlap interval `k` of `few`, and by how much.
+/// Iterates over those of `many` equal intervals that overlap interval `k` of `few`, and by how much.
 fn overlaps(k: usize, few: usize, many: usize) -> impl Iterator<Item = (usize, f64)> + Clone {
     let ratio = many as f64 / few as f64;
     let (from, to) = (k as f64 * ratio, (k + 1) as f64 * ratio);

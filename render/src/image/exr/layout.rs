@@ -1,5 +1,5 @@
-//! How a picture lies in its file: bands of rows, each compressed on its own, so that neither
-//! writing nor reading needs the whole picture in memory.
+//! Layout of a picture in its file: bands of rows, each compressed on its own, so that neither writing nor reading needs
+//! the whole picture in memory.
 
 use super::{Attributes, settings};
 use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
@@ -27,7 +27,7 @@ impl<F: Write + Seek> AnyFile for F {}
 /// Writes the compressed bytes of each part of a band.
 type WriteBand<'a> = dyn FnMut(usize, Vec<Vec<u8>>) -> Result<()> + 'a;
 
-/// How hard DEFLATE tries, of 9: what OpenEXR does too.
+/// Level of DEFLATE, of 9: what OpenEXR uses too.
 const LEVEL: u32 = 4;
 
 /// ZIP of OpenEXR: bytes of even and odd places apart, differences (plus 128) of neighbours,
@@ -50,14 +50,14 @@ fn zip(bytes: Vec<u8>) -> std::io::Result<Vec<u8>> {
     Ok(if packed.len() < bytes.len() { packed } else { bytes })
 }
 
-/// How a picture is written: by default as one part of 32-bit floats.
+/// Style in which a picture is written: by default as one part of 32-bit floats.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Style {
     /// Colours and alpha as 16-bit floats, saturated at 65504; all other channels keep 32 bits.
     pub half: bool,
     /// A part for each layer.
     pub multi_part: bool,
-    /// Where the picture is taken from.
+    /// Camera of the picture.
     pub camera: Option<CameraMatrices>,
     /// Frames per second of the film that it is of.
     pub frames_per_second: Option<u16>,
@@ -74,9 +74,9 @@ impl Style {
 /// goes to p M.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraMatrices {
-    /// To the camera's coordinates (M): x to the right, y up, looking along −z.
+    /// Matrix to the camera's coordinates (M): x to the right, y up, looking along −z.
     pub world_to_camera: [f32; 16],
-    /// To normalised device coordinates: x and y from −1 to 1 from left to right and from below upwards.
+    /// Matrix to normalised device coordinates: x and y from −1 to 1 from left to right and from below upwards.
     pub world_to_ndc: [f32; 16],
 }
 
@@ -93,7 +93,7 @@ pub struct Layout {
 #[derive(Debug, Clone)]
 struct Part {
     header: Header,
-    /// Where the k-th channel of the part is in the caller's order.
+    /// Index of the k-th channel of the part in the caller's order.
     order: Vec<usize>,
 }
 

@@ -149,7 +149,7 @@ impl Header {
     }
 }
 
-/// Where the pixels of an EXR file are in the picture, its display window.
+/// Window of the pixels of an EXR file in the picture, its display window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
     /// Columns and rows of the picture.

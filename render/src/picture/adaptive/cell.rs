@@ -10,7 +10,7 @@ use crate::picture::rings::range;
 pub(super) struct Cell {
     /// Centre, in pixels from the pixel's.
     pub(super) center: [f64; 2],
-    /// How often the pixel was cut to get it.
+    /// Number of times the pixel was cut to get it.
     pub(super) level: u32,
     pub(super) quarters: [Light; 4],
     /// Estimated error of its share in the pixel's intensity.

@@ -1,10 +1,10 @@
-//! Which cell lies where in a pixel, and the edges that pass between neighbours.
+//! Map of the cells in a pixel, and the edges that pass between neighbours.
 
 use super::DEEPEST;
 use super::cell::{Cell, area};
 use super::light::Light;
 
-/// Which cell lies where in a pixel.
+/// Map of the cells in a pixel.
 pub(super) struct CellMap(Vec<u16>);
 
 impl CellMap {

@@ -11,7 +11,7 @@ const MOST_SAMPLES: u32 = 4096;
 
 /// A pixel that is being cut.
 pub(super) struct Cut {
-    /// Which of the tile's.
+    /// Index among the tile's pixels.
     pub(super) pixel: usize,
     pub(super) column: usize,
     pub(super) row: usize,
@@ -24,8 +24,8 @@ pub(super) struct Cut {
     pub(super) disc: f64,
     /// The first rays of its neighbours, row by row, its own in the middle.
     pub(super) around: [Light; 9],
-    /// How much neighbours' first rays differ from its rays on their side if none of these is of
-    /// their kind: an edge may run through between its border and its outermost rays.
+    /// Difference of neighbours' first rays from its rays on their side if none of these is of their kind: an edge
+    /// may run through between its border and its outermost rays.
     pub(super) contrast: f64,
     pub(super) samples: u32,
     pub(super) rays: u32,
@@ -95,8 +95,8 @@ impl Cut {
         }
     }
 
-    /// How much the first ray of the neighbour on one side differs from the outermost rays on
-    /// that side, 0 if one of them is of its kind.
+    /// Returns the difference of the first ray of the neighbour on one side from the outermost rays on that side, 0
+    /// if one of them is of its kind.
     pub(super) fn contrast_with(&self, side: [i32; 2], neighbor: &Light) -> f64 {
         let mut contrast = 0.0f64;
         for cell in self.cells.iter().filter(|cell| cell.is_at_border()) {

@@ -16,7 +16,7 @@ pub(super) struct Light {
     pub(super) unresolved: u32,
     /// Estimated error of the intensity where it is a mean over rays along photon rings.
     pub(super) mean: Option<f64>,
-    /// Where the ray passes the disc.
+    /// Passage of the ray by the disc.
     pub(super) passes: Passes,
 }
 
@@ -29,7 +29,7 @@ pub(super) struct Kind {
     pub(super) disc_images: u32,
     /// True if there is emission.
     pub(super) lit: bool,
-    /// On which sides the ray passes the disc.
+    /// Sides on which the ray passes the disc.
     pub(super) sides: u8,
 }
 

@@ -33,7 +33,7 @@ const DEEPEST: u32 = 6;
 /// The light between two lensing bands that no ray has met, in terms of what is around.
 const HIDDEN: f64 = 1.0 / 16.0;
 
-/// By how many times as much as a smooth pixel one with an edge may be off: it takes so many more rays that each of them
+/// Ratio of the error of a pixel with an edge to that of a smooth one: it takes so many more rays that each of them
 /// gains less.
 const EDGE: f64 = 8.0;
 

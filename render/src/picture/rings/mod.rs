@@ -22,7 +22,7 @@ use square::Plane;
 /// A ray with its share of a square's area.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stratum {
-    /// Where it arrives, in the view's coordinates.
+    /// Place of arrival, in the view's coordinates.
     pub x: f64,
     /// The same, upwards.
     pub y: f64,
@@ -38,7 +38,7 @@ pub struct RingStrata {
     /// Distance of the critical curve from the origin of an observer's screen, at equal steps of the angle.
     curve: Vec<f64>,
     spacing: f64,
-    /// How many times as far apart as `spacing` says rays are, so that they are as few as the picture is small.
+    /// Ratio of the distance of rays to `spacing`, so that they are as few as the picture is small.
     coarseness: f64,
     /// True if only squares that the critical curve runs through have strata.
     only_on_curve: bool,
@@ -62,9 +62,9 @@ const DEEPEST: u32 = 6;
 struct Part {
     center: (f64, f64),
     size: f64,
-    /// Of the area of the square.
+    /// Share of the area of the square.
     share: f64,
-    /// How often the square was quartered to get it.
+    /// Number of times the square was quartered to get it.
     level: u32,
 }
 
@@ -85,8 +85,8 @@ impl Part {
 type Take<'a> = dyn FnMut(&Part, Option<(&Plane, &[([f64; 2], f64)])>) + 'a;
 
 impl RingStrata {
-    /// For a view of a hole. `spacing` is that of rays in the logarithm of their distance from the critical
-    /// curve: that of the finest feature of what shines, about its size by its radius.
+    /// Prepares strata for a view of a hole. `spacing` is that of rays in the logarithm of their distance from the
+    /// critical curve: that of the finest feature of what shines, about its size by its radius.
     pub fn new(hole: &Kerr, view: &View, spacing: f64) -> Self {
         let curve = match view {
             View::Screen(observer) => {
@@ -121,7 +121,7 @@ impl RingStrata {
         self.coarseness
     }
 
-    /// How many rays [`place`](Self::place) adds for a square.
+    /// Returns the number of rays that [`place`](Self::place) adds for a square.
     pub fn count(&self, center: (f64, f64), size: f64) -> usize {
         if self.is_far(center, size) {
             return 0;

@@ -23,7 +23,7 @@ const FINE_ERROR: f64 = 1e-3;
 /// Rows from which the rays of rings are estimated where they are likely to be few.
 const SAMPLED: usize = 32;
 
-/// By how much such an estimate may be too small.
+/// Largest ratio of the true error to such an estimate.
 const SURE: f64 = 1.5;
 
 /// Strata are widened in so many steps to twice their width.
@@ -48,8 +48,8 @@ struct Job {
 }
 
 impl Resolver {
-    /// Of a prepared scene that is seen on a grid, if what it shows has photon rings. They take no more rays than the grid:
-    /// in a picture of few pixels strata are wider. Where pixels are refined until the picture is off by `image_error`, the
+    /// Prepares a scene that is seen on a grid, if what it shows has photon rings. They take no more rays than the grid: in
+    /// a picture of few pixels strata are wider. Where pixels are refined until the picture is off by `image_error`, the
     /// thin images beside the critical curve are found by their light, and strata are as wide as this error allows.
     pub fn new(prepared: &PreparedScene, grid: &Grid, image_error: Option<f64>) -> Option<Self> {
         let spacing = prepared.ring_spacing()?;
@@ -81,12 +81,12 @@ impl Resolver {
         coarser(coarse)
     }
 
-    /// How many rays a square gets, hidden or not, besides that at its centre.
+    /// Returns the number of rays of a square, hidden or not, besides that at its centre.
     pub fn count(&self, square: Square) -> usize {
         self.strata.count(square.center, square.size)
     }
 
-    /// How many the squares of a grid get, from those in one row of pixels out of `every`.
+    /// Returns the number of rays of the squares of a grid, from those in one row of pixels out of `every`.
     pub fn rays(&self, grid: &Grid, every: usize) -> u64 {
         let Grid { width, height, side, size } = *grid;
         let of_row = |row: usize| {
@@ -156,9 +156,9 @@ impl Resolver {
         Ok(counted)
     }
 
-    /// Of the mean: an edge between two strata is anywhere between their rays, so that a quarter of its height
-    /// is the usual error of their common share; errors of edges are independent. Images that are narrower than strata
-    /// which were widened may lie within them, as bright as what is next to them.
+    /// Returns the error of the mean: an edge between two strata is anywhere between their rays, so that a quarter of its
+    /// height is the usual error of their common share; errors of edges are independent. Images that are narrower than
+    /// strata which were widened may lie within them, as bright as what is next to them.
     fn error(&self, rays: &[Stratum], found: &[RayResult]) -> f64 {
         let pairs = rays.windows(2).zip(found.windows(2));
         let square = |(rays, found): (&[Stratum], &[RayResult])| match (rays, found) {

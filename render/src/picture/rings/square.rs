@@ -5,7 +5,7 @@
 pub(super) struct Plane {
     middle: f64,
     slope: [f64; 2],
-    /// How far the function is from it.
+    /// Distance of the function from it.
     bend: f64,
 }
 
@@ -16,7 +16,7 @@ const LEAST: f64 = 5e-4;
 const MOST: f64 = 400.0;
 
 impl Plane {
-    /// Through the values at the centre and at the corners, from the lower left to the upper right.
+    /// Interpolates the values at the centre and at the corners, from the lower left to the upper right.
     pub fn through(middle: f64, [a, b, c, d]: [f64; 4]) -> Self {
         let slope = [0.5 * ((b - a) + (d - c)), 0.5 * ((c - a) + (d - b))];
         let mean = 0.25 * (a + b + c + d);

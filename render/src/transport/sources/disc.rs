@@ -23,7 +23,7 @@ pub(in crate::transport) struct Disc {
 /// Radii at which the brightest light of a disc is looked for.
 const RADII: u32 = 8;
 
-/// How the light of the disc reaches the observer along one ray.
+/// Light of the disc along one ray.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::transport) struct DiscRay<'a> {
     pub ray: &'a TracedRay,
@@ -44,7 +44,7 @@ impl Disc {
         Some(Disc { model, edges, horizon: 1.0 / hole.horizon() })
     }
 
-    /// How many crossings of a ray are to be located.
+    /// Returns the number of crossings of a ray to be located.
     pub fn crossings(&self) -> usize {
         CROSSINGS
     }
@@ -86,14 +86,15 @@ impl Disc {
         (0..=RADII).map(light).fold(0.0, f64::max)
     }
 
-    /// Where a crossing at 1/r passes it: see [`Passes`](crate::transport::result::Passes).
+    /// Returns the place at which a crossing at 1/r passes it: see
+    /// [`Passes`](crate::transport::result::Passes).
     #[inline]
     fn place(&self, inverse_radius: f64) -> f32 {
         let [outer, inner] = self.edges;
         ((inverse_radius - outer) / (inner - outer)) as f32
     }
 
-    /// Where crossings would be that a ray does not get to.
+    /// Returns the place of crossings that a ray does not get to.
     #[inline]
     fn end(&self, ray: &TracedRay) -> f32 {
         match ray.outcome {

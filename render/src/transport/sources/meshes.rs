@@ -23,7 +23,7 @@ pub(in crate::transport) struct Meshes {
 #[derive(Debug, Default)]
 pub(in crate::transport) struct MeshScratch {
     walk: WalkScratch,
-    /// Where the last ray meets triangles.
+    /// Triangles that the last ray meets.
     hits: Vec<Hit>,
 }
 
@@ -36,7 +36,7 @@ struct MeshTree {
     leaves: Vec<[u32; 2]>,
 }
 
-/// Where a ray meets a triangle.
+/// Intersection of a ray with a triangle.
 #[derive(Debug, Clone, Copy)]
 struct Hit {
     /// Mino time.

@@ -48,7 +48,7 @@ pub struct Tile<'a> {
     pub volume: &'a Volume,
     /// Surroundings.
     pub around: Surroundings,
-    /// From where it is seen.
+    /// Direction of the viewer.
     pub view: View,
 }
 

@@ -10,7 +10,7 @@ pub use drawing::{Tile, mosaic, sheet};
 use kerrlight_geodesic::interrupt;
 use rayon::prelude::*;
 
-/// From where a volume is seen, by a viewer far away.
+/// Direction from which a volume is seen, by a viewer far away.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     /// Direction to the viewer around +z, degrees from +x.
@@ -168,7 +168,7 @@ mod tests {
         Surroundings { hole_radius, axis: [0.5, 0.0, -0.9], ring_radius: 5.0, half_width: 5.5 }
     }
 
-    /// Of a box that shines evenly a ray sees its chord, or what of it is in front of the ball.
+    /// A ray sees its chord of a box that shines evenly, or what of it is in front of the ball.
     #[test]
     fn exact_chords_of_a_box_and_of_what_the_ball_hides() {
         let nodes = [9, 11, 13];

@@ -23,7 +23,7 @@ struct Seen {
     intensity: f64,
     rgb: [f32; 3],
     crossings: u32,
-    /// Which crossings are on the disc.
+    /// Crossings that are on the disc.
     images: u32,
     radius: f64,
     azimuth: f64,
@@ -76,7 +76,7 @@ impl Off {
         self.alpha.len()
     }
 
-    /// With the library.
+    /// Traces with the library.
     pub fn library(&mut self) -> anyhow::Result<()> {
         let rays = self.alpha.chunks(BLOCK).zip(self.beta.chunks(BLOCK));
         for ((alpha, beta), seen) in rays.zip(self.results.chunks_mut(BLOCK)) {
@@ -86,7 +86,7 @@ impl Off {
         Ok(())
     }
 
-    /// With a loop that knows no effects.
+    /// Traces with a loop that knows no effects.
     pub fn plain_loop(&mut self) -> anyhow::Result<()> {
         self.seen.clear();
         for (alpha, beta) in self.alpha.chunks(BLOCK).zip(self.beta.chunks(BLOCK)) {

@@ -19,7 +19,7 @@ pub struct TangentTerm {
     priors: Vec<f64>,
     /// Derivatives of residuals with respect to the gains that are free.
     slopes: DMatrix<f64>,
-    /// From slopes of half of χ² along gains to the gains' moves.
+    /// Matrix from slopes of half of χ² along gains to the gains' moves.
     inverse: DMatrix<f64>,
 }
 

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 pub struct Header<'a> {
     /// The text behind `= `, first of each keyword.
     values: HashMap<&'a str, &'a str>,
-    /// Where it starts in the file.
+    /// Offset in the file.
     offset: usize,
 }
 

@@ -23,9 +23,9 @@ pub struct Unit<'a> {
     pub header: Header<'a>,
     /// Its data, without the padding.
     pub data: &'a [u8],
-    /// Where the data start in the file.
+    /// Offset of the data in the file.
     pub offset: usize,
-    /// Where the next unit starts.
+    /// Offset of the next unit.
     pub next: usize,
 }
 

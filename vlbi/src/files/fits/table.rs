@@ -50,7 +50,7 @@ impl<'a> Table<'a> {
         Ok(Table { columns, row_size, rows, data: &unit.data[..size] })
     }
 
-    /// How many rows it has.
+    /// Returns the number of rows.
     pub fn rows(&self) -> usize {
         self.rows
     }

@@ -101,7 +101,7 @@ fn left(tables: &[Vec<u8>]) -> Vec<usize> {
     numbers
 }
 
-/// Of a datum's number: product, channel, IF, baseline and hour.
+/// Tests a datum by its number: product, channel, IF, baseline and hour.
 #[test]
 fn exact_flags_leave_out_what_they_name() {
     let kept = |is_flagged: fn([usize; 5]) -> bool| {

@@ -25,7 +25,7 @@ pub struct Flag {
     /// First and last, counted from 0.
     bands: [usize; 2],
     channels: [usize; 2],
-    /// By their place on the axis STOKES.
+    /// Products, by their place on the axis STOKES.
     products: [bool; 4],
 }
 

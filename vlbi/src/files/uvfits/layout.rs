@@ -1,4 +1,4 @@
-//! Where things are in a random group.
+//! Layout of a random group.
 
 use super::super::FileError;
 use super::super::fits::Header;
@@ -57,12 +57,12 @@ pub struct Layout {
     complex_stride: usize,
     /// True if there are weights.
     pub weighted: bool,
-    /// For each of the four products, where it is; `None` where there is none.
+    /// Places of the four products; `None` where there is none.
     pub products: [Option<usize>; 4],
     /// Distance of neighbours on the axis of polarisations.
     product_stride: usize,
     pub basis: Basis,
-    /// Where spectral channels of all IFs are.
+    /// Places of spectral channels of all IFs.
     pub channels: Vec<Place>,
     /// Frequency in Hz at the reference channel, that channel (counted from 1), distance of channels.
     pub frequency_hz: f64,
@@ -221,7 +221,7 @@ fn find<'a>(axes: &'a [Axis], name: &str, header: &Header<'_>) -> Result<&'a Axi
         .ok_or_else(|| header.error("CTYPE2", format!("no axis is named {name}")))
 }
 
-/// Where the four products are along the axis of polarisations.
+/// Returns the places of the four products along the axis of polarisations.
 fn products(header: &Header<'_>, axis: &Axis) -> Result<([Option<usize>; 4], Basis), FileError> {
     let k = axis.keyword;
     let value = |name: &str, default: f64| -> Result<f64, FileError> {
@@ -246,7 +246,7 @@ fn products(header: &Header<'_>, axis: &Axis) -> Result<([Option<usize>; 4], Bas
     Ok((products, if circular { Basis::Circular } else { Basis::Stokes }))
 }
 
-/// Where channels of all IFs are; other axes must not be longer than 1.
+/// Returns the places of channels of all IFs; other axes must not be longer than 1.
 fn channels(axes: &[Axis], header: &Header<'_>) -> Result<Vec<Place>, FileError> {
     let mut channels = vec![Place::default()];
     for axis in axes {

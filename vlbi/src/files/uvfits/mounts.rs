@@ -1,4 +1,4 @@
-//! How feeds turn, as codes of mounts (`MNTSTA`) and the angle of a feed (`POLAA`) tell it.
+//! Rotation of feeds, from codes of mounts (`MNTSTA`) and the angle of a feed (`POLAA`).
 
 use super::super::FileError;
 use crate::array::{FeedRotation, Station};
@@ -34,8 +34,8 @@ pub fn of(station: &Station) -> Result<Mount, FileError> {
     })
 }
 
-/// How the feeds of a station turn that has this mount; `None` where the file says nothing that is not known from
-/// the name: published files have angles of 0, and many have mounts of 0, whatever the station is.
+/// Returns the rotation of the feeds of a station with this mount; `None` where the file says nothing that is not
+/// known from the name: published files have angles of 0, and many have mounts of 0, whatever the station is.
 pub fn rotation(name: &str, mount: Mount) -> Option<FeedRotation> {
     let Mount { code, offset_deg } = mount;
     let (_, [parallactic, elevation]) = CODES.into_iter().find(|(known, _)| *known == code)?;

@@ -153,7 +153,8 @@ const LONGEST_S: f64 = 1e4;
 /// Rows take at most this many times the bytes of the file.
 pub const MOST_MEMORY: usize = 16;
 
-/// Where the axes RA and DEC are, which (u, v) belong to; OBSRA and OBSDEC, where antennas point, where these are not told.
+/// Returns the position on the axes RA and DEC, which (u, v) belong to; OBSRA and OBSDEC, where antennas point, where these are
+/// not told.
 fn position(header: &fits::Header<'_>) -> Result<Option<SourcePosition>, FileError> {
     let axis = |name: &str| {
         let named = |k: &i32| header.text(&format!("CTYPE{k}")).is_some_and(|text| text == name);
@@ -183,7 +184,7 @@ struct Reader<'a> {
     flags: &'a [Flag],
     /// Frequencies in Hz that (u, v) of each channel count wavelengths of.
     wavelengths: Vec<f64>,
-    /// Where the data start in the file.
+    /// Offset of the data in the file.
     offset: usize,
 }
 

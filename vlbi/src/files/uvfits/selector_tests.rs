@@ -5,7 +5,7 @@ use super::tests::small;
 use super::*;
 use crate::observation::Observation;
 
-/// How a made-up file differs from a plain one.
+/// Differences of a made-up file from a plain one.
 struct Made {
     /// Random parameters besides those of a baseline, with their values in both groups.
     parameters: Vec<(&'static str, [f32; 2])>,
@@ -234,7 +234,7 @@ fn paper_times_of_tai_become_utc() {
     assert!(refused(&Made { time_system: "GPS", ..plain() }).contains("TIMSYS = 'GPS"));
 }
 
-/// Where antennas point is not where (u, v) belong to.
+/// The pointing of antennas is not the position that (u, v) belong to.
 #[test]
 fn exact_the_phase_centre_is_the_position() {
     let made = |ra: &str, dec: &str| Made {

@@ -6,7 +6,7 @@ use super::layout::{Layout, Parameter, SELECTORS};
 use crate::earth::SourcePosition;
 use std::collections::BTreeSet;
 
-/// As many values are listed.
+/// Largest number of values that are listed.
 const SHOWN: usize = 16;
 
 /// The one value that groups with data have of a parameter; none where there is no such parameter.
@@ -44,7 +44,7 @@ fn values(unit: &Unit<'_>, layout: &Layout, parameter: Parameter) -> BTreeSet<i6
 pub struct TableSource {
     /// Its name.
     pub name: String,
-    /// Where it is.
+    /// Position.
     pub position: SourcePosition,
 }
 

@@ -122,7 +122,8 @@ fn exact_what_is_not_known_is_asked_for() {
     assert!(fail(|o| o.rows.clear()).contains("no visibilities"));
 }
 
-/// Without an `AIPS FQ` table IFs have no frequencies of their own; channels have.
+/// Returns axes without an `AIPS FQ` table: IFs then have no frequencies of their own; channels
+/// have.
 fn foreign_axes() -> &'static str {
     "no AIPS FQ table: all IFs counted at the reference frequency"
 }

@@ -7,7 +7,7 @@ use kerrlight_common::units::SPEED_OF_LIGHT;
 /// (u, v) of the frame are off by less than this part of baselines, or positions are not those of the data.
 const LARGEST_MISS: f64 = 0.01;
 
-/// As many rows decide about the frame.
+/// Number of rows that decide about the frame.
 const TRIAL: usize = 64;
 
 /// w of rows in seconds of light, in the frame whose (u, v) are nearest to those of the rows; 0 for all of them where

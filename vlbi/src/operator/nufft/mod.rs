@@ -34,7 +34,7 @@ struct Site {
     factor: Complex<f64>,
     /// True if the visibility is the conjugate of the sum.
     conjugate: bool,
-    /// Where it is among the data.
+    /// Index among the data.
     datum: usize,
 }
 
@@ -50,10 +50,10 @@ pub struct Nufft {
     margin: usize,
     /// Factors of image columns and rows.
     correction: [Vec<f64>; 2],
-    /// Along a row and along a column, there and back.
+    /// Transforms along a row and along a column, there and back.
     along_row: [Arc<dyn Fft<f64>>; 2],
     along_column: [Arc<dyn Fft<f64>>; 2],
-    /// In the order of frames and, within, of columns.
+    /// Sites in the order of frames and, within, of columns.
     sites: Vec<Site>,
     frames: Vec<Range<usize>>,
 }
@@ -175,7 +175,7 @@ impl Nufft {
         (k + cells - pixels / 2) % cells
     }
 
-    /// Which cell of a transformed row is column `k` of those kept.
+    /// Returns the cell of a transformed row that is column `k` of those kept.
     fn kept(&self, k: usize) -> usize {
         let across = self.along_row[0].len();
         (k + across - self.margin) % across

@@ -21,7 +21,7 @@ use kerrlight_geodesic::{Path, PathOfRay};
 struct Panel {
     /// Mino times.
     ends: [f64; 2],
-    /// In M.
+    /// Length, M.
     length: f64,
     /// True if it ends at the horizon.
     falls: bool,

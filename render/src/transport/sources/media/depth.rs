@@ -9,7 +9,7 @@ pub(in crate::transport) struct DepthProfile {
     times: Vec<f64>,
     depths: Vec<f64>,
     rates: Vec<f64>,
-    /// That of the whole way.
+    /// Depth of the whole way.
     total: f64,
 }
 

@@ -88,7 +88,7 @@ impl MediaScratch {
         self.depths.clear();
     }
 
-    /// Where the light of medium number `m` along ray number `k` is, at all times.
+    /// Returns the light of medium number `m` along ray number `k`, at all times.
     fn lights_of(&mut self, m: usize, k: usize) -> &mut [Light] {
         let first = (m * self.rays + k) * self.times;
         &mut self.lights[first..first + self.times]
@@ -170,7 +170,7 @@ impl Media {
         self
     }
 
-    /// How many there are.
+    /// Returns the number of media.
     pub fn len(&self) -> usize {
         self.all.len()
     }
@@ -219,7 +219,7 @@ impl Media {
         self.smooth[sphere]
     }
 
-    /// Whose cost medium number `m` is part of.
+    /// Returns the part of the plan that the cost of medium number `m` belongs to.
     pub fn part(&self, m: usize) -> Part {
         self.all[m].part()
     }
@@ -330,7 +330,7 @@ fn request(medium: &dyn Medium, optics: &Optics) -> NodeRequest {
     }
 }
 
-/// How many panels a coarsest panel is cut into at most.
+/// Returns the largest number of panels that a coarsest panel is cut into.
 pub(in crate::transport) fn finest(medium: &dyn Medium) -> u32 {
     if medium.cell_size().is_some() { FINEST_OF_CELLS } else { FINEST }
 }

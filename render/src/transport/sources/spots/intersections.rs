@@ -1,4 +1,4 @@
-//! Which spots a ray meets, and where.
+//! Intersections of rays with spots.
 
 use super::light::SpotRay;
 use super::trees::{SpotSpans, SpotTree};

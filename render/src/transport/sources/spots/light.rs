@@ -31,7 +31,7 @@ pub(super) struct SpotLight<'a> {
     number: u32,
     /// Time of observation.
     observed: f64,
-    /// Where it may shine, as intervals of Mino time in order.
+    /// Pieces in which it may shine, as intervals of Mino time in order.
     pieces: &'a [[f64; 2]],
     seen: &'a SpotRay<'a>,
     /// The brightest point, and its emission per length.
@@ -42,7 +42,7 @@ pub(super) struct SpotLight<'a> {
 struct SpotNode {
     point: PathPoint,
     position: [f64; 3],
-    /// When the light that is seen passed here.
+    /// Time at which the light that is seen passed here.
     time: f64,
     carried: Comoving,
 }

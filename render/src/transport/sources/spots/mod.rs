@@ -57,7 +57,7 @@ impl Spots {
         Spots { spans, models, trees: Arc::default() }
     }
 
-    /// How many there are.
+    /// Returns the number of spots.
     pub fn len(&self) -> usize {
         self.models.len()
     }

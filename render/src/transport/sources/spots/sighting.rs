@@ -1,4 +1,4 @@
-//! Which rays of the closed form may meet a spot, found from their positions alone.
+//! Rays of the closed form that may meet a spot, found from their positions alone.
 //!
 //! A spot's light is summed along a path that is traced step by step, which costs several times as
 //! much as all else of a ray. Most rays that pass the spot's radii miss it: their positions in
@@ -23,7 +23,7 @@ const NEAREST: f64 = 4.0;
 /// Positions on a panel: panels are at most 0.4 radians long.
 const ORDER: usize = 4;
 
-/// From the last node of a panel to its end, over the distance of the last two nodes: 0.27.
+/// Distance from the last node of a panel to its end, over that of the last two nodes: 0.27.
 const END_GAP: f64 = 0.3;
 
 /// Largest ratio of a piece of path to its chord, in coordinates that are sheared.

@@ -7,7 +7,7 @@ use kerrlight_geodesic::{Kerr, Ray};
 use std::collections::BTreeMap;
 use std::sync::{Arc, PoisonError, RwLock};
 
-/// Where all spots can shine from: at one time, in a span of time, or ever.
+/// Tree of the places from which all spots can shine: at one time, in a span of time, or ever.
 #[derive(Debug)]
 pub(in crate::transport) struct SpotTree {
     pub(super) tree: Tree,
@@ -23,7 +23,7 @@ pub(in crate::transport) struct SpotSpans {
     trees: RwLock<BTreeMap<i64, Arc<SpotTree>>>,
 }
 
-/// From so many spots on spans are worth their making.
+/// Number of spots from which on spans are worth their making.
 const MANY_SPOTS: usize = 32;
 
 /// Parts of all trees of spans together, about.
@@ -76,7 +76,7 @@ impl SpotSpans {
     }
 }
 
-/// By how many times its own half-size a spot moves within a span.
+/// Distance that a spot moves within a span, in its own half-sizes.
 const OWN_SIZES: f64 = 4.0;
 
 /// Longest span in M.
