@@ -12,7 +12,7 @@ use kerrlight_render::Parts;
 use kerrlight_vlbi::Error as VlbiError;
 use std::borrow::Cow;
 
-/// Why a function of this crate refuses what it was given, or cannot finish.
+/// Reason why a function of this crate refuses its input, or cannot finish.
 ///
 /// The message is complete in itself and names the field, its value and what is allowed; an error in
 /// a text or a file also names the line or the byte. Match on a variant to treat one kind in a way of
@@ -80,7 +80,7 @@ from_below! {
 }
 
 impl Error {
-    /// That `field` cannot be `value`, with the allowed range in words.
+    /// States that `field` cannot be `value`, with the allowed range in words.
     pub const fn out_of_range(field: &'static str, value: f64, allowed: &'static str) -> Self {
         Self::Render(RenderError::out_of_range(field, value, allowed))
     }

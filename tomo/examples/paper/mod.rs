@@ -53,7 +53,7 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// About this axis.
+    /// Starts about this axis.
     pub fn about(axis: Axis) -> Self {
         Self { axis }
     }

@@ -46,7 +46,7 @@ pub struct Memory<'a> {
 }
 
 impl<'a> Memory<'a> {
-    /// In a journal.
+    /// Remembers in a journal.
     pub fn new(journal: &'a dyn Journal) -> Self {
         Self { journal, about: 0 }
     }
@@ -73,7 +73,7 @@ impl<'a> Memory<'a> {
     }
 }
 
-/// Of searches that keep nothing.
+/// Memory of searches that keep nothing.
 impl Default for Memory<'_> {
     fn default() -> Self {
         Self::new(&Forgetful)

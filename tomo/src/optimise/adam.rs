@@ -34,7 +34,7 @@ pub struct AdamState<T> {
 }
 
 impl<T: Float> AdamState<T> {
-    /// Of no step yet.
+    /// Creates a state with zero moments.
     pub fn new(parameters: usize) -> Self {
         Self { steps: 0, first: vec![T::zero(); parameters], second: vec![T::zero(); parameters] }
     }

@@ -53,7 +53,7 @@ pub struct LbfgsState<T> {
 }
 
 impl<T: Float> LbfgsState<T> {
-    /// Of no step yet.
+    /// Creates a state without steps.
     pub fn new(parameters: usize, memory: usize) -> Self {
         Self { numbers: vec![T::zero(); (1 + 2 * memory) * parameters], pairs: 0, value: None }
     }

@@ -27,8 +27,8 @@ impl Wolfe {
         at.slope.abs() <= self.curvature * start.slope.abs()
     }
 
-    /// From `start` (length 0, negative slope), trying `first` first. The last point that was evaluated is
-    /// the one returned.
+    /// Searches from `start` (length 0, negative slope), trying `first` first. The last point that was
+    /// evaluated is the one returned.
     pub fn search(
         &self,
         start: Point,
@@ -57,7 +57,7 @@ impl Wolfe {
         None
     }
 
-    /// Between `low`, the better end, and `high`.
+    /// Searches between `low`, the better end, and `high`.
     fn zoom(
         &self,
         start: Point,

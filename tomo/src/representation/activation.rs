@@ -1,4 +1,4 @@
-//! From an unbounded number to an emissivity.
+//! Activations: from an unbounded number to an emissivity.
 
 use kerrlight_common::simd::{Float, Lanes, math};
 use schemars::JsonSchema;

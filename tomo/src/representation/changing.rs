@@ -10,7 +10,7 @@ use kerrlight_render::dynamics::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Which changes are allowed.
+/// Changes that are allowed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
@@ -26,9 +26,9 @@ pub enum Allowed {
 pub struct Knots {
     /// The first, M.
     pub first: f64,
-    /// From one to the next, M.
+    /// Distance of knots, M.
     pub spacing: f64,
-    /// How many; one is a field that does not change.
+    /// Number of knots; one is a field that does not change.
     pub count: usize,
     /// Meaning of the fields.
     pub allowed: Allowed,
@@ -38,7 +38,7 @@ impl Knots {
     /// A field that does not change.
     pub const STEADY: Self = Self { first: 0.0, spacing: 1.0, count: 1, allowed: Allowed::Any };
 
-    /// From one time to another, M, not farther apart than `spacing`.
+    /// Spreads knots from one time to another, M, not farther apart than `spacing`.
     ///
     /// # Errors
     /// If the spacing is not above 0, or there would be more than 10,000.
@@ -101,7 +101,7 @@ impl Knots {
 pub struct Carrier {
     /// The axis that matter turns about.
     pub axis: Axis,
-    /// How it moves.
+    /// Velocity of the matter.
     pub velocity: AngularVelocity,
     /// Least and largest radius (M) of matter that shines, of matter that changes its radius.
     pub limits: [f64; 2],
@@ -110,8 +110,8 @@ pub struct Carrier {
 /// Fields in space, one a knot, that matter carries: e(t, x) = Σ share_k(t) e_k(x_k), where x_k is the place that the
 /// matter at (t, x) has at the knot's label time. Parameters are those of the fields, one after the other.
 ///
-/// Without a [`Carrier`] points are given by the places that their matter has at the reference time
-/// ([`Representation::is_carried`]), which are those of all knots.
+/// A field that changes while matter carries it. Without a [`Carrier`] points are given by the places that their matter has
+/// at the reference time ([`Representation::is_carried`]), which are those of all knots.
 pub struct Changing<T> {
     inner: Box<dyn Representation<T>>,
     knots: Knots,
@@ -128,14 +128,14 @@ struct Part<T> {
     elapsed: Vec<f64>,
     /// Places at the radii that matter has at the label time.
     stretched: [Vec<T>; 3],
-    /// By which they are turned.
+    /// Angles by which they are turned.
     angle: Vec<T>,
     /// Places at the label time.
     pulled: [Vec<T>; 3],
 }
 
 impl<T: Float> Changing<T> {
-    /// Of fields in space and the motion that carries them.
+    /// Takes fields in space and the motion that carries them.
     ///
     /// # Errors
     /// If the inner representation is not one in space, there is no knot, or births have no carrier: each knot's are given at
@@ -282,7 +282,7 @@ impl<T: Float> Part<T> {
         self.pulled = pulled;
     }
 
-    /// From slopes at the label time to those of the angles and of the stretched places.
+    /// Converts slopes at the label time to those of the angles and of the stretched places.
     fn pull_vjp(&self, axis: Axis, [a, b, c]: &[Vec<T>; 3]) -> (Vec<T>, [Vec<T>; 3]) {
         let mut angles = vec![T::zero(); self.points.len()];
         let mut places: [Vec<T>; 3] = core::array::from_fn(|_| angles.clone());

@@ -34,7 +34,7 @@ pub type Tangent<'a> = dyn Fn(&[f64], &[f64], &[f64], &[f64]) -> (f64, f64) + Sy
 
 /// Representation that is tested, with its points.
 pub struct Subject<'a> {
-    /// In double precision.
+    /// The representation in double precision.
     pub representation: &'a dyn Representation<f64>,
     /// Points are drawn from −within to within along each axis.
     pub within: f64,

@@ -32,12 +32,12 @@ pub use kerrlight_render::points::{Coordinates, CoordinatesMut};
 
 use core::ops::Range;
 
-/// Where a vector-Jacobian product goes; it is added to what is there.
+/// Destination of a vector-Jacobian product; it is added to what is there.
 #[derive(Debug)]
 pub struct Gradient<'a, T> {
-    /// With respect to the parameters.
+    /// Gradient with respect to the parameters.
     pub parameters: &'a mut [T],
-    /// With respect to the coordinates, if wanted.
+    /// Gradient with respect to the coordinates, if wanted.
     pub coordinates: Option<CoordinatesMut<'a, T>>,
 }
 
@@ -80,7 +80,7 @@ pub enum BuiltIn<'a> {
 pub struct Groups<'a, T> {
     /// Group k holds the points `starts[k]..starts[k + 1]`, from 0 to the number of points.
     pub starts: &'a [usize],
-    /// From values to cotangents.
+    /// Map from values to cotangents.
     pub link: &'a Link<'a, T>,
 }
 
@@ -158,13 +158,13 @@ pub trait Representation<T: Float>: Send + Sync {
     /// Parameters to start from; the same for the same seed on every machine.
     fn initialise(&self, seed: u64, parameters: &mut [T]);
 
-    /// Which parameters are matrices that [`Muon`](crate::optimise::Muon) may take its steps of, in their order; all
-    /// others are learnt by Adam.
+    /// Returns the parameters that are matrices of which [`Muon`](crate::optimise::Muon) may take its steps, in their
+    /// order; all others are learnt by Adam.
     fn matrices(&self) -> Vec<WeightMatrix> {
         Vec::new()
     }
 
-    /// Which of those that are built in it is, if it is one that devices may know.
+    /// Returns the built-in representation that it is, if it is one that devices may know.
     fn built_in(&self) -> Option<BuiltIn<'_>> {
         None
     }
@@ -220,8 +220,8 @@ pub trait Representation<T: Float>: Send + Sync {
     /// the end of a ray): overwrites `values`, and adds the product with the cotangents that the link
     /// makes of them.
     ///
-    /// Without a way of its own it does one after the other, and takes memory for the cotangents each time; a
-    /// network goes through its layers once instead of twice.
+    /// Evaluates values and their vector-Jacobian product. The default does one after the other, and takes memory for the
+    /// cotangents each time; a network goes through its layers once instead of twice.
     fn eval_vjp(
         &self,
         parameters: &[T],

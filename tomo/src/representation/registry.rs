@@ -4,7 +4,7 @@ use super::Representation;
 use crate::Error;
 use std::ops::RangeInclusive;
 
-/// Why a representation cannot be built: any error, of which the message is shown.
+/// Reason why a representation cannot be built: any error, of which the message is shown.
 pub type BuildError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Makes a representation of its settings.

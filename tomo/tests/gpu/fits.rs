@@ -135,7 +135,7 @@ fn code_twenty_steps_are_those_of_the_processor() {
     }
 }
 
-/// Of a gradient with as many singular values as a matrix has, the first step by Muon is that of the processor.
+/// The first step by Muon is that of the processor, for a gradient with as many singular values as a matrix has.
 #[test]
 fn code_a_step_by_muon_is_that_of_the_processor() {
     let bhnerf = problem::bhnerf();

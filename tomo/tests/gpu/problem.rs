@@ -25,7 +25,7 @@ use std::sync::Arc;
 
 pub const SIDE: usize = 9;
 const FRAMES: usize = 4;
-/// About the light of a frame before a fit, Jy.
+/// Approximate light of a frame before a fit, Jy.
 const LIGHT: f64 = 15.0;
 const REGION: Region = Region { r_min: 3.0, r_max: 6.0, z_width: 4.0 };
 
@@ -38,7 +38,8 @@ pub fn model() -> ForwardModel<f32> {
     model_of(AngularVelocity::Keplerian { drag: 0.6 })
 }
 
-/// Between circular orbits and free fall; with β_r = 1 on circles down to the innermost stable one.
+/// Returns the motion between circular orbits and free fall; with β_r = 1 on circles down to the innermost stable
+/// one.
 fn falling(beta_r: f64) -> AngularVelocity {
     let mixture = Mixture { xi: 0.8, beta_r, beta_phi: 0.9 };
     AngularVelocity::Falling(Arc::new(Falling::new(Law::Family { spin: 0.6, mixture }).unwrap()))
@@ -235,7 +236,7 @@ pub fn late() -> Network {
     Network::new(settings).unwrap()
 }
 
-/// Of places and times.
+/// A network of places and times.
 pub fn mlp4d() -> Network {
     let settings = NetworkSettings {
         width: 70,

@@ -72,7 +72,7 @@ impl Background {
     }
 }
 
-/// When the data of a light curve were taken, and how well.
+/// Times of the data of a light curve, and their errors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sampling {
     /// Minutes of the samples, from any time on.
@@ -103,12 +103,12 @@ impl Sampling {
 /// Some data over the factor of the covariance that noise and background give them.
 pub(super) struct Whitening {
     factor: Option<DMatrix<f64>>,
-    /// Of that covariance, over the standard deviations of the data.
+    /// Logarithm of the determinant of that covariance, over the standard deviations of the data.
     pub ln_determinant: f64,
 }
 
 impl Whitening {
-    /// Of the data with these numbers.
+    /// Takes the data with these numbers.
     pub fn new(curve: &CurveRows, background: &Background, used: &[usize]) -> Result<Self, Error> {
         let background = background.checked()?;
         if background.is_none() {

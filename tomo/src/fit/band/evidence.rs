@@ -10,7 +10,7 @@ use super::{Background, Band, BandPrior, CurveRows};
 use crate::Error;
 use nalgebra::{DMatrix, DVector};
 
-/// How probable data are in a geometry.
+/// Probability of data in a geometry.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Weighed {
     /// ln of the mean probability over all combinations, up to what is the same for all geometries.
@@ -28,8 +28,8 @@ pub struct Weighed {
 /// Bands and geometries with a ln this far below the best one are not likely, and do not say where the emission is.
 pub const UNLIKELY: f64 = 8.0;
 
-/// How probable each of some data sets (over their standard deviations) is: of light curves that differ in their values
-/// alone.
+/// Returns the probability of each of some data sets (over their standard deviations): of light curves that differ in their
+/// values alone.
 ///
 /// # Errors
 /// If a number of the prior is out of its range, or no band has any voxel.

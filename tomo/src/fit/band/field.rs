@@ -110,7 +110,7 @@ impl CurveRows {
         [moments, DMatrix::from_fn(4, 4, own)]
     }
 
-    /// Of all emission: its covariance with the data; its variance, and what it is for a field of 1.
+    /// Returns the covariance of all emission with the data, its variance, and its value for a field of 1.
     fn total(
         &self,
         parts: &DMatrix<f64>,

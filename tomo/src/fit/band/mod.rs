@@ -1,4 +1,4 @@
-//! How probable a geometry is, given the light curve of a flare that orbits in a band: the emission is marginalised, not
+//! Probability of a geometry, given the light curve of a flare that orbits in a band: the emission is marginalised, not
 //! fitted.
 //!
 //! Emission is thought of as env(x) (μ + g(x)) a with a Gaussian random field g of unit variance, the envelope

@@ -1,4 +1,4 @@
-//! Where the emission is: its first moments about the axis, given the data.
+//! Place of the emission: its first moments about the axis, given the data.
 //!
 //! With q = ∫ e exp(iφ) ρ dρ dφ dz and p = ∫ e exp(iφ) ρ² dρ dφ dz the azimuth is arg q, and the radius Re(p q̄)/|q|². Both are
 //! linear in e, hence Gaussian for every band; the angle and the quotient are taken to first order. Emission that goes round
@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 /// A mean and its standard deviation.
 pub type Normal = [f64; 2];
 
-/// Where one band has its emission.
+/// Place of the emission of one band.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     /// ln of its weight.
@@ -37,8 +37,9 @@ pub struct Interval {
     pub high: f64,
 }
 
-/// Where bands have their emission, given the data that are used (over their standard deviations). Bands come with the ln of
-/// their weights; those of the same radius, width and length one after the other, among these those of the same background.
+/// Returns the places of the emission of bands, given the data that are used (over their standard deviations). Bands come with
+/// the ln of their weights; those of the same radius, width and length one after the other, among these those of the same
+/// background.
 ///
 /// # Errors
 /// If a band has no node.

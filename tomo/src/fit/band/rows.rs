@@ -74,16 +74,16 @@ impl PolarGrid {
 pub struct CurveRows {
     /// The grid.
     pub grid: PolarGrid,
-    /// Which of the data are used; the others judge.
+    /// Mask of the data that are used; the others judge.
     pub used: Vec<bool>,
-    /// When they were taken, and how well.
+    /// Times and errors of the data.
     pub sampling: Sampling,
     /// A column for each layer of each datum of each function of the azimuth (the first slowest), ring by ring.
     pub(super) waves: DMatrix<f64>,
 }
 
 impl CurveRows {
-    /// Of numbers of all nodes of the grid for each datum, over its standard deviation.
+    /// Takes the numbers of all nodes of the grid for each datum, over its standard deviation.
     pub fn new(grid: PolarGrid, rows: &[Vec<f64>], used: Vec<bool>, sampling: Sampling) -> Self {
         let trigonometric = trigonometric(&grid);
         let mut waves = DMatrix::zeros(grid.rings, grid.waves() * rows.len() * grid.layers);
@@ -102,7 +102,7 @@ impl CurveRows {
         Self { grid, used, sampling, waves }
     }
 
-    /// Of light curves of a model, whose pixels are the numbers of a frame and whose frames are the samples.
+    /// Takes light curves of a model, whose pixels are the numbers of a frame and whose frames are the samples.
     pub fn of<T: Float>(
         model: &ForwardModel<T>,
         axis: Axis,
@@ -140,7 +140,7 @@ impl CurveRows {
     }
 }
 
-/// Where the matter of a node was at the reference time, and the weight of its light.
+/// Returns the place of the matter of a node at the reference time, and the weight of its light.
 fn point<T: Float>(batch: &Batch<T>, k: usize) -> ([f64; 3], f64) {
     let [x, y, z] = &batch.columns.pulled;
     ([x[k], y[k], z[k]].map(T::double), batch.columns.weight[k].double())

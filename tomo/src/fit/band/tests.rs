@@ -114,7 +114,7 @@ fn positive(
     libm::erfc(-expected / (2.0 * variance).sqrt()).ln()
 }
 
-/// Of draws from the prior the radius is found, and the data that were left out have a χ² of 1.
+/// The radius of draws from the prior is found, and the data that were left out have a χ² of 1.
 #[test]
 fn exact_draws_from_the_prior_are_found_again() {
     let curve = curve(60);
@@ -213,7 +213,7 @@ fn exact_quantiles_of_mixtures() {
     assert!(together(&[]).is_none());
 }
 
-/// Of a spot without noise: where it is.
+/// The place of a spot without noise is found.
 #[test]
 fn exact_a_spot_is_found_where_it_is() {
     let curve = CurveRows::new(GRID, &rows(60), vec![true; 60], sampling(60));

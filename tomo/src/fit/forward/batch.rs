@@ -15,8 +15,8 @@ const SHARE: usize = 2048;
 /// Columns of a batch's points.
 #[derive(Clone, Debug, Default)]
 pub struct Columns<T> {
-    /// Where the light was emitted; of matter that changes its radius, stretched to the one that it had at the reference
-    /// time.
+    /// Place where the light was emitted; of matter that changes its radius, stretched to the one that it had at the
+    /// reference time.
     pub position: [Vec<T>; 3],
     /// When, since the reference time.
     pub time: Vec<T>,
@@ -24,9 +24,9 @@ pub struct Columns<T> {
     pub angle: Vec<T>,
     /// Weight of emission in its pixel.
     pub weight: Vec<T>,
-    /// Where the matter was at the reference time.
+    /// Place of the matter at the reference time.
     pub pulled: [Vec<T>; 3],
-    /// Which node of the forward model each is.
+    /// Index of each node in the forward model.
     pub node: Vec<u32>,
 }
 

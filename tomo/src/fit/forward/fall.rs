@@ -1,4 +1,4 @@
-//! Where matter that changes its radius was at the reference time.
+//! Matter that changes its radius: its place at the reference time.
 
 use super::sightlines::Sightlines;
 use kerrlight_geodesic::interrupt;
@@ -16,7 +16,7 @@ pub(in crate::fit) struct Fall {
 }
 
 impl Fall {
-    /// Of nodes.
+    /// Takes the nodes of sight lines.
     pub fn new(flow: &Arc<Falling>, lines: &Sightlines) -> Self {
         let origin = |k: usize| {
             interrupt::check();

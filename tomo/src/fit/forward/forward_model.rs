@@ -15,21 +15,21 @@ use kerrlight_render::dynamics::{AngularVelocity, Axis, Injection};
 use kerrlight_render::polarization::{Stokes, StokesParameter};
 use rayon::prelude::*;
 
-/// How the matter moves, and when it is seen.
+/// Motion of the matter, and the times at which it is seen.
 #[derive(Clone, Debug)]
 pub struct Motion {
-    /// How matter moves about the axis.
+    /// Velocity of matter about the axis.
     pub velocity: AngularVelocity,
     /// Time at which the field of emission is what a representation says, M.
     pub reference: f64,
-    /// When it begins to shine; always, without one.
+    /// Time at which it begins to shine; always, without one.
     pub injection: Option<Injection>,
     /// Times of the frames, M.
     pub times: Vec<f64>,
 }
 
 impl Motion {
-    /// Where the matter at points (M) at a time since the reference time (M) is at the reference time.
+    /// Returns the places at the reference time of the matter at points (M) at a time since the reference time (M).
     pub fn matter<T: Float>(&self, axis: Axis, time: f64, [x, y, z]: [&[T]; 3]) -> [Vec<T>; 3] {
         let before = |k: usize| {
             self.velocity.before(axis, [x[k], y[k], z[k]].map(Float::double), time).map(T::of)
@@ -62,9 +62,9 @@ pub struct ForwardModel<T> {
     pub(in crate::fit) weight: Vec<T>,
     pub(in crate::fit) plain_weight: Vec<f64>,
     pub(in crate::fit) shift: Option<Shift>,
-    /// Where matter comes from that changes its radius; `rate` and `phase` then do not say it.
+    /// Origins of matter that changes its radius; `rate` and `phase` then do not say it.
     pub(in crate::fit) fall: Option<Fall>,
-    /// With which factors nodes enter several images; one image without.
+    /// Factors with which nodes enter several images; one image without.
     pub(in crate::fit) planes: Option<Planes<T>>,
     /// Emission that does not move; its parameters are the last of a field's.
     pub(in crate::fit) quiescent: Option<Quiescent>,
@@ -79,7 +79,7 @@ pub struct ForwardModel<T> {
 }
 
 impl<T: Float> ForwardModel<T> {
-    /// Of these nodes and this motion.
+    /// Makes the model of these nodes and this motion.
     ///
     /// # Errors
     /// If a number is out of its range, or redshift is asked of nodes without momenta.

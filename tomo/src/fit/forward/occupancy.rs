@@ -1,4 +1,4 @@
-//! Where in co-rotating coordinates anything shines: what is empty is not evaluated.
+//! Occupancy: the co-rotating cells where anything shines; empty ones are not evaluated.
 
 use super::sightlines::Region;
 use crate::representation::{Representation, Workspace};
@@ -7,7 +7,7 @@ use kerrlight_render::points::Coordinates;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// How a mask is kept.
+/// Settings of the mask.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OccupancySettings {
     /// Cells along each axis of the cube that holds the region.
@@ -19,7 +19,7 @@ pub struct OccupancySettings {
     pub memory: f64,
 }
 
-/// At how many times a field that changes is looked at, once it has been looked at at all of them.
+/// Number of times at which a field that changes is looked at, once it has been looked at at all of them.
 const LATER: usize = 4;
 
 /// Cells of a cube about the hole that shine, or may.
@@ -124,7 +124,7 @@ impl Occupancy {
         at.map(|k| (k as f64 + random.random::<f64>()) * width - self.half_width)
     }
 
-    /// Which cells may shine.
+    /// Returns the cells that may shine.
     pub(in crate::fit) fn lit(&self) -> Vec<usize> {
         (0..self.occupied.len()).filter(|cell| self.occupied[*cell]).collect()
     }

@@ -7,14 +7,14 @@
 use kerrlight_geodesic::analytic::CriticalCurve;
 use kerrlight_geodesic::{Kerr, Observer};
 
-/// How pixels near the critical curve are seen.
+/// Rays of pixels near the critical curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RingRays {
     /// Rays of each of them.
     pub count: usize,
     /// Width of a pixel on the screen, M.
     pub spacing: f64,
-    /// By which part of a pixel they are shifted, those that leave it coming back on the other side.
+    /// Part of a pixel by which they are shifted, those that leave it coming back on the other side.
     pub shift: [f64; 2],
 }
 
@@ -30,7 +30,7 @@ impl RingRays {
 /// Rays of all pixels, pixel after pixel.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(in crate::fit) struct PixelRays {
-    /// Where they are on the screen, M to the right and upwards.
+    /// Places on the screen, M to the right and upwards.
     pub places: Vec<[f64; 2]>,
     /// Pixel k has the rays `starts[k]..starts[k + 1]`.
     pub starts: Vec<usize>,
@@ -38,7 +38,7 @@ pub(in crate::fit) struct PixelRays {
 
 /// Half the diagonal of a pixel of width 1.
 const HALF_DIAGONAL: f64 = core::f64::consts::FRAC_1_SQRT_2;
-/// How far beyond the pixel the critical curve may be, M: the second image lies within that.
+/// Largest distance of the critical curve from the pixel, M: the second image lies within that.
 const BEYOND: f64 = 0.3;
 /// Points of the critical curve.
 const POINTS: u32 = 256;
@@ -77,7 +77,7 @@ impl PixelRays {
         all
     }
 
-    /// With a ray in the middle of each of n × n parts of the pixels (M wide) that have one ray.
+    /// Puts a ray in the middle of each of n × n parts of the pixels (M wide) that have one ray.
     pub fn divided(self, (spacing, n): (f64, usize)) -> Self {
         let place = |k: usize| ((k as f64 + 0.5) / n as f64 - 0.5) * spacing;
         let mut all = Self { places: Vec::new(), starts: vec![0] };
@@ -105,7 +105,7 @@ impl PixelRays {
     }
 }
 
-/// Which places on the screen are nearer to the critical curve than a limit, M.
+/// Returns the places on the screen that are nearer to the critical curve than a limit, M.
 pub(in crate::fit) fn near_the_ring(
     (hole, observer): (&Kerr, &Observer),
     places: &[[f64; 2]],

@@ -35,7 +35,7 @@ pub(in crate::fit) struct Shift {
 const SHARE: usize = 4096;
 
 impl Shift {
-    /// Of gas on the spheres of a hole, or falling in; the sightlines must have momenta.
+    /// Takes gas on the spheres of a hole, or falling in; the sightlines must have momenta.
     pub fn new(lines: &Sightlines, hole: &Kerr, velocity: &AngularVelocity, power: f64) -> Self {
         let node = |k| {
             interrupt::check();

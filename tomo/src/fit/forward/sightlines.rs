@@ -1,5 +1,5 @@
-//! Where the light of a movie's pixels may come from: nodes on rays inside the region of recovery, and
-//! what each gives to its pixel. Computed once for a fit.
+//! Sight lines: nodes on rays inside the region of recovery, from where the light of a movie's pixels may come, and what each
+//! gives to its pixel. Computed once for a fit.
 
 use super::pixel_rays::PixelRays;
 use crate::Error;
@@ -12,7 +12,7 @@ use kerrlight_geodesic::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Where emission is looked for.
+/// Region in which emission is looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Region {
     /// Least radius.
@@ -65,7 +65,7 @@ impl Region {
     }
 }
 
-/// Where nodes lie on a ray.
+/// Placement of nodes on a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Sampling {
@@ -89,9 +89,9 @@ pub enum Sampling {
 /// Quantities wanted of nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SightlineRequest {
-    /// Where they may lie.
+    /// Region of the nodes.
     pub region: Region,
-    /// How they are spread.
+    /// Placement of the nodes.
     pub sampling: Sampling,
     /// Delays, for slow light.
     pub delay: bool,
@@ -104,7 +104,7 @@ pub struct SightlineRequest {
 pub struct Sightlines {
     /// Pixels of the screen, those without a node included.
     pub pixels: usize,
-    /// Which pixel each ray belongs to.
+    /// Pixel of each ray.
     pub pixel: Vec<u32>,
     /// Ray k has the nodes `starts[k]..starts[k + 1]`.
     pub starts: Vec<usize>,

@@ -12,7 +12,7 @@ use kerrlight_render::polarization::{
 };
 use rayon::prelude::*;
 
-/// How polarised light of a fit is seen.
+/// View of polarised light of a fit.
 #[derive(Clone, Debug)]
 pub struct PolarizedView {
     /// The law of emission.
@@ -21,9 +21,9 @@ pub struct PolarizedView {
     pub axis: Axis,
     /// Sine of the angle between the spin and the line of sight.
     pub sin_inclination: f64,
-    /// Where each pixel's ray arrives: α and β, M.
+    /// Place where each pixel's ray arrives: α and β, M.
     pub screen: [Vec<f64>; 2],
-    /// Of the spin on the sky, radians east of north.
+    /// Position angle of the spin on the sky, radians east of north.
     pub position_angle: f64,
 }
 
@@ -153,7 +153,7 @@ impl Observable {
 /// Factors with which the emission of a node enters several images.
 #[derive(Clone, Debug)]
 pub(in crate::fit) struct Planes<T> {
-    /// How many.
+    /// Number of planes.
     pub count: usize,
     /// Pixels of one image.
     pub stride: usize,
@@ -166,7 +166,7 @@ impl<T: Float> Planes<T> {
         size_of_val(&*self.factors)
     }
 
-    /// Of the factors of all nodes.
+    /// Takes the factors of all nodes.
     pub fn new(factors: &[Stokes], parameters: &[StokesParameter], stride: usize) -> Self {
         let mut all = Vec::with_capacity(factors.len() * parameters.len());
         for stokes in factors {

@@ -38,8 +38,8 @@ pub struct Rule {
 const ROW: u32 = 64 * kernels::ROW;
 
 impl Learning {
-    /// Of so many parameters but those of `others`, whose steps are not Adam's; `positive`: they are held at zero or
-    /// above.
+    /// Takes so many parameters but those of `others`, whose steps are not Adam's; `positive`: they are held at zero
+    /// or above.
     ///
     /// # Errors
     /// If the device has no room, or fails.

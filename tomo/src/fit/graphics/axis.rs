@@ -16,7 +16,8 @@ pub struct AxisSlope {
 }
 
 impl AxisSlope {
-    /// Behind the text of a shader and its bindings; so many pairs, and so many nodes if their weights depend on the axis.
+    /// Appends to the text of a shader and its bindings; so many pairs, and so many nodes if their weights depend on the
+    /// axis.
     ///
     /// # Errors
     /// If the device has no room, or fails.
@@ -58,7 +59,7 @@ impl AxisSlope {
         device.write(of_weights, &floats(slopes.as_flattened()))
     }
 
-    /// Before a step.
+    /// Prepares a step.
     pub fn begin(&self, commands: &mut Commands) {
         commands.clear(&self.sum);
     }

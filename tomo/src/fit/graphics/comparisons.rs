@@ -41,14 +41,14 @@ pub struct Comparisons {
     pub uses: Vec<u32>,
     /// Rows of inverse covariances.
     pub precision: Vec<f32>,
-    /// Of each frame, where its visibilities and closure quantities begin and end.
+    /// Begin and end of the visibilities and closure quantities of each frame.
     pub frames: Vec<[u32; 4]>,
-    /// Where pixels are; none if nothing but fluxes is compared.
+    /// Grid of pixels; none if nothing but fluxes is compared.
     pub sky: Option<ImageGrid>,
 }
 
 impl Comparisons {
-    /// Of the data of a fit; none if there are such as only this processor compares.
+    /// Takes the data of a fit; none if there are such as only this processor compares.
     pub fn new(objective: &Objective<f32>) -> Option<Self> {
         let mut all = Self::default();
         for frame in 0..objective.model.frames() {
@@ -159,7 +159,7 @@ impl Comparisons {
     }
 }
 
-/// Where so many pairs of words come to lie behind others.
+/// Returns the range of so many pairs of words behind others.
 fn range(pairs: &[u32], count: usize) -> Range<u32> {
     let first = pairs.len() / 2;
     first as u32..(first + count) as u32

@@ -20,7 +20,7 @@ pub struct FallTable {
 }
 
 impl FallTable {
-    /// Of a fall.
+    /// Takes a fall.
     pub fn new(fall: &Fall) -> Self {
         let (flow, _, limits) = fall.parts();
         let Table { cells, last, ends } = flow.numbers();

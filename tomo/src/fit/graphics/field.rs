@@ -25,7 +25,7 @@ pub enum Field {
 }
 
 impl Field {
-    /// Of a representation; with `of_places` it finds dL/dplace, too.
+    /// Takes a representation; with `of_places` it finds dL/dplace, too.
     ///
     /// # Errors
     /// If it has no kernels, or the device fails.

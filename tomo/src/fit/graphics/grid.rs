@@ -17,7 +17,7 @@ pub struct Level {
     pub per_length: [f32; 3],
     /// Numbers on a node.
     pub planes: usize,
-    /// Where they start in the parameters: plane after plane.
+    /// Start in the parameters: plane after plane.
     pub offset: usize,
 }
 
@@ -26,7 +26,7 @@ pub struct Level {
 pub struct Levels {
     /// The grids.
     pub all: Vec<Level>,
-    /// Of voxels: 0 sigmoid, 1 softplus, 2 none.
+    /// Activation of voxels: 0 sigmoid, 1 softplus, 2 none.
     pub activation: u32,
 }
 
@@ -120,7 +120,7 @@ impl Binding<'_> {
         Ok((bound, [invocations.min(ROW).div_ceil(64) as u32, rows as u32]))
     }
 
-    /// From slopes of so many points to the gradient.
+    /// Adds slopes of so many points to the gradient.
     fn scattered(
         &self,
         levels: &Levels,
@@ -204,7 +204,7 @@ pub struct Features {
     blocks: Vec<Layers>,
 }
 
-/// Of a block: before the network, behind it, and back.
+/// Kernels of a block: before the network, behind it, and back.
 #[derive(Debug)]
 struct Layers {
     features: Vec<Task>,

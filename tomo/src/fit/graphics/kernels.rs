@@ -15,7 +15,7 @@ pub fn compiled(device: &Compute, source: &str, entries: &[&str]) -> Result<Vec<
 /// Workgroups in a row of the grid: fewer than any device allows.
 pub const ROW: u32 = 32_768;
 
-/// So many workgroups, in rows.
+/// Arranges so many workgroups in rows.
 pub fn grid(workgroups: usize) -> [u32; 2] {
     let count = workgroups as u32;
     [count.min(ROW), count.div_ceil(ROW)]

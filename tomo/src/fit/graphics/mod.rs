@@ -77,7 +77,7 @@ pub struct GraphicsFit {
     events: bool,
     /// True if the device makes all residuals.
     makes_residuals: bool,
-    /// Where there are data but images, which it compares.
+    /// Comparison with data but images, where there are any.
     visibilities: Option<Visibilities>,
     /// Pixels without a ray.
     dark: Vec<usize>,

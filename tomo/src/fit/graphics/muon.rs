@@ -28,7 +28,7 @@ struct Binding<'a> {
 }
 
 impl Turning {
-    /// Of these matrices among the parameters; none if there are none.
+    /// Takes these matrices among the parameters; none if there are none.
     ///
     /// # Errors
     /// If the device has no room, or fails.

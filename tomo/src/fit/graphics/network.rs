@@ -37,7 +37,7 @@ pub struct Network {
     pub blocks: Vec<Block>,
     /// Memory that the blocks share.
     pub memory: Memory,
-    /// Which of the slopes those of given inputs are.
+    /// Index among the slopes of those of given inputs.
     pub of_inputs: usize,
 }
 

@@ -10,7 +10,7 @@ pub enum Pending {
     Known(Loss),
 }
 
-/// Of images: factor on the sum of squares, squares of pixels without a ray, and weight of the term.
+/// Loss of images: factor on the sum of squares, squares of pixels without a ray, and weight of the term.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Squares {
     pub scale: f64,
@@ -18,7 +18,7 @@ pub struct Squares {
     pub weight: f64,
 }
 
-/// Of a term, what its χ² is multiplied by to be that of a datum, and its weight.
+/// Share of a term: the factor of its χ² to be that of a datum, and its weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Share {
     scale: f64,
@@ -26,7 +26,7 @@ pub struct Share {
 }
 
 impl Share {
-    /// Of all terms but that of images, in a step of so many frames.
+    /// Returns the shares of all terms but that of images, in a step of so many frames.
     pub fn all(objective: &Objective<f32>, frames: usize) -> Vec<Self> {
         let of = |other: &crate::fit::loss::objective::Weighted<_>| Self {
             scale: 1.0 / objective.data_of(&*other.term, frames),
@@ -42,7 +42,8 @@ impl Share {
 }
 
 impl Pending {
-    /// With what the device has recorded: a sum of squares, and the bits of the number of points; χ² of the other terms.
+    /// Returns the loss from what the device has recorded: a sum of squares, and the bits of the number of points; χ² of
+    /// the other terms.
     pub fn ended(self, record: &[f32], others: &[f32]) -> Loss {
         let points = record[1].to_bits() as usize;
         let (image, shares) = match self {

@@ -1,4 +1,4 @@
-//! From nodes on the device to points of a batch, and from their emission to pixels, residuals and back.
+//! Kernels from nodes on the device to points of a batch, and from their emission to pixels, residuals and back.
 
 use super::axis::AxisSlope;
 use super::bytes::{floats, read, words};
@@ -47,7 +47,7 @@ pub struct Pair {
     pub datum: f32,
 }
 
-/// How pairs become points.
+/// Gathering of pairs into points.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Gathering {
     /// The axis that matter turns about.
@@ -75,11 +75,11 @@ pub struct Points {
     pub bends: Buffer,
     /// dL/demission.
     pub cotangents: Buffer,
-    /// How many there are: known to the device alone.
+    /// Number of points: known to the device alone.
     pub extent: Buffer,
     /// If the axis is learnt, dL/dplace, which fields write.
     pub of_places: Buffer,
-    /// How many there may be.
+    /// Largest number of points.
     pub room: usize,
 }
 
@@ -218,7 +218,7 @@ impl Pixels {
         device.write(&self.task, &words(task.as_flattened()))
     }
 
-    /// From so many pairs to points.
+    /// Gathers so many pairs into points.
     pub fn gather(&self, commands: &mut Commands, pairs: usize) {
         let [count, scan, collect] = &self.forward;
         commands.dispatch(count, grid(pairs));
@@ -226,13 +226,13 @@ impl Pixels {
         commands.dispatch(collect, grid(pairs));
     }
 
-    /// From emission to pixels, and to the squares of their residuals.
+    /// Sums emission into pixels, and the squares of their residuals.
     pub fn sum(&self, commands: &mut Commands, pairs: usize) {
         commands.dispatch(&self.sums[0], grid(pairs));
         commands.dispatch(&self.sums[1], [1, 1]);
     }
 
-    /// From dL/dpixel to dL/demission.
+    /// Spreads dL/dpixel to dL/demission.
     pub fn spread(&self, commands: &mut Commands, pairs: usize) {
         commands.dispatch(&self.spread, grid(pairs));
     }

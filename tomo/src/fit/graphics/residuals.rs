@@ -123,7 +123,8 @@ impl GraphicsFit {
         Ok(Pending::Known(loss))
     }
 
-    /// From pairs of a piece to the light of their rays; before the first piece of a step, a new gradient.
+    /// Computes the light of the rays of the pairs of a piece; before the first piece of a step, a new
+    /// gradient.
     fn light(&self, commands: &mut Commands, pairs: usize, points: usize, ends: Ends) {
         if ends.is_first {
             commands.clear(&self.learning.gradient);
@@ -134,7 +135,8 @@ impl GraphicsFit {
         self.pixels.sum(commands, pairs);
     }
 
-    /// From the cotangents of a piece to the gradient; behind the last piece of a step that is taken, the step.
+    /// Computes the gradient from the cotangents of a piece; behind the last piece of a step that is taken, the
+    /// step.
     fn back(&self, commands: &mut Commands, pairs: usize, points: usize, ends: Ends) {
         self.field.backward(commands, points);
         self.pixels.axis.iter().for_each(|axis| axis.add(commands, pairs));

@@ -1,4 +1,4 @@
-//! How much of a step the device takes at a time.
+//! Rooms: the part of a step that the device takes at a time.
 
 use super::pixels::Room;
 use crate::fit::learning::training::BatchSize;
@@ -18,7 +18,7 @@ pub struct Pieces {
 }
 
 impl Pieces {
-    /// Of the steps of a fit.
+    /// Takes the steps of a fit.
     pub fn new(objective: &Objective<f32>, batch: BatchSize) -> Self {
         let model = &objective.model;
         let frames = match batch {
@@ -41,7 +41,7 @@ impl Pieces {
     }
 }
 
-/// Where a piece of a step is in it.
+/// Place of a piece in its step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ends {
     /// True if it is the first.

@@ -6,7 +6,7 @@
 pub struct Shape {
     /// Input.
     pub front: Front,
-    /// Where its parameters start.
+    /// Start of its parameters.
     pub start: usize,
     /// Units of a hidden layer.
     pub width: usize,
@@ -14,7 +14,7 @@ pub struct Shape {
     pub hidden: usize,
     /// Hidden layer, counted from 1, to whose units the input is appended.
     pub skip: Option<usize>,
-    /// Of the output: 0 sigmoid, 1 softplus, 2 none.
+    /// Activation of the output: 0 sigmoid, 1 softplus, 2 none.
     pub activation: u32,
     /// Added to the output before it.
     pub shift: f32,
@@ -32,7 +32,7 @@ pub enum Front {
         /// Degree of the positional encoding.
         degree: usize,
     },
-    /// So many numbers that another kernel has made, and a one behind them; their slopes are wanted.
+    /// Numbers that another kernel has made, so many, and a one behind them; their slopes are wanted.
     Given(usize),
 }
 
@@ -41,7 +41,7 @@ pub enum Front {
 pub struct Layer {
     /// Columns of the units before it.
     pub base: usize,
-    /// How many.
+    /// Number of units.
     pub units: usize,
     /// Columns behind them: the encoded point and the one, or the one alone.
     pub tail: usize,
@@ -51,11 +51,12 @@ pub struct Layer {
     pub outputs: usize,
     /// Their column.
     pub into: usize,
-    /// Of its parameters.
+    /// Offset of its parameters.
     pub offset: usize,
 }
 
-/// How 256 lanes share a tile of a product of matrices, four numbers of the left one by eight of the right one each.
+/// Tiling: how 256 lanes share a tile of a product of matrices, four numbers of the left one by eight of the right
+/// one each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tiling {
     left_lanes: usize,
@@ -64,7 +65,7 @@ pub struct Tiling {
 }
 
 impl Tiling {
-    /// For layers so wide: no wider than they are, where that can be.
+    /// Returns the tiling for layers so wide: no wider than they are, where that can be.
     pub fn of(width: usize) -> Self {
         let (right_lanes, slab) = match width {
             0..=32 => (4, 8),

@@ -1,4 +1,4 @@
-//! From the light of rays to visibilities, what data say of them, and back to rays.
+//! Kernels from the light of rays to visibilities, their losses, and back to rays.
 
 use super::bytes::{floats, words};
 use super::comparisons::Comparisons;
@@ -29,8 +29,8 @@ pub struct Visibilities {
 }
 
 impl Visibilities {
-    /// Of a fit, so many frames at a time, whose losses are kept for so many steps; none if there are data that only this
-    /// processor compares.
+    /// Takes the visibilities of a fit, so many frames at a time, whose losses are kept for so many steps; none if there
+    /// are data that only this processor compares.
     ///
     /// # Errors
     /// If the device has no room, or fails.
@@ -106,7 +106,7 @@ impl Visibilities {
         device.write(&self.task, &words(&task.map(|x| x as u32)))
     }
 
-    /// From the light of rays in so many frames to losses, and to slopes along the light, which are added.
+    /// Computes from the light of rays in so many frames losses, and slopes along the light, which are added.
     pub fn compare(&self, commands: &mut Commands, frames: usize) {
         let [look, compare, close, pull, open, shine, add_losses] = &self.tasks;
         let [seen, closures] = self.most;

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// Why bytes are no checkpoint of this fit.
+/// Reason why bytes are no checkpoint of this fit.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CheckpointError {
@@ -25,9 +25,9 @@ pub enum CheckpointError {
     /// Bytes that are not those that were written.
     #[error("damaged: the stored checksum is {written:08x}, that of the bytes {found:08x}")]
     Damaged {
-        /// As it was written.
+        /// Checksum as it was written.
         written: u32,
-        /// Of the bytes.
+        /// Checksum of the bytes.
         found: u32,
     },
     /// A tensor that does not fit.
@@ -35,9 +35,9 @@ pub enum CheckpointError {
     Tensor {
         /// Its name.
         name: String,
-        /// How many numbers it has.
+        /// Number of its parameters.
         found: usize,
-        /// How many the fit needs.
+        /// Number of parameters that the fit needs.
         wanted: usize,
     },
 }
@@ -53,7 +53,7 @@ pub struct Header {
     /// Steps taken by the state that is gone back to; none yet, without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub good_step: Option<u64>,
-    /// How often it has gone back.
+    /// Number of times it has gone back.
     pub setbacks: u32,
     /// The settings of the fit, as they were given.
     pub settings: String,
@@ -101,7 +101,7 @@ pub fn encode(state: &State<f32>, settings: &str) -> Result<Vec<u8>, Error> {
 /// The tensor that holds the checksum of all other bytes.
 const CHECKSUM: &str = "checksum";
 
-/// Where the bytes of the checksum are.
+/// Returns the range of the bytes of the checksum.
 fn checksum_place(bytes: &[u8]) -> Result<Range<usize>, CheckpointError> {
     let (length, metadata) = SafeTensors::read_metadata(bytes)?;
     let missing = || CheckpointError::Header("its checksum is missing".to_owned());

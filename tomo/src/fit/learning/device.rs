@@ -13,7 +13,7 @@ use crate::optimise::Adam;
 use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::Axis;
 
-/// Why a device does not take the steps of a fit: it failed, or it does not do what settings ask for.
+/// Failure of a device to take the steps of a fit: it failed, or it does not do what settings ask for.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct DeviceError(pub String);

@@ -33,7 +33,7 @@ impl<T: Float> Trainer<'_, T> {
         self.moved(taken, state)
     }
 
-    /// How many steps to take at once.
+    /// Returns the number of steps to take at once.
     fn stretch(&self, delegate: &DeviceRunner<T>, step: u64) -> u64 {
         let to_multiple = |of: u64| of - step % of;
         let mut count =

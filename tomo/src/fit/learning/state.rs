@@ -35,11 +35,11 @@ pub struct Progress<T> {
 /// All that a fit remembers: what a checkpoint holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State<T> {
-    /// Where it is.
+    /// Present state.
     pub now: Progress<T>,
-    /// Where it goes back to when it diverges.
+    /// State it goes back to when it diverges.
     pub good: Option<Box<Progress<T>>>,
-    /// How often it has gone back.
+    /// Number of times it has gone back.
     pub setbacks: u32,
 }
 
@@ -59,7 +59,7 @@ pub enum Outcome {
     },
 }
 
-/// Why a fit cannot go on.
+/// Reason why a fit cannot go on.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "the loss is {loss} at step {step}, after {setbacks} returns to earlier steps with ever smaller learning rates"

@@ -14,7 +14,7 @@ use rand::seq::index;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Where a loss is taken.
+/// Parameters at which a loss is taken.
 #[derive(Clone, Copy)]
 pub struct Place<'a, T> {
     /// Parameters of the representation.

@@ -13,7 +13,7 @@ pub struct Trainer<'a, T> {
     pub objective: Objective<T>,
     /// The field.
     pub representation: &'a dyn Representation<T>,
-    /// How it is run.
+    /// Training of the fit.
     pub training: Training,
     /// A device that takes the steps in place of this processor, if there is one.
     pub device: Option<DeviceRunner<T>>,
@@ -21,7 +21,7 @@ pub struct Trainer<'a, T> {
     pub(in crate::fit) buffers: Buffers<T>,
     pub(in crate::fit) changes: ChangeBuffers<T>,
     pub(in crate::fit) gradient: Vec<T>,
-    /// Which parameters are matrices.
+    /// Parameters that are matrices.
     pub(in crate::fit) matrices: Vec<WeightMatrix>,
     pub(in crate::fit) pairs: Vec<(u32, u32)>,
     pub(in crate::fit) frames: Vec<usize>,

@@ -1,4 +1,4 @@
-//! How a fit is run.
+//! Settings of training.
 
 use crate::fit::forward::occupancy::OccupancySettings;
 use crate::fit::forward::sightlines::Region;
@@ -13,15 +13,15 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum BatchSize {
-    /// That many random (ray, frame) pairs; for images alone.
+    /// Random (ray, frame) pairs, that many; for images alone.
     Pixels(#[schemars(range(min = 1, max = 1_000_000_000), extend("unit" = "pixels"))] usize),
-    /// That many random frames, whole.
+    /// Random frames, that many, whole.
     Frames(#[schemars(range(min = 1), extend("unit" = "frames"))] usize),
     /// All frames, whole: the same loss at every step.
     All,
 }
 
-/// When a mask of what shines is used and renewed.
+/// Times at which a mask of what shines is used and renewed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OccupancyPlan {
     /// The mask.
@@ -32,7 +32,7 @@ pub struct OccupancyPlan {
     pub every: u64,
 }
 
-/// How a fit is run.
+/// Training: optimiser, steps and batches.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Training {
     /// Seed of the parameters and of all that is drawn.
@@ -53,7 +53,7 @@ pub struct Training {
     pub occupancy: Option<OccupancyPlan>,
     /// Price of change while matter carries emission, where a representation allows it.
     pub change: Option<ChangePrice>,
-    /// Where emission is looked for.
+    /// Region in which emission is looked for.
     pub region: Region,
     /// Steps from one good state that is kept to the next.
     pub keep_every: u64,

@@ -1,4 +1,4 @@
-//! Which nodes of the grid count: the columns of the matrix.
+//! Nodes of the grid that count: the columns of the matrix.
 
 /// No column.
 pub(super) const NONE: u32 = u32::MAX;
@@ -10,8 +10,8 @@ pub(super) struct Active {
     pub node: Vec<u32>,
     /// Column of each node, or [`NONE`].
     pub column: Vec<u32>,
-    /// By its first node, whether any of a cell's nodes counts. Cells of nodes at the edge reach into the next row, plane
-    /// or knot: no ray meets them.
+    /// Mask of cells any of whose nodes counts, by their first nodes. Cells of nodes at the edge reach into the next row,
+    /// plane or knot: no ray meets them.
     pub cells: Vec<bool>,
     /// Columns of a quiescent image behind those of nodes: all of them count.
     pub beside: usize,

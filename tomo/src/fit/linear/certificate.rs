@@ -1,4 +1,4 @@
-//! How far from the minimum a field can be, or how flat it is there.
+//! Certificates: the largest distance of a field from the minimum, or how flat it is there.
 
 /// Bounds at a field x, from the gradient g with respect to every node of the grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +48,7 @@ impl Certificate {
     }
 }
 
-/// How flat the function is at a field x, where it is not convex: there is no bound on how much less it could be elsewhere.
+/// Flatness of the function at a field x, where it is not convex: there is no bound on how much less it could be elsewhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stationarity {
     /// f(x), the loss: dimensionless.

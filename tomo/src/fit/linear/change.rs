@@ -1,23 +1,23 @@
 //! Motion as a weak constraint: emission that changes while matter carries it, at a price.
 //!
-//! With ε(X, t) the emission at time t of the matter with label X, its place at a label time, ∂ε/∂t at fixed X is the
-//! derivative along the flow. Its integral ∫∫ |∂ε/∂t| dV dt is penalised: a large weight gives a field that matter
-//! carries unchanged, a small one a field that is free at each time.
+//! Change of emission along the flow. With ε(X, t) the emission at time t of the matter with label X, its place at a label
+//! time, ∂ε/∂t at fixed X is the derivative along the flow. Its integral ∫∫ |∂ε/∂t| dV dt is penalised: a large weight gives a
+//! field that matter carries unchanged, a small one a field that is free at each time.
 
 use crate::Error;
 use crate::fit::Region;
 use crate::fit::loss::regulariser::Shape;
 use crate::representation::{Allowed, Knots};
 
-/// How emission may change.
+/// Change of emission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Change {
     /// Times at which fields are given, and what these mean.
     pub knots: Knots,
     /// Factor on ∫∫ |∂ε/∂t| dV dt.
     pub weight: f64,
-    /// Where emission is born, and is at the start; anywhere, if none is given. What matter would carry in from elsewhere
-    /// has to be born at the edge then, at the price of all births. Fields that may also fade are not bound to it.
+    /// Region where emission is born, and is at the start; anywhere, if none is given. What matter would carry in from
+    /// elsewhere has to be born at the edge then, at the price of all births. Fields that may also fade are not bound to it.
     pub within: Option<Region>,
     /// An emission s, if births that were found are to cost less in the rounds that follow: `weight` · s/(s + e) with e
     /// around them in the round before.

@@ -7,7 +7,7 @@ use super::scaled::{Scaled, add, dot};
 use core::ops::ControlFlow;
 use std::collections::VecDeque;
 
-/// Why iterations ended.
+/// Reason why iterations ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Ending {
@@ -15,7 +15,7 @@ pub enum Ending {
     Converged,
     /// The value hardly falls any more, by less than noise would change it.
     Settled,
-    /// As many iterations as were allowed.
+    /// The allowed iterations were used up.
     Exhausted,
     /// No step helps: within rounding of the minimum.
     Rounding,
@@ -23,7 +23,7 @@ pub enum Ending {
     Cancelled,
 }
 
-/// When to end.
+/// Conditions to end.
 #[derive(Clone, Copy)]
 pub(super) struct Stop {
     pub iterations: usize,
@@ -51,7 +51,7 @@ impl RecentValues {
 /// Told the value and the numbers after each iteration.
 pub(super) type Each<'a> = dyn FnMut(f64, &[f64]) -> ControlFlow<()> + 'a;
 
-/// Where a descent ended.
+/// Result of a descent.
 pub(super) struct Descended {
     pub x: Vec<f64>,
     pub value: f64,

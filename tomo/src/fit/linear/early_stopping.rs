@@ -13,7 +13,7 @@ use crate::Error;
 use core::ops::ControlFlow;
 use kerrlight_common::simd::Float;
 
-/// How long the best field of one of many problems is looked for.
+/// Rule that stops the solution of one of many similar problems.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StopRule {
     /// Iterations over all nodes, from a dark field.
@@ -45,7 +45,7 @@ impl StopRule {
 struct Round {
     least: Least,
     ending: Ending,
-    /// At all nodes.
+    /// Gradient at all nodes.
     gradient: Vec<f64>,
 }
 
@@ -153,7 +153,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
     }
 }
 
-/// Of iterations that end where they hardly lower the function.
+/// Returns settings of iterations that end where they hardly lower the function.
 fn settling() -> LinearSettings {
     LinearSettings { settled: SETTLED, tolerance: 0.0, ..LinearSettings::default() }
 }

@@ -1,4 +1,4 @@
-//! Why a linear problem has no solution.
+//! Reasons why a linear problem has no solution.
 
 /// Failure of a linear problem or of a scan of axes.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -7,9 +7,9 @@ pub enum LinearError {
     /// A χ² that is no finite number.
     #[error("{data} of frame {frame}: χ² is {value}, which is not a finite number")]
     NotFinite {
-        /// Which data.
+        /// Name of the data.
         data: String,
-        /// Of which frame of the movie, counted from 0.
+        /// Frame of the movie, counted from 0.
         frame: usize,
         /// Their χ².
         value: f64,
@@ -35,7 +35,7 @@ pub enum LinearError {
     /// Axes that data cannot tell apart.
     #[error("the losses of all {axes} axes are {loss:.6e}: the data do not constrain the axis")]
     Alike {
-        /// How many.
+        /// Number of axes.
         axes: usize,
         /// Their loss.
         loss: f64,

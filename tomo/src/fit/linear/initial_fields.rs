@@ -12,7 +12,7 @@ const SPOT: f64 = 0.1;
 /// Spots are dark beyond so many standard deviations.
 const EDGE: f64 = 3.0;
 
-/// How many spots are tried: circles about the axis, and spots on each.
+/// Numbers of spots that are tried: circles about the axis, and spots on each.
 #[derive(Clone, Copy)]
 pub(super) struct Spots {
     pub circles: usize,
@@ -23,13 +23,13 @@ pub(super) struct Spots {
 pub(super) struct InitialField {
     /// The field that it began with, at the nodes that count.
     pub start: Vec<f64>,
-    /// Where it ended.
+    /// Field at its end.
     pub x: Vec<f64>,
     /// The value there.
     pub value: f64,
 }
 
-/// How lit fields are tried.
+/// Trials of lit fields.
 #[derive(Clone, Copy)]
 pub(super) struct Trials {
     /// Number of candidate spots.

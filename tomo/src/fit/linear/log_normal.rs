@@ -19,12 +19,12 @@ use kerrlight_common::simd::Float;
 #[derive(Clone, Debug)]
 pub struct LogNormalField {
     logarithm: GaussianField,
-    /// Where the density is highest, one number for each wave.
+    /// Waves at which the density is highest, one number for each.
     center: Vec<f64>,
 }
 
 impl LogNormalField {
-    /// With this law of the logarithm at the nodes.
+    /// Takes this law of the logarithm at the nodes.
     ///
     /// # Errors
     /// If a number is out of its range.
@@ -55,7 +55,7 @@ impl LogNormalField {
 pub(super) struct Posterior<'a, 'b, T: Float> {
     pub objective: Objective<'a, 'b, T>,
     pub prior: &'b LogNormalField,
-    /// Where emission stays.
+    /// Bound below which emission stays.
     pub upper: f64,
 }
 
@@ -88,7 +88,7 @@ impl<T: Float + Default> Posterior<'_, '_, T> {
 
 const STEPS: Lbfgs = Lbfgs { memory: 16, evaluations: 20 };
 
-/// Where a descent is.
+/// State of a descent.
 struct Place {
     white: Vec<f64>,
     state: LbfgsState<f64>,

@@ -16,17 +16,17 @@ use rand_pcg::Pcg64;
 /// Penalties on a field, and how it may change.
 #[derive(Clone, Copy)]
 pub(super) struct Penalised<'a> {
-    /// On the field of each knot.
+    /// Priors on the field of each knot.
     pub priors: &'a [Prior],
     /// The nodes of the grid.
     pub shape: Shape,
     /// Gaussian on the nodes, and one over the number of data that it is beside.
     pub gaussian: Option<(&'a GaussianField, f64)>,
-    /// Along the flow.
+    /// Change along the flow.
     pub change: Change,
-    /// Of births, at all knots but the first, beside the weight of the change; all are 1 if there are none.
+    /// Prices of births, at all knots but the first, beside the weight of the change; all are 1 if there are none.
     pub prices: &'a [f64],
-    /// Behind the values of nodes, with penalties of its own.
+    /// Static image behind the values of nodes, with penalties of its own.
     pub quiescent: Option<&'a Quiescent>,
     /// The largest emission that is allowed.
     pub upper: f64,
@@ -65,8 +65,8 @@ impl Penalised<'_> {
         }
     }
 
-    /// Of values at all nodes and knots; those on fields are the means over time of a field that changes, sums over what
-    /// is born. Adds slopes.
+    /// Returns the objective of values at all nodes and knots; those on fields are the means over time of a field that
+    /// changes, sums over what is born. Adds slopes.
     pub fn value_and_gradient(&self, x: &[f64], slopes: &mut [f64]) -> f64 {
         let of_image = self.quiescent.map_or(0.0, |image| image.penalty(x, slopes));
         let fields = self.shape.count() * self.change.knots.count;

@@ -1,4 +1,4 @@
-//! From values at some nodes of the grid to pixels, as a sparse matrix, and back.
+//! Operator from values at some nodes of the grid to pixels, as a sparse matrix, and back.
 
 use super::active::{Active, NONE};
 use super::data::Data;
@@ -232,7 +232,7 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         self.through(x, false, link).0 / self.frames.len() as f64
     }
 
-    /// Which of the nodes that count any ray meets.
+    /// Returns those of the nodes that count which any ray meets.
     pub fn seen(&self) -> Vec<bool> {
         let link = |_: usize, _: &[T], slopes: &mut [T]| {
             slopes.fill(T::one());

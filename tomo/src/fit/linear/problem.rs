@@ -36,12 +36,12 @@ pub struct LinearProblem<'a, T: Float> {
     /// what is minimised is (Σ weight · χ² + |L (x − center)|²)/data, −2/data times the logarithm of a density if the
     /// weights are 1.
     pub gaussian: Option<&'a GaussianField>,
-    /// How emission may change while matter carries it; [`Change::NONE`] is the usual.
+    /// Change of emission while matter carries it; [`Change::NONE`] is the usual.
     pub change: Change,
 }
 
 impl<T: Float + Default> LinearProblem<'_, T> {
-    /// Where a prior's density is highest: there a descent without a coarse problem begins.
+    /// Returns the field at which a prior's density is highest: there a descent without a coarse problem begins.
     pub(super) fn center(&self) -> Option<Vec<f64>> {
         let inside = |x: &f64| x.clamp(0.0, self.upper);
         self.gaussian.map(|gaussian| gaussian.center().iter().map(inside).collect())
@@ -70,7 +70,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         Active::new(&is_active, &self.voxels.corners(), self.beside())
     }
 
-    /// Which nodes of a knot are where emission may be.
+    /// Returns the nodes of a knot where emission may be.
     fn allowed(&self) -> Vec<bool> {
         let [.., spacing] = self.voxels.shape().spacing;
         let allows = |node| self.change.allows(self.voxels.position(node), spacing);

@@ -21,11 +21,11 @@ use rayon::prelude::*;
 /// Slope and second derivatives of the minimum over fields.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
-    /// With respect to each number.
+    /// Slope with respect to each number.
     pub slopes: Vec<f64>,
     /// Row by row.
     pub bends: Vec<f64>,
-    /// By how much the best field moves with each number, at all nodes.
+    /// Change of the best field with each number, at all nodes.
     pub responses: Vec<Vec<f64>>,
 }
 
@@ -41,8 +41,8 @@ struct Moved<T> {
 }
 
 impl<T: Float + Default> LinearProblem<'_, T> {
-    /// At a field (values at all nodes) that is the best one or near it, with derivatives of the frames' images with
-    /// respect to each number, frame after frame.
+    /// Takes the profile at a field (values at all nodes) that is the best one or near it, with derivatives of the
+    /// frames' images with respect to each number, frame after frame.
     ///
     /// `iterations` are those of the conjugate gradients by which the field follows; without any it is held.
     ///

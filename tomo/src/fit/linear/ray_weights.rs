@@ -1,4 +1,4 @@
-//! Where the nodes of a frame's rays come to lie in a grid of voxels.
+//! Weights of the nodes of a frame's rays in a grid of voxels.
 
 use crate::Error;
 use crate::fit::ForwardModel;
@@ -43,7 +43,7 @@ impl Voxels {
         self.nodes.iter().product()
     }
 
-    /// As penalties see it.
+    /// Returns the shape that penalties see.
     pub fn shape(&self) -> Shape {
         let spacing = |k: usize| (self.high[k] - self.low[k]) / (self.nodes[k].max(2) - 1) as f64;
         Shape { nodes: self.nodes, spacing: [0, 1, 2].map(spacing) }
@@ -57,7 +57,7 @@ impl Voxels {
         core::array::from_fn(|k| self.low[k] + spacing[k] * at[k] as f64)
     }
 
-    /// From the first node of a cell to all that a point in it takes from, z fastest.
+    /// Returns the offsets from the first node of a cell to all that a point in it takes from, z fastest.
     pub(super) fn corners(&self) -> Vec<usize> {
         let ([_, ny, nz], taps) = (self.nodes, self.degree.taps());
         let node = |k: usize| (k / (taps * taps) * ny + k / taps % taps) * nz + k % taps;
@@ -86,7 +86,7 @@ impl<T: Float> Place<T> {
 
 #[derive(Clone, Copy)]
 struct Geometry<T> {
-    /// Where the first cell begins.
+    /// Begin of the first cell.
     low: [T; 3],
     per_length: [T; 3],
     /// Cells along each axis.
@@ -145,7 +145,8 @@ pub(super) struct Buffers<T> {
     pulled: [Vec<T>; 3],
     stretched: [Vec<T>; 3],
     places: Vec<Place<T>>,
-    /// Which nodes these are, where there are several images, and the same with their weights in one of them.
+    /// Indices of these nodes, where there are several images, and the same with their weights in one of
+    /// them.
     nodes: Vec<u32>,
     of_plane: Vec<Place<T>>,
 }
@@ -154,7 +155,7 @@ pub(super) struct Buffers<T> {
 const BLOCK: usize = 4096;
 
 impl<'a, T: Float> Walk<'a, T> {
-    /// Of rays with the weights that they have for the axis.
+    /// Takes rays with the weights that they have for the axis.
     pub fn new(model: &'a ForwardModel<T>, axis: Axis, (voxels, knots): (Voxels, Knots)) -> Self {
         let delays = &model.delay;
         let bound = |of: fn(T, T) -> T| delays.iter().copied().reduce(of).unwrap_or(T::zero());
@@ -280,7 +281,7 @@ impl<'a, T: Float> Walk<'a, T> {
         pull_back(self.axis, turned, CoordinatesMut::xyz(a, b, c));
     }
 
-    /// When the light of a node in a frame is emitted.
+    /// Returns the time at which the light of a node in a frame is emitted.
     #[inline(always)]
     fn time(&self, node: usize, frame: usize) -> T {
         let delay = self.model.delay.get(node).copied().unwrap_or(T::zero());

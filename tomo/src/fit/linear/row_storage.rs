@@ -1,5 +1,4 @@
-//! How the frames of the matrix are passed through: by rows that are kept, by rows that are made each time, or node by
-//! node.
+//! Storage of the frames of the matrix: rows that are kept, rows that are made each time, or node by node.
 
 use super::active::{Active, NONE};
 use super::operator::Operator;

@@ -92,12 +92,12 @@ impl<T: Float> Rows<T> {
     }
 }
 
-/// How a frame is passed through: rows add up in another order than a walk, so that this decides the last bits, and
-/// whether rows are kept or made again does not.
+/// Storage of a frame: rows add up in another order than a walk, so that this decides the last bits, and whether
+/// rows are kept or made again does not.
 pub(super) enum Held<T> {
-    /// By rows that are kept.
+    /// Rows that are kept.
     Kept(Rows<T>),
-    /// By rows that are made each time, one after the other.
+    /// Rows that are made each time, one after the other.
     Made,
     /// Node by node.
     Walked,

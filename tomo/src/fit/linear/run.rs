@@ -22,7 +22,7 @@ type Start = (Vec<f64>, Vec<bool>);
 /// Field of the coarse problem, and the lit field that it began with if there was one.
 type Coarsely = (Vec<f64>, Option<Vec<f64>>);
 
-/// Where lit fields are evaluated if no coarse problem is requested.
+/// Grid on which lit fields are evaluated if no coarse problem is requested.
 pub(super) const LIT: Coarse = Coarse { nodes: 32, stride: 1, iterations: 20 };
 /// Lit fields of a problem, and of one of the many problems of a scan.
 const MANY: Trials = Trials { spots: Spots { circles: 12, on_each: 16 }, best: 4, iterations: 0 };
@@ -166,7 +166,8 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         Ok(Some((x.collect(), is_active)))
     }
 
-    /// From a dark field, or from lit ones where data are not convex: what was found, and where that began.
+    /// Solves the coarse problem from a dark field, or from lit ones where data are not convex; returns its field, and
+    /// where it began.
     fn coarse_field(
         &mut self,
         objective: &mut Objective<'_, '_, T>,

@@ -1,6 +1,6 @@
-//! How a linear problem is solved.
+//! Settings of linear problems.
 
-/// Where a solution is first looked for.
+/// Grid on which a solution is first looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coarse {
     /// Nodes along each axis of the coarse grid.
@@ -11,7 +11,7 @@ pub struct Coarse {
     pub iterations: usize,
 }
 
-/// How a linear problem is solved.
+/// Settings of a linear problem.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinearSettings {
     /// The coarse problem whose solution says where to begin; all nodes of the grid count at once, without one.
@@ -19,7 +19,7 @@ pub struct LinearSettings {
     /// Nodes count at first where the coarse solution exceeds this part of its maximum, or a node not farther than
     /// `dilation` along each axis has it so.
     pub threshold: f64,
-    /// In nodes of the grid.
+    /// Width, in nodes of the grid.
     pub dilation: usize,
     /// Times that nodes may be admitted again.
     pub rounds: usize,

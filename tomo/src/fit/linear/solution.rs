@@ -38,11 +38,11 @@ pub struct LinearSolution<T> {
     pub emission: Vec<T>,
     /// Parameters of what does not move ([`Quiescent`](crate::fit::Quiescent)), where that is recovered.
     pub quiescent: Vec<T>,
-    /// How far from the minimum it can be; none if it was cancelled, or the data are not convex in the pixels.
+    /// Largest distance from the minimum; none if it was cancelled, or the data are not convex in the pixels.
     pub certificate: Option<Certificate>,
-    /// How flat the function is there, if the data are not convex: all that can be said then.
+    /// Flatness of the function there, if the data are not convex: all that can be said then.
     pub stationarity: Option<Stationarity>,
-    /// Why the last round ended.
+    /// Reason why the last round ended.
     pub ending: Ending,
     /// Rounds, the coarse problem not counted.
     pub rounds: usize,

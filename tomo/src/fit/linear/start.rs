@@ -1,4 +1,4 @@
-//! Where a problem that is not convex begins: at lit fields, scaled to the data; the best after some iterations.
+//! Starts of a problem that is not convex: lit fields, scaled to the data; the best after some iterations.
 
 use super::Ending;
 use super::convex::Convex;
@@ -101,7 +101,7 @@ impl<T: Float + Default> Run<'_, '_, '_, T> {
     }
 }
 
-/// Where a slope with respect to a scale of 0 to `top` vanishes, by secants.
+/// Returns the scale from 0 to `top` at which a slope vanishes, by secants.
 fn newton(top: f64, mut slope: impl FnMut(f64) -> f64) -> f64 {
     let (mut before, mut scale) = (0.5 * top, top);
     let (mut steep, mut flat) = (slope(before), slope(scale));

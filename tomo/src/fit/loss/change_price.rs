@@ -19,7 +19,7 @@ pub struct ChangePrice {
     /// True if emission is linear between the knots. Else it is compared at times as far apart, anywhere between the first
     /// and the last of them.
     pub linear: bool,
-    /// Where emission is looked for.
+    /// Region in which emission is looked for.
     pub region: Region,
 }
 

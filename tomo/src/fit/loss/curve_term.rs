@@ -18,7 +18,7 @@ pub struct StokesCurveTerm {
 }
 
 impl StokesCurveTerm {
-    /// Of what was measured, parameter by parameter in each frame.
+    /// Takes the measurements, parameter by parameter in each frame.
     ///
     /// # Errors
     /// If numbers are not whole frames, not finite, or a standard deviation is not above 0.

@@ -12,7 +12,7 @@ pub enum Compared {
     Flux(f32, f32),
     /// Visibilities of the image.
     Scan {
-        /// Where pixels are.
+        /// Grid of pixels.
         sky: ImageGrid,
         /// (u, v) in wavelengths, and the Fourier transform of a pixel there.
         seen: Vec<([f64; 2], f64)>,

@@ -37,8 +37,8 @@ impl<T: Float> Objective<T> {
         self.terms().map(of).collect()
     }
 
-    /// How far two movies of some frames are apart for the data: the root mean square difference of what data are compared
-    /// with, over their errors; of the kind of data that tells them apart best.
+    /// Returns the distance of two movies of some frames for the data: the root mean square difference of what data are
+    /// compared with, over their errors; of the kind of data that tells them apart best.
     pub fn apart(&self, frames: &[usize], [a, b]: [&[T]; 2]) -> f64 {
         let pixels = self.model.pixels();
         let of = |(term, _): (&dyn FrameTerm<T>, f64)| {
@@ -96,7 +96,7 @@ impl<T: Float> Objective<T> {
         Ok(None)
     }
 
-    /// Why data that were there at the beginning cannot be read any more, if any is so.
+    /// Returns the reason why data that were there at the beginning cannot be read any more, if any is so.
     pub fn fault(&self) -> Option<&str> {
         self.terms().find_map(|(term, _)| term.fault())
     }

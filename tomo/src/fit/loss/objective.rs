@@ -39,11 +39,11 @@ pub struct Loss {
     pub points: usize,
 }
 
-/// Where gradients are added to.
+/// Gradients that are added to.
 pub struct Gradients<'a, T> {
-    /// With respect to the parameters.
+    /// Gradient with respect to the parameters.
     pub parameters: &'a mut [T],
-    /// With respect to the axis, along the sphere, if wanted.
+    /// Gradient with respect to the axis, along the sphere, if wanted.
     pub axis: Option<&'a mut [f64; 3]>,
 }
 
@@ -86,7 +86,7 @@ impl<T: Float> Buffers<T> {
 
 /// A forward model with its data.
 pub struct Objective<T> {
-    /// From emission to pixels.
+    /// Model from emission to pixels.
     pub model: ForwardModel<T>,
     /// Data of pixels.
     pub data: Data<T>,
@@ -238,7 +238,7 @@ impl<T: Float> Objective<T> {
         self.model.image_recorded(field, frame, batch, workspace, image);
     }
 
-    /// From the gradient with respect to the last image to the others.
+    /// Adds the gradient with respect to the last image to those of the others.
     fn back(
         &self,
         field: Field<'_, T>,

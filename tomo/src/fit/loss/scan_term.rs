@@ -9,9 +9,9 @@ use num_complex::Complex;
 
 /// Measurements of a frame by an array of telescopes.
 pub struct Scan<T> {
-    /// From the frame, an image or several for Stokes parameters, to its visibilities.
+    /// Transform of the frame, an image or several for Stokes parameters, to its visibilities.
     pub transform: Transform<T>,
-    /// From visibilities to χ².
+    /// Data term of the visibilities.
     pub term: Box<dyn DataTerm<T> + Send>,
 }
 
@@ -24,7 +24,7 @@ pub struct ScanTerm<T> {
 }
 
 impl<T: Float> ScanTerm<T> {
-    /// Of a scan a frame. `quadratic`: whether χ² is so in the visibilities.
+    /// Takes a scan a frame. `quadratic`: whether χ² is so in the visibilities.
     ///
     /// # Panics
     /// If a transform and its term do not fit together.

@@ -1,6 +1,6 @@
 //! Selection of the data of a step.
 
-/// Which part of the data a step looks at.
+/// Part of the data that a step looks at.
 #[derive(Clone, Copy, Debug)]
 pub enum Selection<'a> {
     /// (ray, frame) pairs of images.
@@ -10,7 +10,7 @@ pub enum Selection<'a> {
 }
 
 impl Selection<'_> {
-    /// How many pairs or frames.
+    /// Returns the number of pairs or frames.
     pub fn len(&self) -> usize {
         match self {
             Self::Pixels(pairs) => pairs.len(),

@@ -40,7 +40,8 @@ pub trait FrameTerm<T: Float>: Send + Sync {
         false
     }
 
-    /// Why data that were there at the beginning cannot be read any more: χ² is no number then.
+    /// Returns the reason why data that were there at the beginning cannot be read any more: χ² is no number
+    /// then.
     fn fault(&self) -> Option<&str> {
         None
     }
@@ -74,7 +75,7 @@ pub struct ImageTerm<T> {
 }
 
 impl<T: Float> ImageTerm<T> {
-    /// Of a movie, frame after frame, all pixels with the same standard deviation.
+    /// Takes a movie, frame after frame, all pixels with the same standard deviation.
     ///
     /// # Errors
     /// If σ is not positive, or the movie is not whole frames of finite numbers.
@@ -87,7 +88,7 @@ impl<T: Float> ImageTerm<T> {
         Self::of(Frames::of(movie, pixels), noise_sigma)
     }
 
-    /// Of images, which may be in a file, all pixels with the same standard deviation.
+    /// Takes images, which may be in a file, all pixels with the same standard deviation.
     ///
     /// # Errors
     /// If σ is not positive, a pixel is not finite, or images cannot be read.
@@ -193,7 +194,7 @@ pub struct LightCurveTerm {
 }
 
 impl LightCurveTerm {
-    /// Of fluxes with their standard deviations.
+    /// Takes fluxes with their standard deviations.
     ///
     /// # Errors
     /// If a σ is not positive, a flux not finite, or their numbers differ.

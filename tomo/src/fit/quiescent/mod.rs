@@ -18,7 +18,7 @@ use kerrlight_common::simd::Float;
 pub struct Quiescent {
     /// Pixels of an image; 1 of a flux.
     pub pixels: usize,
-    /// For each image of a frame, whether its pixels may be negative.
+    /// Mask of the images of a frame whose pixels may be negative.
     pub signed: Vec<bool>,
     /// The largest parameter.
     pub most: f64,
@@ -28,7 +28,7 @@ pub struct Quiescent {
     pub jy_per_pixel: f64,
     /// Penalties on the brightness, as integrals over the screen.
     pub priors: Vec<Prior>,
-    /// From one pixel to the next, M.
+    /// Distance of pixels, M.
     pub spacing: f64,
 }
 

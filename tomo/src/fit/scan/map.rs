@@ -11,8 +11,7 @@ use kerrlight_render::image::colormap::Colormap;
 /// Points of the lattice that a pixel's loss is the weighted mean of.
 const NEAREST: usize = 4;
 
-/// Where a direction lies, in [−2, 2] × [−1, 1]; longitude 0 (+x) in the middle, +y to the right, +z
-/// above.
+/// Returns the place of a direction, in [−2, 2] × [−1, 1]; longitude 0 (+x) in the middle, +y to the right, +z above.
 fn projected(axis: Axis) -> [f64; 2] {
     let [x, y, z] = axis.vector();
     let (longitude, latitude) = (y.atan2(x), z.clamp(-1.0, 1.0).asin());

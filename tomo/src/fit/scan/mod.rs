@@ -1,5 +1,5 @@
-//! Which axis matter turns about: the linear problem of a coarse grid, solved for axes all over the
-//! sphere, and again with a finer grid where its loss is least.
+//! Scan for the axis that matter turns about: the linear problem of a coarse grid, solved for axes all over the sphere,
+//! and again with a finer grid where its loss is least.
 //!
 //! The loss of an axis is the least χ² of any field of emission that turns about it (variable
 //! projection, Golub & Pereyra 1973), so that no field has to be guessed before the axis is known and both
@@ -46,7 +46,7 @@ pub struct Effort {
     pub iterations: usize,
 }
 
-/// How the sphere is searched.
+/// Settings of the search of the sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisSettings {
     /// Points of the lattice over the whole sphere.

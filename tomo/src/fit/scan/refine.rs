@@ -1,4 +1,4 @@
-//! From a point of the lattice down to the minimum beside it.
+//! Descent from a point of the lattice to the minimum beside it.
 
 use super::{AxisLoss, Effort, Scanner};
 use crate::Error;
@@ -67,8 +67,8 @@ fn moved(axis: Axis, [x, y]: [f64; 2]) -> Axis {
     axis.moved(core::array::from_fn(|c| x * east[c] + y * north[c]))
 }
 
-/// Where g·u + u·H·u/2 is least, which has these values at the corners of a hexagon of radius `radius`; nothing if it
-/// has no minimum inside.
+/// Returns the minimum of g·u + u·H·u/2, which has these values at the corners of a hexagon of radius `radius`;
+/// nothing if it has none inside.
 fn minimum(values: &[f64], radius: f64, level: usize) -> Option<[f64; 2]> {
     let (mut slope, mut mean, mut across) = ([0.0; 2], 0.0, [0.0; 2]);
     for (k, value) in values.iter().enumerate() {

@@ -4,11 +4,11 @@ use crate::representation::Allowed;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How emission may change while matter carries it.
+/// Change of emission while matter carries it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChangeSettings {
-    /// Which changes are allowed.
+    /// Changes that are allowed.
     pub allowed: Allowed,
     /// Factor on ∫∫ |∂e/∂t| dV dt along the flow, M³ of emission.
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a factor"))]

@@ -57,7 +57,7 @@ pub enum DataFiles {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Loss {
-    /// Which data.
+    /// Kind of data.
     pub data: LossKind,
     /// Weight of the term.
     #[serde(default = "one")]

@@ -8,7 +8,7 @@ use kerrlight_render::scene::line_of;
 use kerrlight_render::{Error as RenderError, Parts};
 use kerrlight_vlbi::Error as VlbiError;
 
-/// Why settings are not those of a fit.
+/// Reason why settings are not those of a fit.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FitError {
@@ -32,7 +32,7 @@ pub enum FitError {
     Missing {
         /// Dotted path of the key.
         key: String,
-        /// Why it is needed, and what to write.
+        /// Reason why it is needed, and what to write.
         why: String,
     },
     /// Settings that contradict each other or the data.
@@ -82,7 +82,7 @@ impl FitError {
         }
     }
 
-    /// With the line of the text on which the key stands.
+    /// Adds the line of the text on which the key stands.
     pub(super) fn located(self, text: &str) -> Self {
         match self {
             FitError::Range { key, value, allowed, .. } => {

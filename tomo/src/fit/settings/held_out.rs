@@ -5,7 +5,7 @@ use crate::Error;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Which setting is chosen, from which values, and how data are divided.
+/// Setting that is chosen, its values, and how data are divided.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HeldOutSettings {
@@ -22,19 +22,19 @@ pub struct HeldOutSettings {
 /// A weight of the linear problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Weight {
-    /// How much a change of emission costs.
+    /// Cost of a change of emission.
     #[serde(rename = "change.weight")]
     Change,
-    /// How much slopes cost.
+    /// Cost of slopes.
     #[serde(rename = "linear.smoothness")]
     Smoothness,
-    /// How much light costs.
+    /// Cost of light.
     #[serde(rename = "linear.sparsity")]
     Sparsity,
-    /// How bright the prior's fields are.
+    /// Amplitude of the prior's fields.
     #[serde(rename = "linear.prior.amplitude")]
     Amplitude,
-    /// How far they are alike.
+    /// Correlation length of the prior's fields.
     #[serde(rename = "linear.prior.correlation_length")]
     CorrelationLength,
 }

@@ -27,7 +27,7 @@ pub struct PerStokes {
 }
 
 impl PerStokes {
-    /// That of a parameter.
+    /// Returns the value of a parameter.
     pub fn of(&self, parameter: StokesParameter) -> Option<f64> {
         self.all()[parameter.index()]
     }

@@ -15,13 +15,13 @@ pub enum Scattering {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Variability {
-    /// On short baselines, per real and imaginary part, Jy.
+    /// Amplitude on short baselines, per real and imaginary part, Jy.
     #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "Jy"))]
     pub jy: f64,
     /// Baseline length from which it falls, wavelengths.
     #[schemars(range(min = 1.0), extend("unit" = "wavelengths"))]
     pub uv: f64,
-    /// How steeply it falls.
+    /// Steepness of its fall.
     #[schemars(range(min = 0.0, max = 20.0), extend("unit" = "an exponent"))]
     pub power: f64,
 }

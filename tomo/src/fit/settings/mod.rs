@@ -65,11 +65,11 @@ pub struct FitFile {
     pub seed: u64,
     /// The black hole.
     pub hole: Hole,
-    /// Where the observer is.
+    /// Place of the observer.
     pub observer: Observer,
     /// Square pixels of the model.
     pub screen: Screen,
-    /// Where emission may be, and how rays are sampled there.
+    /// Region of the emission, and sampling of rays in it.
     pub region: Region,
     /// Effects on light, each off unless given.
     #[serde(default)]
@@ -103,9 +103,9 @@ pub struct FitFile {
     pub instrument: Option<InstrumentSettings>,
     /// Terms of the loss, the sum of weight · χ² per datum.
     pub loss: Vec<Loss>,
-    /// How the recovered emission is represented.
+    /// Representation of the recovered emission.
     pub representation: Representation,
-    /// How the representation is optimised.
+    /// Optimisation of the representation.
     #[serde(default)]
     pub training: Training,
     /// The linear problem of voxels, for linear-grid, a linear start, a scan of axes and searches.

@@ -147,7 +147,7 @@ impl FitFile {
         self.scaled_to(flux_jy)
     }
 
-    /// With a scale by which emission that fills the region, of which a ray sees 4 M, has this flux.
+    /// Scales emission that fills the region, of which a ray sees 4 M, to this flux.
     fn scaled_to(mut self, flux_jy: f64) -> Self {
         let pixels = self.screen.pixels.pow(2) as f64;
         self.screen.jy_per_pixel = flux_jy / (pixels * 4.0 * FILLING);

@@ -31,7 +31,7 @@ pub enum PriorSettings {
         #[schemars(range(min = 0.0))]
         sigma: f64,
     },
-    /// Of an inclination: any direction in space between two angles.
+    /// Isotropic prior of an inclination: any direction in space between two angles.
     Isotropic([f64; 2]),
 }
 
@@ -66,7 +66,7 @@ impl From<PriorSettings> for Quantity {
 }
 
 impl PriorSettings {
-    /// With numbers times `unit`.
+    /// Converts to numbers times `unit`.
     pub(super) fn prior(self, unit: f64) -> Prior {
         match self {
             Self::Uniform([low, high]) => Prior::Uniform { low: low * unit, high: high * unit },

@@ -1,4 +1,4 @@
-//! How emission is recovered.
+//! Settings of the recovery.
 
 use super::{FieldKind, PriorOfVoxels};
 use crate::fit::BatchSize;
@@ -6,7 +6,7 @@ use crate::representation::Degree;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How it is recovered.
+/// Settings of the optimiser.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Training {
@@ -72,12 +72,12 @@ impl Linear {
     }
 }
 
-/// From where parameters start.
+/// Start of the parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Start {
-    /// As the representation draws them.
+    /// Parameters as the representation draws them.
     #[default]
     Drawn,
     /// Fitted to the solution of the linear problem on a coarse grid.

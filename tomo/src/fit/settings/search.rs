@@ -1,9 +1,9 @@
-//! How a geometry that is not known is searched for.
+//! Search for a geometry that is not known.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How parameters that have a prior are searched for.
+/// Search for parameters that have a prior.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GeometrySearch {
@@ -25,7 +25,7 @@ impl Default for GeometrySearch {
     }
 }
 
-/// How geometries are evaluated.
+/// Evaluation of geometries.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SearchView {

@@ -194,7 +194,7 @@ pub struct Spot {
     #[serde(default)]
     #[schemars(range(min = -1e6, max = 1e6), extend("unit" = "M"))]
     pub wound_for: f64,
-    /// When it shines; always without it.
+    /// Time in which it shines; always without it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shines: Option<Shines>,
 }
@@ -238,7 +238,7 @@ pub struct Ring {
     #[serde(default)]
     #[schemars(range(min = -1e15, max = 1e15), extend("unit" = "Jy"))]
     pub u_jy: f64,
-    /// By which part of its mean the brightest side is brighter.
+    /// Excess of the brightest side, as a part of its mean.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "a part of the mean brightness"))]
     pub asymmetry: f64,
@@ -273,7 +273,7 @@ impl Tube {
     }
 }
 
-/// When emission appears and fades.
+/// Times at which emission appears and fades.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Shines {

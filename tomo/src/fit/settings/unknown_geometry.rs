@@ -11,7 +11,7 @@ use rand_pcg::Pcg64;
 pub struct UnknownGeometry {
     /// The free parameters.
     pub free: Vec<Free>,
-    /// How they are searched for.
+    /// Settings of the search for them.
     pub search: GeometrySearch,
 }
 
@@ -74,7 +74,7 @@ impl FitFile {
     }
 }
 
-/// Why a search without anything to look for is refused.
+/// Reason why a search without anything to look for is refused.
 const NOTHING: &str = "search looks for parameters that have a prior in place of a value, such as \
      `spin = { uniform = [-0.9, 0.9] }` in [hole], and there is none; hole.spin, observer.inclination_deg, \
      observer.position_angle_deg and xi, beta_r and beta_phi of motion.velocity.infall may have one";

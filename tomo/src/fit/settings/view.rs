@@ -27,7 +27,7 @@ pub struct Hole {
     pub distance_kpc: Option<f64>,
 }
 
-/// From where it is seen.
+/// Direction of the observer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Observer {
@@ -118,7 +118,7 @@ pub enum WidthOf {
     Centers,
 }
 
-/// Where emission is looked for.
+/// Region in which emission is looked for.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Region {
@@ -179,7 +179,7 @@ pub struct Absorption {
     pub height: f64,
 }
 
-/// How matter turns.
+/// Motion of matter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Motion {

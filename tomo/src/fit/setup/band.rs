@@ -1,4 +1,4 @@
-//! From settings to geometries that are weighed by the light curve of a flare in an orbital band.
+//! Geometries that are weighed by the light curve of a flare in an orbital band, from settings.
 
 mod background;
 mod kept;
@@ -24,7 +24,7 @@ pub struct BandGeometry {
     pub inclination_deg: f64,
     /// Angular velocity over that of the law.
     pub rotation_factor: f64,
-    /// Of the spin, degrees east of north.
+    /// Position angle of the spin, degrees east of north.
     pub position_angle_deg: f64,
     /// ln of the probability, up to what all geometries share: the evidence, and sin i of axes in any direction.
     pub ln_posterior: f64,
@@ -43,7 +43,7 @@ pub struct BandScan {
     pub geometries: Vec<BandGeometry>,
     /// Radii of the bands, M.
     pub radii: Vec<f64>,
-    /// Which geometry is the most probable.
+    /// Index of the most probable geometry.
     pub best: usize,
     /// Distance of the emission from the axis, M, in all geometries that are likely.
     pub radius: Interval,
@@ -292,7 +292,7 @@ pub fn in_band_geometry(file: &FitFile, inclination_deg: f64) -> FitFile {
     file
 }
 
-/// How matter moves in a geometry.
+/// Returns the motion of matter in a geometry.
 ///
 /// # Errors
 /// If the motion is out of range.

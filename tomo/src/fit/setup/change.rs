@@ -1,4 +1,4 @@
-//! From settings to how emission may change while matter carries it.
+//! Change of emission while matter carries it, from settings.
 
 use super::{Instrument, Result};
 use crate::fit::linear::Change;
@@ -33,7 +33,8 @@ pub fn emission_times(instrument: &Instrument, motion: &Motion) -> [f64; 2] {
     [from - motion.reference, last.max(from) - motion.reference]
 }
 
-/// How emission may change in a fit, with the knots over these times of emission, M since the reference time.
+/// Returns the change of emission in a fit, with the knots over these times of emission, M since the
+/// reference time.
 ///
 /// # Errors
 /// If a number is out of range.

@@ -7,7 +7,7 @@ use kerrlight_render::polarization::StokesParameter;
 /// A light curve that a fit explains.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// Which numbers each frame has.
+    /// Stokes parameters of each frame.
     pub parameters: Vec<StokesParameter>,
     /// Hours of UTC of the frames.
     pub hours: Vec<f64>,

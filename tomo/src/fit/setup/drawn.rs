@@ -12,9 +12,9 @@ use kerrlight_render::dynamics::Velocity;
 pub struct Drawn<'a> {
     /// Spin, M.
     pub spin: f64,
-    /// From the spin axis, radians.
+    /// Inclination from the spin axis, radians.
     pub inclination: f64,
-    /// Of the spin axis, radians east of north.
+    /// Position angle of the spin axis, radians east of north.
     pub position_angle: f64,
     /// Power of the redshift factor that emission goes with.
     pub redshift_power: f64,
@@ -22,11 +22,11 @@ pub struct Drawn<'a> {
     pub radii: [f64; 2],
     /// Largest |z|, M.
     pub height: f64,
-    /// Between the edges of the screen, M.
+    /// Width between the edges of the screen, M.
     pub width: f64,
     /// Pixels along each side.
     pub pixels: usize,
-    /// Of the images, M since the time at which emission is known.
+    /// Times of the images, M since the time at which emission is known.
     pub times: &'a [f64],
 }
 

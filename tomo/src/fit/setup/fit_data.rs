@@ -25,7 +25,7 @@ pub struct FitData {
     pub has_intrinsic_variability: bool,
     /// The light curve of an unresolved source.
     pub curve: Option<Curve>,
-    /// Where pixels are on the sky, where that matters.
+    /// Grid of pixels on the sky, where that matters.
     pub sky: Option<ImageGrid>,
     /// Shape of those pixels in visibilities.
     pub pulse: Pulse,

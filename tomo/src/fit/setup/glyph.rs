@@ -28,7 +28,7 @@ pub struct Glyph {
 }
 
 impl Glyph {
-    /// Of this shape, extruded along a unit vector.
+    /// Extrudes this shape along a unit vector.
     ///
     /// # Errors
     /// If a number is out of its range, the font has no such letter, or its centre lies on the axis.
@@ -103,7 +103,7 @@ impl Glyph {
         self.amplitude * self.value(column, row) * 0.5 * (1.0 + libm::erf(depth / 2f64.sqrt()))
     }
 
-    /// Between pixels.
+    /// Interpolates between pixels.
     fn value(&self, column: f64, row: f64) -> f64 {
         let (x, y) = (column.floor(), row.floor());
         let (u, v) = (column - x, row - y);

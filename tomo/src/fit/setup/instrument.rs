@@ -16,7 +16,7 @@ use kerrlight_render::polarization::StokesParameter;
 
 /// Instrument of a fit: the same for all data and representations.
 pub struct Instrument {
-    /// Where its pixels are: M to the right and upwards of the middle of the screen.
+    /// Places of its pixels: M to the right and upwards of the middle of the screen.
     pub pixels: [Vec<f64>; 2],
     /// The hole.
     pub hole: Kerr,
@@ -24,7 +24,7 @@ pub struct Instrument {
     pub lines: Sightlines,
     /// Emission goes like g to this power.
     pub redshift: Option<Redshift>,
-    /// How polarised light is seen; total intensity alone, without.
+    /// View of polarised light; total intensity alone, without.
     pub polarized: Option<PolarizedView>,
     /// Quantities that data depend on.
     pub seen: Observable,
@@ -175,7 +175,7 @@ fn spread(side: usize) -> Vec<usize> {
     (0..pixels).step_by(step).collect()
 }
 
-/// How polarised light arrives at these pixels, if any is modelled.
+/// Returns the view of polarised light at these pixels, if any is modelled.
 fn polarized(file: &FitFile, screen: &[Vec<f64>; 2]) -> Result<Option<PolarizedView>> {
     let Some(law) = file.polarization else { return Ok(None) };
     law.check()?;

@@ -1,4 +1,4 @@
-//! From settings to what is recovered and how it is learnt.
+//! Representation and its training, from settings.
 
 use super::change::{self, change};
 use super::quiescent::{self, quiescent};
@@ -158,8 +158,8 @@ fn own(name: &str, file: &FitFile, registry: &Registry) -> Result<Box<dyn Repres
     Err(FitError::range("representation.kind", format!("{name:?}"), &known.join(", ")).into())
 }
 
-/// How it is learnt; where emission may change, `times` are those of the first and the last emission, M since the reference
-/// time ([`emission_times`](super::emission_times)).
+/// Returns the training; where emission may change, `times` are those of the first and the last emission, M since the
+/// reference time ([`emission_times`](super::emission_times)).
 ///
 /// # Errors
 /// If a number is out of range, or settings contradict each other.

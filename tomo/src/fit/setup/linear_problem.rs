@@ -69,9 +69,9 @@ pub(super) struct Of<'a> {
     pub file: &'a FitFile,
     pub objective: &'a Objective<f32>,
     pub how: (Axis, Change),
-    /// Along each axis.
+    /// Nodes along each axis.
     pub nodes: usize,
-    /// Of the field that the prior's density is about; about its mean, without one.
+    /// Seed of the field that the prior's density is about; about its mean, without one.
     pub seed: Option<u64>,
 }
 
@@ -144,7 +144,8 @@ fn iterations(file: &FitFile, settings: &Linear) -> usize {
     }
 }
 
-/// When a round ends: what is left of the slopes, and the part of what noise changes χ² by that ten iterations must gain.
+/// Returns the conditions to end a round: what is left of the slopes, and the part of what noise changes χ² by that ten
+/// iterations must gain.
 fn enough(of: &Of<'_>, settings: &Linear) -> (f64, f64) {
     let (file, usual) = (of.file, LinearSettings::default());
     let is_steady = !of.how.1.is_any();

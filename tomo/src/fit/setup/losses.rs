@@ -120,7 +120,7 @@ impl FitData {
         Ok(ScanTerm::new(name, images * pixels, quadratic, scans))
     }
 
-    /// Why there are no closure quantities where averages of scans have them.
+    /// Explains why there are no closure quantities where averages of scans have them.
     fn torn(&self, loss: &Loss) -> String {
         let kind = match loss.data {
             LossKind::ClosurePhases => ClosureKind::Phase,
@@ -168,7 +168,8 @@ impl FitData {
 }
 
 impl FitData {
-    /// From an image of the sky to the visibilities of a frame's rows that have Stokes I.
+    /// Returns the transform from an image of the sky to the visibilities of a frame's rows that have
+    /// Stokes I.
     pub(super) fn transform<T: Float>(
         &self,
         part: &Observation,

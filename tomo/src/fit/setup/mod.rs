@@ -1,4 +1,4 @@
-//! From settings to the parts of a fit: sight lines, motion, data with their losses, the representation and its training.
+//! Parts of a fit, from settings: sight lines, motion, data with their losses, the representation and its training.
 
 mod band;
 mod change;
@@ -108,7 +108,7 @@ pub fn spacing(screen: &Screen) -> Result<f64> {
     })
 }
 
-/// Where the model's pixels are on the sky.
+/// Returns the grid of the model's pixels on the sky.
 ///
 /// # Errors
 /// If neither a field nor mass and distance are given, or they are out of range.
@@ -180,7 +180,7 @@ pub fn priors(linear: &Linear) -> Vec<Prior> {
     asked.map(|(regulariser, weight)| Prior { regulariser, weight }).collect()
 }
 
-/// How matter turns, with the times of the frames in M.
+/// Returns the motion of matter, with the times of the frames in M.
 ///
 /// # Errors
 /// If the velocity is out of range.
@@ -211,7 +211,7 @@ pub fn known_axis(file: &FitFile) -> Result<Option<Axis>> {
     file.motion.axis.map(Axis::new).transpose().within("motion")
 }
 
-/// Where the axis starts, and its rates if it is learnt.
+/// Returns the axis at the start, and its rates if it is learnt.
 ///
 /// # Errors
 /// If the axis is said to be known and is missing, or a rate is out of range.

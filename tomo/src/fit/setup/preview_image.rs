@@ -16,19 +16,19 @@ use kerrlight_render::transport::View;
 const MOST: usize = 256;
 /// Rays that are traced at a time, about: the memory that they need goes like their number.
 pub(super) const AT_A_TIME: usize = 4096;
-/// Of rays along photon rings, in the logarithm of their distance from the critical curve: less than a cell of
-/// a volume by its radius.
+/// Spacing of rays along photon rings, in the logarithm of their distance from the critical curve: less than a
+/// cell of a volume by its radius.
 const SPACING: f64 = 0.1;
 
 /// Square images, rows from the top: Σ emission · path, in M.
 pub struct PreviewImage {
     /// Pixels along each side.
     pub side: usize,
-    /// When it is seen, M.
+    /// Time at which it is seen, M.
     pub time: f64,
-    /// Of the recovered field.
+    /// Image of the recovered field.
     pub recovered: Vec<f32>,
-    /// Of the true one, if it is known.
+    /// Image of the true one, if it is known.
     pub truth: Option<Vec<f32>>,
 }
 
@@ -38,7 +38,7 @@ pub struct PreviewView<'a> {
     pub file: &'a FitFile,
     /// Hole, redshift and polarisation.
     pub instrument: &'a Instrument,
-    /// How matter moves.
+    /// Motion of matter.
     pub motion: &'a Motion,
     /// The true field, if it is known.
     pub truth: Option<&'a Truth>,
@@ -127,9 +127,9 @@ impl PreviewView<'_> {
 struct Rays {
     alpha: Vec<f64>,
     beta: Vec<f64>,
-    /// Of their pixels' areas.
+    /// Shares of their pixels' areas.
     share: Vec<f64>,
-    /// How many each pixel has.
+    /// Number of rays of each pixel.
     count: Vec<usize>,
 }
 

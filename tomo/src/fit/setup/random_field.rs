@@ -5,7 +5,7 @@ use crate::fit::linear::{GaussianField, LogNormalField, Voxels};
 use crate::fit::settings::{FieldKind, FieldSettings, FitFile, Negative, Within};
 use crate::representation::Spline;
 
-/// Of the random numbers of a truth.
+/// Stream of the random numbers of a truth.
 const TRUTH: u64 = 0x7472_7574_6800_0000;
 
 /// A random field that is nowhere negative.
@@ -49,13 +49,13 @@ fn factors(settings: &FieldSettings, voxels: &Voxels, seed: u64) -> Result<Vec<f
 /// Fields of which the spread is taken, at so many places along each axis of the inner half.
 const FIELDS: u64 = 8;
 const PLACES: usize = 12;
-/// Of their random numbers.
+/// Stream of their random numbers.
 const SPREAD: u64 = 0x7370_7265_6164_0000;
 
 /// Standard deviation of the emission at a voxel under `[linear.prior]`, before any data: none without a prior.
 ///
-/// That of a Gaussian field is smaller than its amplitude, since emission is not negative and not above `linear.upper`; it is
-/// that of eight fields.
+/// Returns the standard deviation of the prior. That of a Gaussian field is smaller than its amplitude, since emission is not
+/// negative and not above `linear.upper`; it is that of eight fields.
 ///
 /// # Errors
 /// If a number is out of range.

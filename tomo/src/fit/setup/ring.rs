@@ -60,7 +60,7 @@ impl Rings {
         }
     }
 
-    /// That of a parameter, Jy in a pixel, rows from the top; V has none.
+    /// Returns the image of a parameter, Jy in a pixel, rows from the top; V has none.
     pub fn of(&self, parameter: StokesParameter) -> &[f64] {
         self.images.get(parameter.index()).map_or(&[], Vec::as_slice)
     }

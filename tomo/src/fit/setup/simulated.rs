@@ -135,10 +135,10 @@ fn times_of_images(file: &FitFile) -> Result<Vec<f64>> {
     even_times("simulation.movie", movie.frames, [movie.from, movie.to])
 }
 
-/// So many times the rays near the critical curve of a fit are those of a simulation whose geometry is drawn, up to
-/// [`MOST_RAYS`]: data do not know rays.
+/// Ratio of the rays near the critical curve of a simulation whose geometry is drawn to those of a fit, up to [`MOST_RAYS`]:
+/// data do not know rays.
 const DENSER: usize = 16;
-/// Of a pixel.
+/// Largest number of rays of a pixel.
 const MOST_RAYS: usize = 1024;
 
 /// Settings with more rays near the critical curve than a fit has.

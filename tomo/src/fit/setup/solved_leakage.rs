@@ -8,7 +8,7 @@ use kerrlight_vlbi::polarimetry::{Leakage, LeakageProblem, LeakageTable, SharedL
 /// Leakage beside a model.
 #[derive(Clone, Debug)]
 pub struct SolvedLeakage {
-    /// Of all stations that observe, with errors.
+    /// Leakage of all stations that observe, with errors.
     pub table: LeakageTable,
     /// The largest change of any d since it was solved for last.
     pub moved: f64,

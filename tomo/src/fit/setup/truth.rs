@@ -30,7 +30,7 @@ pub struct Truth {
     scale: f64,
 }
 
-/// Where a Gaussian is 5e-32 of its peak, in its standard deviations: nothing beside any rounding.
+/// Distance at which a Gaussian is 5e-32 of its peak, in its standard deviations: nothing beside any rounding.
 const DARK: f64 = 12.0;
 
 impl Truth {

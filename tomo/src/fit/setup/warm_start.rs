@@ -106,7 +106,7 @@ fn grown(step: u64, matrices: &[WeightMatrix]) -> f64 {
 
 /// Result of a linear problem.
 struct Solution<'a> {
-    /// Between the nodes, and between the knots.
+    /// Field between the nodes, and between the knots.
     field: Changing<f32>,
     knots: Knots,
     emission: &'a [f32],

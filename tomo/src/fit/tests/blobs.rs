@@ -15,7 +15,7 @@ impl Blobs {
     pub const STEADY: Self = Self { dimension: 3, carried: true };
     /// Carried along, and changing on the way.
     pub const CHANGING: Self = Self { dimension: 4, carried: true };
-    /// Of events.
+    /// A field of events.
     pub const EVENTS: Self = Self { dimension: 4, carried: false };
 }
 

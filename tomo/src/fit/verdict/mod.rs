@@ -88,7 +88,7 @@ pub struct Tested {
 }
 
 impl Tested {
-    /// With the χ² of independent Gaussian data.
+    /// Expects the χ² of independent Gaussian data.
     pub fn gaussian(statistics: Statistics, errors: Errors) -> Self {
         let spread = (2.0 / statistics.all.count.max(1) as f64).sqrt();
         let taken = statistics.taken.clamp(0.0, 1.0);
@@ -96,7 +96,7 @@ impl Tested {
         Self { statistics, errors, expected }
     }
 
-    /// With what residuals of drawn data about the same model are like; Gaussian if that is no number.
+    /// Expects residuals like those of drawn data about the same model; Gaussian if that is no number.
     #[must_use]
     pub fn among(self, draws: &[Statistics]) -> Self {
         let count = draws.len() as f64;
@@ -120,11 +120,11 @@ impl Tested {
 /// Total flux where baselines are too short to resolve anything: mean over the frames that have them, Jy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ZeroSpacing {
-    /// Of the data.
+    /// Flux of the data.
     pub measured_jy: f64,
     /// Its standard deviation.
     pub error_jy: f64,
-    /// Of the model in the same frames.
+    /// Flux of the model in the same frames.
     pub model_jy: f64,
     /// Visibilities that it is a mean of.
     pub count: usize,
@@ -143,10 +143,10 @@ pub enum Outcome {
     Unexplained,
 }
 
-/// Why it is not [`Outcome::Explained`].
+/// Reason why it is not [`Outcome::Explained`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reason {
-    /// Of which kind of data, counted from 0; none of what all of them show.
+    /// Index of the kind of data, counted from 0; none of what all of them show.
     pub term: Option<usize>,
     /// Fault of the residuals.
     pub fault: Fault,

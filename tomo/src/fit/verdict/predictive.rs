@@ -11,18 +11,18 @@ use statrs::function::gamma::checked_gamma_ur;
 /// Probabilities, under one draw, of data of one kind that are at least as far from it as the measured ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Predicted {
-    /// Of χ² of all.
+    /// Probability of χ² of all.
     pub all: f64,
-    /// Of the least probable χ² among baselines, triangles or quadrangles.
+    /// Probability of the least probable χ² among baselines, triangles or quadrangles.
     pub groups: Option<f64>,
-    /// Of the least probable χ² among frames.
+    /// Probability of the least probable χ² among frames.
     pub frames: Option<f64>,
     /// The least of the three if the model has an error as large as the verdict of a fit lets pass.
     pub beyond: f64,
 }
 
 impl Tested {
-    /// Of these residuals from a draw; none of data whose σ is no error.
+    /// Returns the probabilities of these residuals from a draw; none of data whose σ is no error.
     pub fn predicted(&self) -> Option<Predicted> {
         if self.errors == Errors::Weight {
             return None;
@@ -47,8 +47,9 @@ impl Tested {
     }
 }
 
-/// That χ² of as many data is larger: a gamma distribution with n times the mean of one datum, and √(2 n) times that and
-/// `excess` for its standard deviation. χ² of Gaussian data has mean 1 and excess 1. None without data.
+/// Returns the probability that χ² of as many data is larger: a gamma distribution with n times the mean of one datum, and
+/// √(2 n) times that and `excess` for its standard deviation. χ² of Gaussian data has mean 1 and excess 1. None without
+/// data.
 fn probability_of_larger(part: &Part, mean: f64, excess: f64) -> Option<f64> {
     if part.count == 0 || part.chi2.is_nan() {
         return None;
@@ -61,7 +62,7 @@ fn probability_of_larger(part: &Part, mean: f64, excess: f64) -> Option<f64> {
     checked_gamma_ur(shape, scaled).ok().filter(|p| p.is_finite()).map(|p| p.clamp(0.0, 1.0))
 }
 
-/// Of the least of independent probabilities, each uniform between 0 and 1: 1 − (1 − p)ⁿ.
+/// Returns the probability of the least of independent probabilities, each uniform between 0 and 1: 1 − (1 − p)ⁿ.
 fn least(all: impl Iterator<Item = f64>) -> Option<f64> {
     let (count, least) = all.fold((0, 1.0f64), |(count, least), p| (count + 1, least.min(p)));
     // Keeps its digits where p is small.

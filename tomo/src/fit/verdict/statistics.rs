@@ -36,7 +36,7 @@ pub struct PixelSum {
 /// Sums over pairs of residuals that are neighbours.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pairs {
-    /// How many.
+    /// Number of residuals.
     pub count: usize,
     product: f64,
     squares: [f64; 2],
@@ -62,13 +62,13 @@ impl Pairs {
 pub struct Statistics {
     /// All of them.
     pub all: Part,
-    /// By frame; without data where nothing was observed.
+    /// Residuals by frame; without data where nothing was observed.
     pub frames: Vec<Part>,
-    /// By pixel, or by number where data of a frame have no stations.
+    /// Residuals by pixel, or by number where data of a frame have no stations.
     pub pixels: Vec<PixelSum>,
-    /// By the stations of a baseline, triangle or quadrangle.
+    /// Residuals by the stations of a baseline, triangle or quadrangle.
     pub groups: BTreeMap<Vec<u16>, Part>,
-    /// By station, each in all groups that it is part of.
+    /// Residuals by station, each in all groups that it is part of.
     pub stations: BTreeMap<u16, Part>,
     /// The same datum in consecutive frames.
     pub in_time: Pairs,
@@ -89,14 +89,14 @@ struct Frame {
 }
 
 impl Statistics {
-    /// Of all frames, one after the other; images have rows of `width` pixels.
+    /// Takes the residuals of all frames, one after the other; images have rows of `width` pixels.
     pub fn of(frames: impl IntoIterator<Item = Vec<Residual>>, width: usize) -> Self {
         let mut all = Self::default();
         frames.into_iter().for_each(|frame| all.add(frame, width));
         all.ended()
     }
 
-    /// When all frames were added.
+    /// Ends when all frames were added.
     #[must_use]
     pub fn ended(self) -> Self {
         Self { before: Frame::default(), ..self }

@@ -10,7 +10,7 @@ fn numbers(count: usize, seed: u64) -> Vec<f64> {
     (0..count).map(|_| random.random_range(-1.0..1.0)).collect()
 }
 
-/// Of matrices that are row by row; `inner` columns of the first.
+/// Multiplies matrices that are row by row; `inner` columns of the first.
 fn product(a: &[f64], b: &[f64], rows: usize, inner: usize) -> Vec<f64> {
     let columns = b.len() / inner;
     let mut out = vec![0.0; rows * columns];

@@ -110,7 +110,7 @@ fn exact_values_are_linear_between_knots_and_constant_outside() {
     }
 }
 
-/// Where matter falls, slopes along random directions are those of central differences.
+/// Slopes along random directions are those of central differences where matter falls.
 #[test]
 fn exact_slopes_of_falling_fields_are_those_of_differences() {
     let law = Velocity::Infall { xi: 0.8, beta_r: 0.8, beta_phi: 0.9, drag: None };

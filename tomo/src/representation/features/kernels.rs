@@ -229,11 +229,11 @@ pub struct Backward<'a, T> {
     pub parameters: &'a [T],
     pub at: Coordinates<'a, T>,
     pub cotangents: &'a [T],
-    /// As [`Forward`] has left it.
+    /// Values as [`Forward`] has left them.
     pub kept: &'a [T],
     /// dL/dfeature, all features of a point side by side.
     pub slopes: &'a mut [T],
-    /// Of the network, overwritten.
+    /// Gradient of the network, overwritten.
     pub network: &'a mut [T],
     /// dL/dx of each point, if wanted.
     pub pulls: Option<&'a mut [[T; 3]]>,

@@ -1,4 +1,4 @@
-//! Where parameters are.
+//! Layout of parameters.
 
 use core::ops::Range;
 
@@ -15,7 +15,7 @@ pub const MAX_INPUTS: usize = MAX_LEVELS * FEATURES;
 #[derive(Clone, Debug)]
 pub struct Layout {
     nodes: Vec<usize>,
-    /// Where the features of each grid start, and at last the network.
+    /// Starts of the features of each grid, and at last of the network.
     starts: Vec<usize>,
 }
 
@@ -46,7 +46,7 @@ impl Layout {
         start..start + size
     }
 
-    /// Where the network's parameters start.
+    /// Returns the start of the network's parameters.
     pub fn network_start(&self) -> usize {
         self.starts[self.nodes.len()]
     }

@@ -24,13 +24,13 @@ use rayon::prelude::*;
 pub struct FeatureGridSettings {
     /// Cells of the coarsest grid along each axis; every further one has twice as many.
     pub coarsest: usize,
-    /// How many grids, 1 to 6.
+    /// Number of grids, 1 to 6.
     pub levels: usize,
     /// Coordinates of the first node of all grids, M.
     pub low: [f64; 3],
     /// Coordinates of the last node, M.
     pub high: [f64; 3],
-    /// From the network's output to emission: [`Activation::Sigmoid`] or [`Activation::Softplus`].
+    /// Activation from the network's output to emission: [`Activation::Sigmoid`] or [`Activation::Softplus`].
     pub activation: Activation,
     /// Initial bias of the output: far below 0 it is dark.
     pub initial: f64,

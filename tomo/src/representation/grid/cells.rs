@@ -35,7 +35,7 @@ pub fn check_box(low: [f64; 3], high: [f64; 3]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Where lanes of points lie.
+/// Places of lanes of points.
 pub struct Located<T, V> {
     /// First corner of each lane's cell.
     pub corner: [usize; MAX_LANES],

@@ -22,8 +22,8 @@ pub struct GridSettings {
     pub low: [f64; 3],
     /// Coordinates of the last node, M.
     pub high: [f64; 3],
-    /// From the interpolated number to emission. With [`Activation::Linear`] parameters are held at
-    /// zero or above.
+    /// Activation from the interpolated number to emission. With [`Activation::Linear`] parameters are
+    /// held at zero or above.
     pub activation: Activation,
     /// Initial value of all parameters.
     pub initial: f64,

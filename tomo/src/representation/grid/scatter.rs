@@ -10,7 +10,7 @@ use rayon::prelude::*;
 /// The most slabs.
 const SLABS: usize = 32;
 
-/// Of a point that contributes nothing.
+/// Index of a point that contributes nothing.
 pub const NOWHERE: u32 = u32::MAX;
 
 /// Contribution of a point to the eight nodes of its cell.
@@ -29,7 +29,7 @@ pub struct Contribution<T> {
 pub struct Scatter<T> {
     contributions: Vec<Contribution<T>>,
     order: Vec<u32>,
-    /// Where each slab starts in the order.
+    /// Starts of the slabs in the order.
     starts: Vec<usize>,
 }
 

@@ -24,7 +24,7 @@ const PART: f64 = 1.0 / 16.0;
 /// Parameters of which one thread adds up the chunks at a time.
 const SUMMED: usize = 4096;
 
-/// How far a batch goes.
+/// Direction of a batch.
 pub enum Way<'a, T> {
     /// Values only; what the way back needs is kept if `recorded`.
     Forward { values: &'a mut [T], recorded: bool },
@@ -50,7 +50,7 @@ pub struct Memory<T> {
 struct Recording<T> {
     /// Points of the batch, until it is used up.
     points: Option<usize>,
-    /// Of the first tiles of each chunk.
+    /// Activations of the first tiles of each chunk.
     tiles: Vec<Vec<Activations<T>>>,
 }
 
@@ -169,7 +169,7 @@ fn add_up<T: Float + Default>(partial: &[Lines<T>], sums: &mut [T]) {
     });
 }
 
-/// Where a batch is cut; never inside a group.
+/// Cuts of a batch; never inside a group.
 struct Cuts<'a> {
     points: usize,
     groups: &'a [usize],

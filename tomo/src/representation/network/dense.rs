@@ -53,7 +53,7 @@ pub struct Forward<'a, T> {
     pub points: usize,
     pub input: Matrix<'a, T>,
     pub inputs: usize,
-    /// From [`pack_kernel`]: `inputs` rows and the bias.
+    /// Panels from [`pack_kernel`]: `inputs` rows and the bias.
     pub panels: &'a [T],
     pub outputs: usize,
     pub output: MatrixMut<'a, T>,
@@ -114,7 +114,7 @@ pub struct Backward<'a, T> {
     pub points: usize,
     pub cotangent: Matrix<'a, T>,
     pub units: usize,
-    /// From [`pack_transposed`]: `units` rows.
+    /// Panels from [`pack_transposed`]: `units` rows.
     pub panels: &'a [T],
     pub activations: Option<Matrix<'a, T>>,
     pub outputs: usize,
@@ -191,7 +191,7 @@ unsafe fn pass<T: Float, V: Lanes<T>>(sum: V, h: Option<*const T>, to: *mut T) {
 /// gradient += inputᵀ · cotangent over the points (or = with `overwrite`), of a kernel and its biases.
 pub struct Weights<'a, T> {
     pub points: usize,
-    /// With the one behind the last input.
+    /// Inputs, with the one behind the last.
     pub input: Matrix<'a, T>,
     pub inputs: usize,
     pub cotangent: Matrix<'a, T>,

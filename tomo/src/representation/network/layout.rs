@@ -1,4 +1,4 @@
-//! Where parameters and activations lie.
+//! Layout of parameters and activations.
 
 use super::settings::NetworkSettings;
 
@@ -37,7 +37,7 @@ pub struct Layer {
     pub inputs: usize,
     /// Its units.
     pub outputs: usize,
-    /// Where its parameters start.
+    /// Start of its parameters.
     pub offset: usize,
 }
 

@@ -94,7 +94,7 @@ impl<T: Float + Default> Representation<T> for Network {
         self.layout.parameters()
     }
 
-    /// Of the hidden layers, each with its biases, the weights of an input that is always one.
+    /// Returns the matrices of the hidden layers, each with its biases, the weights of an input that is always one.
     fn matrices(&self) -> Vec<WeightMatrix> {
         let of = |layer: &Layer| WeightMatrix {
             offset: layer.offset,

@@ -21,7 +21,7 @@ pub struct Output<'a, T> {
     pub activation: Activation,
     pub shift: T,
     pub values: &'a mut [T],
-    /// As long as `values`, or empty if not wanted.
+    /// Slopes, as many as `values`, or empty if not wanted.
     pub slopes: &'a mut [T],
 }
 
@@ -56,7 +56,7 @@ pub struct OutputBackward<'a, T> {
     /// One number a point.
     pub cotangents: &'a [T],
     pub input: Matrix<'a, T>,
-    /// As in [`Output`].
+    /// Weights, as in [`Output`].
     pub weights: &'a [T],
     pub output: MatrixMut<'a, T>,
     /// Weights' gradient, as long as `weights`; added to.

@@ -3,7 +3,7 @@
 use super::super::Activation;
 use crate::Error;
 
-/// How kernels are drawn; biases start at zero.
+/// Distribution of kernels at the start; biases start at zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Initialisation {
@@ -41,7 +41,7 @@ pub struct NetworkSettings {
     pub activation: Activation,
     /// See `activation`.
     pub shift: f64,
-    /// How parameters start.
+    /// Initial parameters.
     pub initialisation: Initialisation,
 }
 

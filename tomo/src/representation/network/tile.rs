@@ -22,17 +22,17 @@ const BLOCK: usize = 12;
 #[derive(Default)]
 pub struct Activations<T> {
     points: usize,
-    /// Of each layer, the encoded points first.
+    /// Rows of each layer, the encoded points first.
     rows: Vec<Lines<T>>,
     values: Lines<T>,
-    /// Of the activation; then times the cotangents.
+    /// Slopes of the activation; then times the cotangents.
     slopes: Lines<T>,
 }
 
 /// Memory of one tile.
 #[derive(Default)]
 pub struct Tile<T> {
-    /// Of the points at hand.
+    /// Activations of the points at hand.
     pub passed: Activations<T>,
     /// Gradients with respect to what a layer gives and takes, in turns.
     cotangents: [Lines<T>; 2],
@@ -108,7 +108,7 @@ impl<T: Float + Default> Tile<T> {
         }
     }
 
-    /// After [`Activations::forward`]: what the values are differentiated against.
+    /// Returns the cotangents of the values, after [`Activations::forward`].
     pub fn cotangents(
         &mut self,
         cotangents: Cotangents<'_, T>,
@@ -130,7 +130,7 @@ impl<T: Float + Default> Tile<T> {
         }
     }
 
-    /// After [`Self::cotangents`]: adds the gradient (or overwrites that of parameters).
+    /// Adds the gradient (or overwrites that of parameters), after [`Self::cotangents`].
     pub fn backward(
         &mut self,
         network: &Network,

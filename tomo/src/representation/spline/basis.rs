@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Degree {
-    /// Of degree 1: trilinear interpolation, with kinks where cells meet.
+    /// Degree 1: trilinear interpolation, with kinks where cells meet.
     #[default]
     Linear,
-    /// Of degree 2: once continuously differentiable.
+    /// Degree 2: once continuously differentiable.
     Quadratic,
-    /// Of degree 3: twice continuously differentiable.
+    /// Degree 3: twice continuously differentiable.
     Cubic,
 }
 

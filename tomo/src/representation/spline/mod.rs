@@ -22,16 +22,16 @@ use rayon::prelude::*;
 pub struct Spline {
     nodes: [usize; 3],
     degree: Degree,
-    /// Where the first cell begins, and cells a unit of length.
+    /// Begin of the first cell, and cells a unit of length.
     first: [f64; 3],
     per_length: [f64; 3],
 }
 
-/// Where a point lies.
+/// Place of a point.
 struct Place<T> {
     /// The first node that it takes from.
     corner: usize,
-    /// In its cell, 0 to 1 along each axis.
+    /// Place in its cell, 0 to 1 along each axis.
     within: [T; 3],
 }
 

@@ -4,7 +4,7 @@ use crate::Error;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How smooth a Matérn field is: its ν.
+/// Smoothness of a Matérn field: its ν.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Roughness {
     /// ν = 1/2, covariance exp(−r/ℓ): continuous, with kinks everywhere.
@@ -33,7 +33,7 @@ impl Roughness {
         }
     }
 
-    /// How many times (κ² − Δ) makes white noise of the field: (ν + 3/2)/2 in three dimensions.
+    /// Returns the number of times that (κ² − Δ) makes white noise of the field: (ν + 3/2)/2 in three dimensions.
     pub(super) fn times(self) -> usize {
         match self {
             Self::Half => 1,

@@ -34,7 +34,7 @@ pub struct GaussianField {
     spread: Vec<f64>,
     /// Amplitude of each wave in a field of unit white noise.
     amplitudes: Vec<f64>,
-    /// Where the density is highest, emission.
+    /// Field at which the density is highest, emission.
     center: Vec<f64>,
 }
 
@@ -44,7 +44,7 @@ fn power(law: &Matern, bend: f64) -> f64 {
 }
 
 impl GaussianField {
-    /// On the nodes of a grid.
+    /// Puts the law on the nodes of a grid.
     ///
     /// # Errors
     /// If a number is out of its range.
@@ -90,7 +90,7 @@ impl GaussianField {
         self.spread.len()
     }
 
-    /// Where its density is highest, emission at the nodes.
+    /// Returns the field at which its density is highest, emission at the nodes.
     pub fn center(&self) -> &[f64] {
         &self.center
     }
@@ -113,7 +113,7 @@ impl GaussianField {
         all.iter().zip(&self.spread).map(|(x, spread)| self.law.mean + x * spread).collect()
     }
 
-    /// From slopes with respect to the field to those with respect to such numbers.
+    /// Converts slopes with respect to the field to those with respect to such numbers.
     pub(super) fn to_white(&self, slopes: &[f64]) -> Vec<f64> {
         let spread: Vec<f64> = slopes.iter().zip(&self.spread).map(|(x, s)| x * s).collect();
         let waves = Modes::new(self.shape).project(&spread);

@@ -27,7 +27,7 @@ struct Waves {
     values: Vec<f64>,
     /// Minus the second difference's eigenvalue, per M².
     bends: Vec<f64>,
-    /// From one node to the next, M.
+    /// Distance of nodes, M.
     spacing: f64,
 }
 

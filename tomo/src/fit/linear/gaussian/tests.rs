@@ -47,8 +47,8 @@ fn worst(roughness: Roughness, nodes: usize) -> f64 {
     all.fold(0.0, f64::max)
 }
 
-/// As nodes come closer, 3 and then 6 a correlation length, covariances approach Matérn's: with a rough field, of which a
-/// grid leaves out what is finer than its cells, in proportion to the distance of the nodes, with a smooth one to its square.
+/// Covariances approach Matérn's as nodes come closer, 3 and then 6 a correlation length: with a rough field, of which a grid
+/// leaves out what is finer than its cells, in proportion to the distance of the nodes, with a smooth one to its square.
 #[test]
 fn exact_covariances_approach_materns() {
     for (roughness, most, ratio) in

@@ -6,7 +6,7 @@ use crate::fit::Observable;
 use crate::representation::Allowed;
 use kerrlight_render::polarization::StokesParameter;
 
-/// How many frames are kept, made each time and walked through.
+/// Counts the frames that are kept, made each time and walked through.
 fn counts(operator: &Operator<'_, f64>) -> [usize; 3] {
     let mut counts = [0; 3];
     for held in &operator.rows {
@@ -73,7 +73,7 @@ fn exact_rows_that_are_made_again_are_those_that_are_kept() {
     assert_room_changes_no_bit(&flux, Knots::STEADY, Degree::Linear);
 }
 
-/// Where rows end and walks begin is decided by the budget alone.
+/// The budget alone decides where rows end and walks begin.
 #[test]
 fn exact_room_does_not_decide_what_is_walked() {
     let model = forward_model();

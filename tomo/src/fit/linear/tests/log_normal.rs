@@ -97,7 +97,7 @@ fn exact_the_most_probable_field_is_stationary() {
     });
 }
 
-/// Where data say nothing, the field that is found is the one that the density is about: draws are those of the prior.
+/// The field that is found where data say nothing is the one that the density is about: draws are those of the prior.
 #[test]
 fn exact_data_that_say_nothing_leave_the_draw() {
     let prior = prior(Roughness::Half);
@@ -110,7 +110,7 @@ fn exact_data_that_say_nothing_leave_the_draw() {
     });
 }
 
-/// With an amplitude that is small, the logarithm is linear: the field is the one of the Gaussian prior whose mean and
+/// The logarithm is linear if its amplitude is small: the field is the one of the Gaussian prior whose mean and
 /// standard deviation are those of the emission.
 #[test]
 fn exact_small_amplitudes_are_gaussian() {

@@ -26,7 +26,7 @@ impl BandGeometry {
         all
     }
 
-    /// From such numbers; none of others.
+    /// Reads such numbers; none of others.
     pub(super) fn of_numbers(numbers: &[f64]) -> Option<Vec<Self>> {
         let mut next = numbers.iter().copied();
         let count = next.next()?;
