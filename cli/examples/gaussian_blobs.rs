@@ -32,7 +32,7 @@ struct GaussianBlobs {
     count: usize,
     /// Unit of sizes and distances, M.
     sigma: f64,
-    /// Where centres are drawn, M.
+    /// Least radius of the centres, M.
     r_min: f64,
     r_max: f64,
 }
@@ -41,7 +41,7 @@ struct GaussianBlobs {
 const EACH: usize = 5;
 /// Points that a thread does at a time: sums over them are added up in their order, whatever the threads.
 const CHUNK: usize = 512;
-/// Beyond exp(−40) a blob is darker than any rounding.
+/// Exponent beyond which a blob is darker than any rounding.
 const DARK: f64 = 40.0;
 
 /// A blob at a point.

@@ -72,14 +72,14 @@ impl Answer {
         Answer { text: Body::Table { name, groups, rows }, ..Self::default() }
     }
 
-    /// With an entry more in the JSON object. A number that is not finite becomes null.
+    /// Adds an entry to the JSON object. A number that is not finite becomes null.
     #[must_use]
     pub fn with(mut self, key: &str, value: impl Into<Value>) -> Self {
         self.json.insert(key.to_owned(), value.into());
         self
     }
 
-    /// With all entries of an object.
+    /// Adds all entries of an object.
     #[must_use]
     pub fn with_all(mut self, object: Value) -> Self {
         if let Value::Object(mut entries) = object {
@@ -88,7 +88,7 @@ impl Answer {
         self
     }
 
-    /// With the files that were written, as `files`.
+    /// Adds the files that were written, as `files`.
     #[must_use]
     pub fn files<'a>(self, paths: impl IntoIterator<Item = &'a Path>) -> Self {
         let files: Vec<String> = paths.into_iter().map(|path| path.display().to_string()).collect();
@@ -101,14 +101,14 @@ impl Answer {
         self.files(written(outputs))
     }
 
-    /// With an error: the result is printed, and the program fails nevertheless.
+    /// Adds an error: the result is printed, and the program fails nevertheless.
     #[must_use]
     pub fn failing(mut self, error: impl Into<anyhow::Error>) -> Self {
         self.failure = Some(error.into());
         self
     }
 
-    /// With another result: its text below, its object as an entry.
+    /// Adds another result: its text below, its object as an entry.
     #[must_use]
     pub fn and(mut self, name: &str, other: Self) -> Self {
         if let (Body::Text(text), Body::Text(more)) = (&mut self.text, &other.text) {

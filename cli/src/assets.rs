@@ -18,12 +18,12 @@ pub struct Files {
     pub decoded: Assets,
     /// Identity of the files: a line for each, with its length and checksum.
     pub identity: String,
-    /// Where they and what they refer to lie.
+    /// Paths of these files and of those that they refer to.
     pub paths: Vec<PathBuf>,
 }
 
-/// How far the files may lie that a mesh of a scene refers to. The scene is the user's own text and names any file; a
-/// mesh may come from anywhere.
+/// Folders in which the files may lie that a mesh of a scene refers to. The scene is the user's own text and names
+/// any file; a mesh may come from anywhere.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct Reach {
     /// Let meshes refer to files outside of their own folders (materials, textures, buffers)
@@ -98,7 +98,7 @@ fn warn(name: &str, warnings: &[String]) {
     warnings.iter().for_each(|what| eprintln!("warning: {name}: {what}"));
 }
 
-/// Where the picture of a `[sky.image]` lies.
+/// Returns the path of the picture of a `[sky.image]`.
 fn sky_path(scene: &Scene, folder: &Path) -> Option<PathBuf> {
     match &scene.sky {
         Some(Sky::Image(image)) => Some(folder.join(&image.path)),

@@ -37,13 +37,14 @@ pub struct Call {
     session: Arc<Session>,
     requests: &'static Requests,
     threads: ThreadPool,
-    /// Of its limit on memory.
+    /// Note on its limit on memory.
     note: Option<String>,
 }
 
 impl Call {
-    /// Of these words, the first of which is the program's name. A fit without a file is one of `settings`, if there are
-    /// any: their text, and the folder that paths in it start from. What `hear` is told, on any thread, the call waits for.
+    /// Takes these words, the first of which is the program's name. A fit without a file is one of `settings`, if there are
+    /// any: their text, and the folder that paths in it start from. The call waits for `hear`, which is called on any
+    /// thread.
     ///
     /// # Errors
     /// If the words make no sense, or there are no more threads.

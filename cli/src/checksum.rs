@@ -6,19 +6,19 @@ use std::io::{BufRead, Write};
 /// Checksum and length of bytes.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sum {
-    /// How many bytes.
+    /// Number of bytes.
     pub bytes: u64,
     /// Their CRC-32, as eight hexadecimal digits.
     pub crc32: String,
 }
 
 impl Sum {
-    /// Of these bytes.
+    /// Returns the checksum of these bytes.
     pub fn of(bytes: &[u8]) -> Self {
         Sum { bytes: bytes.len() as u64, crc32: format!("{:08x}", crc32fast::hash(bytes)) }
     }
 
-    /// Of what is left of a file.
+    /// Returns the checksum of the rest of a file.
     pub fn of_file(file: &mut impl BufRead) -> std::io::Result<Self> {
         let (mut bytes, mut sum) = (0, crc32fast::Hasher::new());
         loop {

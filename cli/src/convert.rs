@@ -20,7 +20,7 @@ use std::path::PathBuf;
 pub struct Convert {
     /// UVFITS, eht-imaging's text, the EHT's csv or txt, or kerrlight's CSV
     input: PathBuf,
-    /// Where to write; the name's ending tells the format, `-` is CSV on standard output
+    /// Output file; the name's ending tells the format, `-` is CSV on standard output
     #[arg(value_name = "OUTPUT.uvfits|.txt|.csv")]
     output: PathBuf,
     /// Write the light curve that baselines within a site (ALMA-APEX, JCMT-SMA) have measured: I, Q, U, V as CSV

@@ -18,11 +18,11 @@ pub struct CriticalCurveTable {
     /// Angle between the spin axis and the line of sight, in [0, 180] degrees
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     inclination: f64,
-    /// How many points, at equal steps of the angle around the screen's origin, the first on
-    /// the right (beta = 0), counterclockwise
+    /// Number of points, at equal steps of the angle around the screen's origin, the first on the
+    /// right (beta = 0), counterclockwise
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     points: u32,
-    /// Where to write the table; `-` is standard output [default: -]
+    /// Output table; `-` is standard output [default: -]
     #[arg(short, long, value_name = "FILE.csv")]
     output: Option<PathBuf>,
 }

@@ -12,19 +12,19 @@ use std::sync::Arc;
 #[derive(Debug, Args)]
 pub struct Devices {}
 
-/// Where rays are traced.
+/// Device that traces rays.
 #[derive(Debug, Args)]
 pub struct DeviceOption {
-    /// Where rays are traced: `cpu`, `gpu` (the first graphics device, in floats), or a name or
+    /// Device that traces rays: `cpu`, `gpu` (the first graphics device, in floats), or a name or
     /// number of `kerrlight devices` [default: cpu]
     #[arg(long = "device", value_name = "DEVICE")]
     name: Option<String>,
 }
 
-/// Where the steps of a fit are taken.
+/// Device that takes the steps of a fit.
 #[derive(Debug, Args)]
 pub struct StepsOption {
-    /// Where steps are taken: cpu, gpu or a name of `devices` [default: cpu]
+    /// Device that takes the steps: cpu, gpu or a name of `devices` [default: cpu]
     #[arg(long = "device", value_name = "DEVICE")]
     name: Option<String>,
 }

@@ -21,10 +21,10 @@ struct Now {
     signal: Option<u8>,
 }
 
-/// How work that is under way wants to be stopped.
+/// Way in which work that is under way wants to be stopped.
 #[derive(Clone)]
 enum Kept {
-    /// In its own time; the words go to the terminal.
+    /// Stops in its own time; the words go to the terminal.
     Waits(&'static str),
     /// Within moments, or it is cut off with these words: nothing is lost that is kept at all.
     Ends(String),
@@ -126,7 +126,7 @@ pub struct Interrupted(pub String);
 /// program ends at once.
 pub struct SignalGuard(&'static Requests);
 
-/// For how long the end waits for work that keeps nothing more.
+/// Time for which the end waits for work that keeps nothing more.
 const MOMENT: Duration = Duration::from_millis(800);
 
 impl SignalGuard {

@@ -20,8 +20,8 @@
 //! From then on `representation.kind = "small"` with `representation.own.settings.width = 32` works in every fit and every
 //! comparison of that program.
 
-/// As the standard library's, but a message that cannot be written, as into a file on a full disk, is no panic, control
-/// characters of foreign names are escaped, and the caller of a [`Call`] hears of it instead.
+/// Prints like the standard library's macro, but a message that cannot be written, as into a file on a full disk, is no panic,
+/// control characters of foreign names are escaped, and the caller of a [`Call`] hears of it instead.
 macro_rules! eprint {
     ($($words:tt)*) => {{
         $crate::session::say(&std::format!($($words)*));

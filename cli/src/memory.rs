@@ -98,14 +98,14 @@ fn available() -> (Option<u64>, &'static str) {
     known.min().map_or((None, "the machine"), |(bytes, by)| (Some(bytes), by))
 }
 
-/// Of the whole machine.
+/// Returns the memory of the whole machine.
 fn machine() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     Some(line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok()? * 1024)
 }
 
-/// Of the control groups that the process is in, of both versions.
+/// Returns the memory of the control groups that the process is in, of both versions.
 fn groups() -> Option<u64> {
     let own = std::fs::read_to_string("/proc/self/cgroup").ok()?;
     let of = |line: &str| {

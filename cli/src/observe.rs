@@ -29,10 +29,10 @@ pub struct Observe {
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     reach: Reach,
-    /// When the images of a movie show the source: `scans` (image k at scan k; needed only where the
-    /// images' own times disagree), `own` (EXR of kerrlight: the scene's times, the first being the
-    /// first scan; .npz: hours of UTC named `times`), hours of UTC of the first and of the last, or
-    /// a file with an hour a line. Between images the source changes linearly
+    /// Times of the movie's images: `scans` (image k at scan k; needed only where the images' own times
+    /// disagree), `own` (EXR of kerrlight: the scene's times, the first being the first scan; .npz: hours
+    /// of UTC named `times`), hours of UTC of the first and of the last, or a file with an hour a line.
+    /// Between images the source changes linearly
     #[arg(long, value_name = "scans|own|FROM-TO|FILE", value_parser = movie_files::frame_times,
           allow_hyphen_values = true)]
     frame_times: Option<FrameTimes>,
@@ -72,7 +72,7 @@ pub struct Observe {
     /// Tell source, date, frequency, stations and history in lines of a CSV that start with `#`
     #[arg(long)]
     comments: bool,
-    /// Where to write the visibilities; the name's ending tells the format, `-` is CSV on standard output
+    /// Output visibilities; the name's ending tells the format, `-` is CSV on standard output
     #[arg(short, long, value_name = "FILE.uvfits|.txt|.csv")]
     output: PathBuf,
 }
@@ -84,7 +84,7 @@ const ACCURACY: f64 = 1e-12;
 enum Noise {
     /// None
     None,
-    /// From the stations' SEFDs, bandwidth and integration time
+    /// Thermal noise from the stations' SEFDs, bandwidth and integration time
     Thermal,
 }
 
@@ -235,7 +235,7 @@ impl Observe {
         }
     }
 
-    /// In the order of light's way.
+    /// Corrupts an observation in the order of light's way.
     fn spoil(&self, observation: &mut Observation, seed: u64) -> anyhow::Result<()> {
         if self.scatter_sgra {
             scatter(observation, &ScatteringKernel::sgr_a())?;
@@ -291,7 +291,8 @@ fn odd(movie: &StokesMovie) -> Option<String> {
     }
 }
 
-/// How many pixels are polarised by more than all of their light, beyond what single precision rounds.
+/// Counts the pixels that are polarised by more than all of their light, beyond what single precision
+/// rounds.
 fn overpolarised(movie: &StokesMovie) -> Option<usize> {
     let [q, u, v] = movie.polarized.each_ref().map(|plane| plane.as_deref().unwrap_or_default());
     let at = |plane: &[f64], k: usize| plane.get(k).copied().unwrap_or(0.0);

@@ -174,8 +174,8 @@ impl Output {
         Ok(())
     }
 
-    /// Where an interrupted run keeps what it needs to be resumed: beside the file itself. Standard output has no such
-    /// place.
+    /// Returns the path where an interrupted run keeps what it needs to be resumed: beside the file itself. Standard
+    /// output has no such place.
     pub fn partial(&self) -> Option<PathBuf> {
         let mut name = self.path.clone().into_os_string();
         name.push(".partial");

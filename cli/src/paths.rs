@@ -8,8 +8,8 @@ use toml::{Table, Value};
 /// The folder of the public files of the Event Horizon Telescope.
 const EHT_DATA: &str = "KERRLIGHT_EHT_DATA";
 
-/// Where a file of data is: `$KERRLIGHT_EHT_DATA/NAME` in the folder that this variable of the environment names, any
-/// other path from `base_dir`.
+/// Returns the path of a file of data: `$KERRLIGHT_EHT_DATA/NAME` in the folder that this variable of the environment
+/// names, any other path from `base_dir`.
 ///
 /// # Errors
 /// If the variable is not set.

@@ -18,14 +18,14 @@ impl Program {
         Self::default()
     }
 
-    /// With a representation more: `representation.kind = \"name\"` in fits and experiments.
+    /// Adds a representation: `representation.kind = "name"` in fits and experiments.
     #[must_use]
     pub fn representation(mut self, name: &'static str, build: BuildRepresentation) -> Self {
         self.registry.add(name, build);
         self
     }
 
-    /// With the representations that `find` knows by name, loaded when a fit names one.
+    /// Adds the representations that `find` knows by name, loaded when a fit names one.
     #[must_use]
     pub fn other_representations(mut self, find: FindRepresentation) -> Self {
         self.registry.find_others(find);

@@ -30,7 +30,7 @@ struct Record {
     threads: usize,
     /// Seconds since 1970, UTC.
     started: f64,
-    /// Until the record was written.
+    /// Seconds until the record was written.
     seconds: f64,
 }
 
@@ -42,13 +42,13 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Of the command line `words`.
+    /// Records the command line `words`.
     pub fn new(words: Vec<OsString>) -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         Self { begun: Instant::now(), started: since.as_secs_f64(), words }
     }
 
-    /// Of this process, or of the call that it has.
+    /// Records this process, or the call that it has.
     pub fn of_process() -> Self {
         Self::new(session::words())
     }
@@ -59,7 +59,7 @@ impl Recorder {
         Output::new(&folder.join(FILE), "json")?.write(record.as_bytes())
     }
 
-    /// With the name of the program, wherever it lies.
+    /// Returns the command with the name of the program, wherever it lies.
     fn command(&self) -> Vec<String> {
         let words = self.words.iter().skip(1).map(|word| word.to_string_lossy().into_owned());
         std::iter::once("kerrlight".to_owned()).chain(words).collect()

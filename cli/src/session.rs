@@ -16,7 +16,7 @@ pub enum Said<'a> {
     Words(&'a str),
     /// A line of a run's log.
     Line(&'a Value),
-    /// So much of so much is done.
+    /// Progress: so much of so much is done.
     Done(u64, u64),
     /// The call has ended.
     End,
@@ -35,7 +35,7 @@ pub struct Session {
 }
 
 thread_local! {
-    /// That of this thread.
+    /// Session of this thread.
     static HERE: RefCell<Option<Arc<Session>>> = const { RefCell::new(None) };
 }
 

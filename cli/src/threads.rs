@@ -51,7 +51,7 @@ fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// How many threads there are to be.
+/// Returns the number of threads.
 fn count(wanted: Option<usize>, variable: Option<&str>, cores: usize) -> usize {
     let of_environment = || variable.and_then(|text| text.parse().ok()).filter(|count| *count > 0);
     match wanted {

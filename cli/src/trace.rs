@@ -24,20 +24,20 @@ pub struct Trace {
     /// skipped
     #[arg(long, value_name = "FILE.csv")]
     rays: PathBuf,
-    /// How rays are traced
+    /// Integrator of the rays
     #[arg(long, default_value = "taylor-mino", value_parser = integrators())]
     integrator: Integrator,
     /// Largest local error of a step, in [1e-14, 1e-2]
     #[arg(long, default_value_t = 1e-12)]
     tolerance: f64,
-    /// Where the observer is: `infinity`, or a Boyer–Lindquist radius above 2 M
+    /// Radius of the observer: `infinity`, or a Boyer–Lindquist radius above 2 M
     #[arg(long, default_value = "infinity", value_parser = parse_radius, value_name = "RADIUS")]
     observer: f64,
-    /// How many equatorial crossings to write for each ray
+    /// Number of equatorial crossings to write for each ray
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1000))]
     crossings: u16,
-    /// How many points equidistant in Mino time to write for each ray, from the observer to
-    /// the end (from infinity: without the points at infinity)
+    /// Number of points equidistant in Mino time to write for each ray, from the observer to the end (from
+    /// infinity: without the points at infinity)
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100_000))]
     samples: u32,
     /// Place the samples at equal path lengths inside a sphere of this radius instead
@@ -56,7 +56,7 @@ pub struct Trace {
     /// Also write each ray's largest estimated errors: of r (relative), theta, phi and delay
     #[arg(long)]
     errors: bool,
-    /// Where to write the table, as .csv or .npz; `-` is CSV on standard output [default: -]
+    /// Output table, as .csv or .npz; `-` is CSV on standard output [default: -]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 }

@@ -3,13 +3,13 @@
 /// Processor time and memory of this process so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Usage {
-    /// Of all threads, s.
+    /// Processor time of all threads, s.
     pub cpu_seconds: f64,
     /// Most memory that was resident, MiB.
     pub peak_mib: f64,
 }
 
-/// Of this process; nothing where the system does not tell.
+/// Returns the usage of this process; nothing where the system does not tell.
 #[cfg(unix)]
 pub fn usage() -> Option<Usage> {
     use nix::sys::resource::{UsageWho, getrusage};

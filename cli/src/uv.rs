@@ -18,10 +18,10 @@ pub struct Uv {
     array: String,
     #[command(flatten)]
     observing: Observing,
-    /// Where to write the table; `-` is standard output [default, without --plot: -]
+    /// Output table; `-` is standard output [default, without --plot: -]
     #[arg(short, long, value_name = "FILE.csv")]
     output: Option<PathBuf>,
-    /// Where to write a picture, coloured by time
+    /// Output picture, coloured by time
     #[arg(long, value_name = "FILE.png|.svg")]
     plot: Option<PathBuf>,
 }

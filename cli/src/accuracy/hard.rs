@@ -1,4 +1,4 @@
-//! Millions of random rays that look for trouble.
+//! Stress test: millions of random rays.
 
 use super::Accuracy;
 use crate::answer::Answer;

@@ -24,9 +24,9 @@ pub struct Accuracy {
     /// Seed of the random rays
     #[arg(long, default_value_t = 1, value_name = "SEED")]
     seed: u64,
-    /// Instead of the sweep, trace this many random rays that look for trouble, each held
-    /// against 28 digits: special spins and inclinations and their neighbours, impact
-    /// parameters from 1e-12 to 1e6 M, rays up to 1e-14 beside the critical curve
+    /// Stress-test this many random rays instead of the sweep, compared with 28-digit references:
+    /// special spins and inclinations and their neighbours, impact parameters from 1e-12 to 1e6 M,
+    /// rays up to 1e-14 beside the critical curve
     #[arg(long, num_args = 0..=1, default_missing_value = "10000000", value_name = "RAYS", value_parser = clap::value_parser!(u64).range(1..=10_000_000_000))]
     hard: Option<u64>,
     /// Integrator of the hard rays

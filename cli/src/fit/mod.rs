@@ -74,7 +74,7 @@ pub struct Fit {
     resume: Option<PathBuf>,
     #[command(flatten)]
     device: StepsOption,
-    /// Draw so many samples of volume and geometry when the fit is finished, as `kerrlight posterior` does
+    /// Draw N posterior samples of volume and geometry after the fit, as `kerrlight posterior` does
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
     samples: Option<u32>,
     /// Write the settings that would be used and stop

@@ -60,7 +60,7 @@ pub struct Line {
 }
 
 impl Line {
-    /// About an array of this name, shape and type; `rest` is what else there is to say of it.
+    /// Describes an array of this name, shape and type; `rest` is what else there is to say of it.
     pub fn new(
         (name, shape, kind): (&str, &[u64], &str),
         found: Option<&Survey>,
@@ -108,11 +108,11 @@ pub struct Survey {
     not_finite: u64,
 }
 
-/// As many numbers are shown one by one.
+/// Number of values up to which they are shown one by one.
 const SHOWN: usize = 4;
 
 impl Survey {
-    /// Of the finite numbers.
+    /// Returns the mean of the finite numbers.
     fn mean(&self) -> Option<f64> {
         (self.finite > 0).then(|| self.sum / self.finite as f64)
     }

@@ -22,7 +22,7 @@ pub struct Inspect {
     /// A picture (EXR), arrays (NPZ, NPY: movies, volumes, tables), visibilities (UVFITS, eht-imaging's
     /// text, tables of the EHT or of kerrlight), or the folder of a fit
     file: PathBuf,
-    /// Of visibilities: where to draw amplitudes against baselines
+    /// Plot of the amplitudes of visibilities against baselines
     #[arg(long, value_name = "FILE.png|.svg")]
     plot: Option<PathBuf>,
 }
@@ -61,7 +61,7 @@ impl Inspect {
     }
 }
 
-/// How an EXR begins.
+/// First bytes of an EXR file.
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// The first bytes of a file, which tell what it is.

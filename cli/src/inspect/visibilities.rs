@@ -93,7 +93,7 @@ fn text(name: &str, format: Format, observation: &Observation) -> String {
     text + &station_table(observation) + &history(observation)
 }
 
-/// How many rows have each product.
+/// Counts the rows that have each product.
 fn product_counts(observation: &Observation) -> [(&'static str, usize); 4] {
     let names = match observation.basis {
         Basis::Circular => ["RR", "LL", "RL", "LR"],
@@ -109,7 +109,7 @@ fn amplitudes(observation: &Observation) -> [f64; 2] {
     [all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max)]
 }
 
-/// How many of each product, and how large Stokes I is.
+/// Describes the number of each product, and the size of Stokes I.
 fn products(observation: &Observation) -> String {
     let counts = product_counts(observation).map(|(name, count)| format!("{name} {count}"));
     let [least, most] = amplitudes(observation);

@@ -44,7 +44,7 @@ pub fn array_near(name: &str, folder: &Path) -> anyhow::Result<Array> {
     array::parse(&output::read_text(&path)?).with_context(|| format!("array {shown}"))
 }
 
-/// How the Earth's attitude is taken.
+/// Earth-orientation model.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub enum FrameName {
     /// Catalogue coordinates as if they were of date, mean sidereal time (eht-imaging's way)
@@ -90,7 +90,7 @@ pub struct Observing {
     #[arg(long, value_name = "FROM-TO", value_parser = range, default_value = "10-85",
           allow_hyphen_values = true)]
     pub elevation: [f64; 2],
-    /// How the Earth's attitude is taken
+    /// Earth-orientation model
     #[arg(long, value_name = "FRAME", default_value = "catalogue")]
     pub frame: FrameName,
     /// UT1 - UTC in seconds, instead of the built-in table's (1999 to 2026)
@@ -99,7 +99,7 @@ pub struct Observing {
 }
 
 impl Observing {
-    /// When scans are.
+    /// Returns the schedule of the scans.
     pub fn schedule(&self) -> anyhow::Result<Schedule> {
         let (clock, hours) = match (self.utc, self.gmst) {
             (Some(hours), _) => (Clock::Utc, hours),

@@ -7,12 +7,12 @@ use anyhow::{Context, bail};
 use kerrlight_vlbi::simulate::StokesMovie;
 use std::path::{Path, PathBuf};
 
-/// How the times of a movie's images are given.
+/// Times of a movie's images.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FrameTimes {
     /// Image k at scan k.
     Scans,
-    /// As the files tell.
+    /// Times in the files.
     Own,
     /// Hours of UTC of the first image and of the last, equal steps between.
     Hours([f64; 2]),

@@ -45,7 +45,7 @@ impl PlotFile {
         self.output.write(&bytes)
     }
 
-    /// Where it goes.
+    /// Returns its output.
     pub fn output(&self) -> &Output {
         &self.output
     }

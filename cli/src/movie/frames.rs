@@ -21,7 +21,7 @@ pub struct Sequence {
     plans: Vec<Plan>,
     /// Those that are wanted of all.
     part: Range<usize>,
-    /// Which are there.
+    /// Mask of the frames that are there.
     done: Vec<bool>,
     /// Fluxes of those that are there, with their unit.
     fluxes: Vec<Option<(f64, String)>>,
@@ -35,7 +35,7 @@ pub struct Sequence {
     device: String,
 }
 
-/// Where a film comes from.
+/// Origin of a film.
 pub struct Origin<'a> {
     /// Name of its scene in messages.
     pub name: &'a str,
@@ -143,7 +143,7 @@ impl Sequence {
         Ok(())
     }
 
-    /// Where a frame lies.
+    /// Returns the path of a frame.
     pub fn path(&self, k: usize, extension: &str) -> PathBuf {
         self.folder.join(format!("frame_{k:04}.{extension}"))
     }

@@ -31,7 +31,7 @@ use times::{Frames, Span};
 pub struct Movie {
     /// Scene file (TOML)
     scene: PathBuf,
-    /// How many frames; A..B/N renders the frames A to B of N alone
+    /// Number of frames; A..B/N renders the frames A to B of N alone
     #[arg(long, value_name = "N")]
     frames: Frames,
     #[command(flatten)]
@@ -110,7 +110,7 @@ impl Movie {
         Ok(self.answer(&sequence, rendered, start.elapsed().as_secs_f64(), &animations.files()))
     }
 
-    /// How many frames there are, how bright they are, and where they lie.
+    /// Describes the frames: their number, brightness and place.
     fn answer(
         &self,
         sequence: &Sequence,

@@ -16,13 +16,13 @@ pub struct Rendering<'a> {
     film: &'a mut Film,
     sequence: &'a mut Sequence,
     folder: &'a Path,
-    /// How files are written, and frames a second.
+    /// Style of the files, and frames a second.
     style: (&'a ExrOptions, u16),
     bar: ProgressBar,
 }
 
 impl<'a> Rendering<'a> {
-    /// Of the frames in `folder`, written in some style, so many a second.
+    /// Takes the frames in `folder`, written in some style, so many a second.
     pub fn new(
         film: &'a mut Film,
         sequence: &'a mut Sequence,
@@ -84,7 +84,7 @@ impl<'a> Rendering<'a> {
         }
     }
 
-    /// How far it is, and how to resume.
+    /// Describes the progress, and how to resume.
     fn there(&self) -> String {
         let all = self.sequence.wanted().len();
         let done = all - self.sequence.missing().len();

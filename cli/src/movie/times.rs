@@ -1,4 +1,4 @@
-//! When the frames of a film are.
+//! Times of the frames of a film.
 
 use anyhow::{Context, bail};
 use clap::Args;
@@ -10,7 +10,7 @@ use std::str::FromStr;
 /// Frames of a film, and those of them that are rendered.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frames {
-    /// How many the film has.
+    /// Number of frames of the film.
     pub all: u32,
     /// The first and the last that are rendered.
     pub part: RangeInclusive<u32>,
@@ -47,7 +47,7 @@ impl FromStr for Frames {
     }
 }
 
-/// Which time a film shows.
+/// Time span of a film.
 #[derive(Debug, Args)]
 pub struct Span {
     /// Show this much time from observer.time on, in steps of one N-th of it (a film of one period

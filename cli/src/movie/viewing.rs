@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// Options of images and animations for viewing.
 #[derive(Debug, Args)]
 pub struct Viewing {
-    /// Where to write a GIF: 256 colours, shown everywhere
+    /// Output GIF: 256 colours, shown everywhere
     #[arg(long, value_name = "FILE.gif")]
     gif: Option<PathBuf>,
     /// Write a PNG beside each EXR
@@ -22,8 +22,7 @@ pub struct Viewing {
     /// Frames per second of the GIF, and in the headers of the EXR files
     #[arg(long, value_name = "N", default_value = "25", value_parser = clap::value_parser!(u16).range(1..=50))]
     fps: u16,
-    /// The value that is white in all pictures [default: the largest of all frames, but for 0.2 %
-    /// of the lit pixels]
+    /// Intensity shown as white [default: 99.8th percentile of the lit pixels of all frames]
     #[arg(long, value_name = "X")]
     white: Option<f32>,
 }

@@ -6,13 +6,13 @@ use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// How names begin of what is written beside its place.
+/// Prefix of files that are written beside their place.
 pub const BESIDE: &str = ".kerrlight-";
 
 /// Letters and digits that `tempfile` adds to a name.
 const RANDOM: usize = 6;
 
-/// How names begin of what is written beside a place.
+/// Returns the prefix of files that are written beside a place.
 pub fn prefix_of(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     format!("{BESIDE}{name}-")

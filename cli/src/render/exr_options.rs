@@ -1,4 +1,4 @@
-//! How EXR files are written.
+//! Options of EXR files.
 
 use clap::Args;
 use kerrlight_render::image::exr::{CameraMatrices, Style};

@@ -33,11 +33,11 @@ pub struct Render {
     /// Scene file (TOML), or an EXR that kerrlight rendered, to render it again; without it
     /// a built-in scene: Sgr A* with a flare and a disc
     scene: Option<PathBuf>,
-    /// Where to write the EXR, `-` for standard output [default, without --preview either: EXR and PNG in the current
-    /// folder, named after the scene]
+    /// Output EXR, `-` for standard output [default, without --preview either: EXR and PNG in the current folder,
+    /// named after the scene]
     #[arg(short, long, value_name = "FILE.exr")]
     output: Option<PathBuf>,
-    /// Where to write a tone-mapped PNG, `-` for standard output
+    /// Output tone-mapped PNG, `-` for standard output
     #[arg(long, value_name = "FILE.png")]
     preview: Option<PathBuf>,
     /// Change a value of the scene, e.g. hole.spin=0.5 or spot.0.phase_deg=90

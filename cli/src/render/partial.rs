@@ -51,7 +51,7 @@ impl Partial {
         Ok(Partial { path: Some(path), journal })
     }
 
-    /// Where it is, in messages.
+    /// Returns its path in messages.
     pub fn shown(&self) -> String {
         self.path.as_ref().map_or("a temporary file".to_owned(), |path| path.display().to_string())
     }

@@ -1,4 +1,4 @@
-//! How the PNG shows a picture.
+//! Appearance of a picture as PNG.
 
 use anyhow::bail;
 use clap::{Args, ValueEnum};
@@ -15,7 +15,7 @@ pub struct PreviewOptions {
     /// black body]
     #[arg(long, value_name = "MAP")]
     colormap: Option<Colors>,
-    /// How intensity is stretched over the colour map
+    /// Stretch of intensity over the colour map
     #[arg(long, default_value = "linear")]
     stretch: StretchName,
 }

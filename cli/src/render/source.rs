@@ -1,4 +1,4 @@
-//! Where a scene comes from.
+//! Sources of scenes.
 
 use crate::changed::{self, Changed};
 use crate::output;

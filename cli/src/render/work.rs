@@ -24,7 +24,7 @@ pub struct Work<'a> {
     pub name: &'a str,
     /// Identity of the files that the scene names.
     pub files: &'a str,
-    /// How the EXR is written.
+    /// Options of the EXR file.
     pub style: &'a ExrOptions,
 }
 
@@ -91,7 +91,7 @@ impl Work<'_> {
         self.raster.summary(journal)
     }
 
-    /// How the graphics device failed, if it did.
+    /// Returns the failure of the graphics device, if there was one.
     fn device_failure(&self) -> Option<String> {
         self.raster.device()?.failure()
     }
@@ -122,7 +122,7 @@ impl Work<'_> {
 
 const STOPPED: &str = "stopped; nothing is kept";
 
-/// Why bands cannot be written, and what is left.
+/// Explains why bands cannot be written, and what is left.
 fn unwritten(error: &dyn std::error::Error, partial: &Partial) -> String {
     let io = error.source().and_then(|source| source.downcast_ref::<std::io::Error>());
     match io {

@@ -69,7 +69,7 @@ pub struct Drawing {
 /// Notice before all else.
 #[derive(Debug)]
 pub struct Notice {
-    /// How it is meant.
+    /// Tone.
     pub tone: Tone,
     /// One sentence.
     pub headline: String,
@@ -77,7 +77,7 @@ pub struct Notice {
     pub text: Vec<String>,
 }
 
-/// How a notice is meant.
+/// Tone of a notice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tone {
     /// All is well.
@@ -108,14 +108,14 @@ pub struct Table {
     pub head: Vec<String>,
     /// Its lines, as long as the head.
     pub rows: Vec<Vec<String>>,
-    /// Where the first cells of the rows lead; nowhere if there are fewer.
+    /// Links of the first cells of the rows; fewer where later ones have none.
     pub links: Vec<String>,
 }
 
 /// A line of the table of settings.
 #[derive(Debug)]
 pub struct Setting {
-    /// As on the command line or in the file.
+    /// Name on the command line or in the file.
     pub key: String,
     /// Its value.
     pub value: String,

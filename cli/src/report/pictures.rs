@@ -154,7 +154,7 @@ pub struct Strip<'a> {
 }
 
 impl<'a> Strip<'a> {
-    /// Of a movie of this name.
+    /// Takes a movie of this name.
     ///
     /// # Errors
     /// If it cannot be read.

@@ -18,7 +18,7 @@ pub struct Axis {
     pub log: bool,
 }
 
-/// How a series is drawn.
+/// Marks of a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Marks {
     /// A line from point to point.
@@ -38,7 +38,7 @@ pub struct Series {
     pub points: Vec<[f64; 2]>,
     /// Standard deviations of y, one for each point, or none at all.
     pub errors: Vec<f64>,
-    /// How it is drawn.
+    /// Marks.
     pub marks: Marks,
 }
 

@@ -72,7 +72,7 @@ impl Triangle {
         all
     }
 
-    /// From below the least to above the largest value.
+    /// Returns the range from below the least to above the largest value.
     fn range(&self, k: usize) -> [f64; 2] {
         let Variable { values, truth, .. } = &self.variables[k];
         let all = || values.iter().copied().chain(*truth);

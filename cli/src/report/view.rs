@@ -23,7 +23,7 @@ const SCRIPTS: [&str; 6] = [
 /// A volume with more nodes along an axis is sampled on as many.
 const MOST_NODES: usize = 128;
 
-/// How matter turns about the axis: right-handed by Ω(r)(t − t₀), r being the spherical radius.
+/// Rotation of matter about the axis: right-handed by Ω(r)(t − t₀), r being the spherical radius.
 #[derive(Debug, Clone)]
 pub struct Motion {
     /// Direction of the axis, of any length but zero.
@@ -53,7 +53,7 @@ pub struct View3d {
     pub truth: Option<Volume>,
     /// Unit of the emission.
     pub unit: String,
-    /// How it moves; without it there is no slider of time.
+    /// Motion; without it there is no slider of time.
     pub motion: Option<Motion>,
     /// Radius of the outer horizon, M.
     pub hole_radius: f64,

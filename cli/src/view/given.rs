@@ -59,7 +59,7 @@ fn keys(text: &str) -> anyhow::Result<Vec<String>> {
     Ok(keys)
 }
 
-/// How a camera moves, as scenes write it; one on a path stands still where it is.
+/// Names the motion of a camera, as scenes write it; one on a path stands still where it is.
 fn motion(scene: &Scene) -> &'static str {
     match scene.camera.as_ref().map(|camera| camera.motion) {
         Some(CameraMotion::Zamo) => "zamo",

@@ -64,7 +64,7 @@ impl Volumes {
         self.textures.iter().map(Texture::described).collect()
     }
 
-    /// How they turn: a law with numbers or a table; null if they do not.
+    /// Returns the law of their motion: numbers or a table; null if they do not turn.
     pub fn law(&self) -> &Value {
         &self.law
     }

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 /// Pictures that a fit was made of.
 pub struct Measured {
-    /// When they were taken, M.
+    /// Times of the data, M.
     pub times: Vec<f64>,
     /// Pixels along each side.
     pub side: usize,

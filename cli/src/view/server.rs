@@ -9,7 +9,7 @@ use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// How long a connection may be silent.
+/// Longest time for which a connection may be silent.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Bytes of a request that are read at most.

@@ -1,4 +1,4 @@
-//! How bright the scene is, from a small picture of it.
+//! Brightness of the scene, from a small picture of it.
 
 use super::subject::Subject;
 use crate::interrupt::SignalGuard;

@@ -24,7 +24,7 @@ const OUT_OF_DEVICE_MEMORY: i32 = -2;
 const DEVICE_LOST: i32 = -4;
 const INSTANCE_CHAIN: i32 = 47;
 const DEVICE_CHAIN: i32 = 48;
-/// Where `VkPhysicalDeviceProperties` has its limits, bytes.
+/// Offset of the limits in `VkPhysicalDeviceProperties`, bytes.
 const LIMITS: usize = 296;
 
 /// The beginning of every structure.

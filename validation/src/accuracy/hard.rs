@@ -1,4 +1,4 @@
-//! Millions of random rays that look for trouble: special spins and inclinations and their
+//! Stress test with millions of random rays: special spins and inclinations and their
 //! neighbours, tiny and huge impact parameters, the neighbourhood of the critical curve.
 
 use super::rays::{Angle, Draw, beside_critical_curve, in_disc, log_uniform};
