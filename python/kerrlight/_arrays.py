@@ -1,4 +1,4 @@
-"""What callers may give where an array is wanted."""
+"""Values that callers may give where an array is wanted."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from kerrlight._stations import PRODUCTS, Station
 
 
 CALIBRATIONS = ("ampcal", "phasecal", "opacitycal", "dcal", "frcal")
-"""What an ``Obsdata`` says of its calibration."""
+"""Calibration as an ``Obsdata`` states it."""
 
 
 def _hours(obs: Any) -> Any:
@@ -31,7 +31,7 @@ def _hours(obs: Any) -> Any:
 
 
 def read(obs: Any) -> dict[str, Any]:
-    """What an ``Observation`` is made of, from an ``ehtim.obsdata.Obsdata``."""
+    """Returns the arguments of an ``Observation``, from an ``ehtim.obsdata.Obsdata``."""
     circular = {"stokes": False, "circ": True}.get(obs.polrep)
     if circular is None:
         raise ValueError(f'polrep = "{obs.polrep}" is not allowed: stokes or circ')

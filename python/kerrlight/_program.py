@@ -11,7 +11,7 @@ from typing import Any
 from kerrlight import _core
 
 LAUNCHER = [sys.executable, "-m", "kerrlight"]
-"""What starts it in a process of its own, as a comparison does for each fit."""
+"""Command that starts the program in a process of its own, as a comparison does for each fit."""
 
 _LOG = logging.getLogger("kerrlight")
 

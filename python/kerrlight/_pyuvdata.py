@@ -20,7 +20,7 @@ CODES = {True: (-1, -2, -3, -4), False: (1, 2, 3, 4)}
 
 
 def _basis(codes: Any) -> tuple[bool, list[int | None]]:
-    """Whether products are circular, and where each of the four stands in the data."""
+    """Returns whether products are circular, and the place of each of the four in the data."""
     known = [int(code) for code in codes]
     for circular, wanted in CODES.items():
         if known and all(code in wanted for code in known):

@@ -39,7 +39,7 @@ def _plain(value: Any) -> Any:
 
 
 INFINITE = "\0inf"
-"""What stands for infinity in JSON, which has none."""
+"""Text for infinity in JSON, which has none."""
 
 
 def _table(value: Any) -> Any:

@@ -19,4 +19,4 @@ class Station:
     feed_rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Factors on parallactic angle and elevation, and a constant in degrees."""
     leakage: tuple[complex, complex] = (0j, 0j)
-    """Of the R and L feeds; carried along for files."""
+    """Leakage of the R and L feeds; carried along for files."""

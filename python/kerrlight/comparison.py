@@ -23,16 +23,16 @@ class Comparison:
 
     def __init__(self, folder: Union[str, PathLike[str]]) -> None:
         self.folder = Path(folder)
-        """Where it lies."""
+        """Path of its folder."""
         path = self.folder / "results.json"
         if not path.is_file():
             raise FileNotFoundError(f"{folder} holds no results of a comparison")
         results = json.loads(path.read_text(encoding="utf-8"))
         self.title: str = results["title"]
         self.is_quick: bool = results["quick"]
-        """Whether it was a look at whether it runs, and no measurement."""
+        """True if it was a look at whether it runs, and no measurement."""
         self.cases: list[dict[str, Any]] = results["cases"]
-        """Of each case ``levels``, ``seed``, ``status``, ``settings`` and ``results``."""
+        """Cases, each with ``levels``, ``seed``, ``status``, ``settings`` and ``results``."""
 
     def rows(self) -> list[dict[str, Any]]:
         """A row for each case: its levels, its seed, its status, its verdict, and every result that is a single

@@ -120,7 +120,7 @@ class Fit:
         self.settings, answer = _program.call([*words, "--print"], settings=given)
         """The settings as TOML, with all changes."""
         self.guessed: list[str] = answer["guessed"]
-        """What was read from the data, and what was assumed because they do not tell."""
+        """Settings that were read from the data, and those that were assumed because they do not tell."""
         tables = answer["settings"]
         self._steps: int = tables["training"]["steps"] if "training" in tables else tables["image"]["iterations"]
 
@@ -147,7 +147,7 @@ class Fit:
 
     @property
     def _place(self) -> str:
-        """Where data in memory are to be."""
+        """Path for data in memory."""
         assert self._given is not None
         return os.path.abspath(self.folder / self._given[0])
 
@@ -229,7 +229,7 @@ class Fit:
 
     @property
     def verdict(self) -> str:
-        """Whether the model explains its data, in words."""
+        """Verdict: whether the model explains its data, in words."""
         return self.results["verdict"]["text"]
 
     @property
@@ -239,7 +239,7 @@ class Fit:
 
     @property
     def chi2_per_datum(self) -> dict[str, float]:
-        """Of each kind of data."""
+        """χ² per datum of each kind of data."""
         return self.results["chi2_per_datum"]
 
     @property
@@ -305,7 +305,7 @@ class Fit:
         threads: int | None = None,
         memory: str | None = None,
     ) -> Posterior:
-        """How sure the fit is: draws volumes, and geometries where the geometry is not known, that the data leave possible,
+        """Draws from the posterior: volumes, and geometries where the geometry is not known, that the data leave possible,
         as ``kerrlight posterior`` does.
 
         :param samples: number of draws, those of earlier calls included; each takes about as long as the fit.

@@ -1,4 +1,4 @@
-"""How gas moves around the hole and how its light is polarised: laws of fits, scenes and forward models."""
+"""Motion of gas around the hole, and polarisation of its light: laws of fits, scenes and forward models."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class PolarizationLaw:
     radial_sine_power: float
     """n."""
     components: Literal["orthonormal", "coordinate"]
-    """What the components are along."""
+    """Frame of the components."""
     frame: Literal["gas", "ideal", "lowered"]
     """Whose they are."""
     redshift_power: float
@@ -113,7 +113,7 @@ class PolarizationLaw:
     fraction: float
     """Linearly polarised part, 0 to 1."""
     normalisation: Literal["mean-field", "none"]
-    """What |b| is measured in."""
+    """Unit of |b|."""
     turn_deg: float
     """Added to all position angles, degrees east of north."""
 

@@ -1,4 +1,4 @@
-"""From images to visibilities, and back."""
+"""Transforms from images to visibilities, and back."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["Fourier"]
 
 
 class Fourier(_Linear):
-    """From images in Jy/pixel to visibilities, with the adjoint.
+    """Transform from images in Jy/pixel to visibilities, with the adjoint.
 
     :param shape: rows and columns of an image; rows from the north, each from the east.
     :param field_uas: width of the field (µas).

@@ -54,7 +54,7 @@ class Closures:
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """What an array has measured: columns with a row for each baseline and time.
+    """Observation of an array: columns with a row for each baseline and time.
 
     ``products`` are RR, LL, RL, LR if ``circular``, else I, Q, U, V, in Jy; ``sigmas`` are the standard deviations of
     their real and of their imaginary parts, NaN where there is no such product.
@@ -83,7 +83,7 @@ class Observation:
     opacity: Floats | None = None
     """Zenith opacities at both stations, shape (rows, 2)."""
     channel: NDArray[np.int64] | None = None
-    """Which of ``channels`` each row is of."""
+    """Index in ``channels`` of each row."""
     array: tuple[Station, ...] = ()
     """The stations that rows name."""
     source: str = ""
@@ -95,7 +95,7 @@ class Observation:
     channels: tuple[tuple[float, float], ...] = ()
     """Frequency and bandwidth (Hz) of spectral channels; none where all rows are of ``frequency_hz``."""
     history: tuple[str, ...] = ()
-    """How the data came about."""
+    """History of the data."""
     _core: Any = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -339,7 +339,7 @@ class Observation:
 
     @staticmethod
     def from_ehtim(obs: Any) -> Observation:
-        """From an ``ehtim.obsdata.Obsdata``; its noise may not be in amplitude-only columns of other bases."""
+        """Converts an ``ehtim.obsdata.Obsdata``; its noise may not be in amplitude-only columns of other bases."""
         return Observation(**_ehtim.read(obs))
 
     def to_ehtim(self) -> Any:
@@ -360,7 +360,7 @@ class Observation:
 
     @staticmethod
     def from_pyuvdata(data: Any, sigmas: ArrayLike | None = None) -> Observation:
-        """From a ``pyuvdata.UVData`` in Jy with one phase centre.
+        """Converts a ``pyuvdata.UVData`` in Jy with one phase centre.
 
         ``sigmas``, in the shape of its ``data_array``, are standard deviations of real and imaginary parts (Jy). Without
         them they are 1/√nsample: pyuvdata keeps the weights of a UVFITS file, which in EHT files are 1/σ², as numbers

@@ -63,7 +63,7 @@ class _Linear:
     """Shape of what it gives."""
 
     _made: tuple[Any, ...]
-    """What its compiled half is made of."""
+    """Keyword arguments of its compiled half."""
 
     def __copy__(self) -> Any:
         other = object.__new__(type(self))
@@ -99,7 +99,7 @@ class _Linear:
 
 
 class ForwardModel(_Linear):
-    """From emission on the nodes of rays to a movie.
+    """Map from emission on the nodes of rays to a movie.
 
     :param observer: who sees which hole.
     :param alpha: screen coordinates of the pixels (M), as of :func:`screen`; their shape is that of an image.
@@ -232,7 +232,7 @@ class ForwardModel(_Linear):
 
     @property
     def factors(self) -> Floats:
-        """What weights are multiplied by for each Stokes parameter, shape (parameters, nodes)."""
+        """Factors of weights for each Stokes parameter, shape (parameters, nodes)."""
         return self._core.factors().reshape(-1, self.nodes)
 
     @cached_property
@@ -241,12 +241,12 @@ class ForwardModel(_Linear):
 
     @property
     def positions(self) -> Floats:
-        """Where light is emitted: x, y and z of each node (M), shape (nodes, 3)."""
+        """Points where light is emitted: x, y and z of each node (M), shape (nodes, 3)."""
         return self._columns["position"].reshape(-1, 3)
 
     @property
     def weights(self) -> Floats:
-        """What the emission of each node is multiplied by in its pixel."""
+        """Weight of the emission of each node in its pixel."""
         return self._columns["weight"]
 
     @property
@@ -256,12 +256,12 @@ class ForwardModel(_Linear):
 
     @property
     def delays(self) -> Floats:
-        """How long before the frame's time the light of each node left (M); 0 without ``slow_light``."""
+        """Time before the frame's time at which the light of each node left (M); 0 without ``slow_light``."""
         delay: Floats = self._columns["delay"]
         return delay if len(delay) else np.zeros(self.nodes)
 
     def coordinates(self, dtype: DTypeLike = np.float64) -> NDArray[Any]:
-        """Where the matter of every node was at the reference time: x, y and z (M), shape (frames, nodes, 3).
+        """Places of the matter of every node at the reference time: x, y and z (M), shape (frames, nodes, 3).
 
         A field of emission is evaluated here. ``dtype`` is float64 or float32.
         """
@@ -326,7 +326,7 @@ class ForwardModel(_Linear):
 
 
 class VoxelModel(_Linear):
-    """From emission on voxels, linear in between and dark outside, to a movie; made by :meth:`ForwardModel.voxels`.
+    """Map from emission on voxels, linear in between and dark outside, to a movie; made by :meth:`ForwardModel.voxels`.
 
     >>> from kerrlight import Kerr
     >>> observer = Kerr(0.5).observer(inclination_deg=30)

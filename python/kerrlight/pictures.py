@@ -17,7 +17,7 @@ from kerrlight._settings import Settings, overrides_of, text_of
 __all__ = ["Movie", "Picture", "movie", "render"]
 
 class _Kept:
-    """What a picture shows of itself, as it goes to another process."""
+    """Data of a picture, as they go to another process."""
 
     def __init__(self, core: Any) -> None:
         names = core.names()
@@ -100,7 +100,7 @@ class Picture(Mapping[str, "NDArray[np.float32]"]):
 
     @cached_property
     def attributes(self) -> dict[str, str]:
-        """What an EXR file of it says: the scene, and every number that decided the picture."""
+        """Attributes of its EXR file: the scene, and every number that decided the picture."""
         return self._core.attributes()
 
     @property

@@ -1,4 +1,4 @@
-"""How sure a fit is: what :meth:`kerrlight.Fit.posterior` draws."""
+"""Posterior of a fit: the draws of :meth:`kerrlight.Fit.posterior`."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Posterior:
 
     @property
     def features(self) -> list[Feature]:
-        """What is bright, the brightest first."""
+        """Bright places, the brightest first."""
         return [feature_of(found) for found in self.summary["features"]]
 
     @cached_property

@@ -13,7 +13,7 @@ class Report:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        """Where the page lies."""
+        """Path of the page."""
 
     def open(self) -> bool:
         """Shows it in a browser."""

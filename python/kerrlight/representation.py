@@ -37,7 +37,7 @@ Singles = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Region:
-    """Where a fit recovers emission: radii and the largest absolute z, in M; ``z_width`` may be infinite."""
+    """Region in which a fit recovers emission: radii and the largest absolute z, in M; ``z_width`` may be infinite."""
 
     r_min: float
     r_max: float

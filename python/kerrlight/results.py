@@ -19,12 +19,12 @@ Kind = TypeVar("Kind")
 
 @dataclass(frozen=True)
 class Step:
-    """What the log says of a step."""
+    """Line of the log for a step."""
 
     step: int
     loss: float
     chi2_per_datum: Mapping[str, float] = field(default_factory=dict)
-    """Of each kind of data."""
+    """χ² per datum of each kind of data."""
     psnr_db: float | None = None
     """Peak signal-to-noise ratio of the emission, where the truth is known; so are the next two."""
     nrmse: float | None = None
@@ -70,7 +70,7 @@ class Ring:
     diameter_uas: Number
     width_uas: Number
     position_angle_deg: Number
-    """Where it is brightest, east of north."""
+    """Brightest direction, east of north."""
     asymmetry: Number
     central_brightness: Number
 
@@ -80,12 +80,12 @@ class Polarization:
     """Linear polarisation of a static image. Fractions are of Stokes I, angles east of north."""
 
     net_fraction: Number
-    """Of all light together."""
+    """Polarisation of all light together."""
     net_evpa_deg: Number
     mean_fraction: Number
     """Mean over the image as the beam sees it."""
     brightest_fraction: Number
-    """Where polarised light is brightest."""
+    """Polarisation where polarised light is brightest."""
     brightest_deg: Number
     """Direction of that place from the centre."""
     beta2: Number
@@ -101,16 +101,16 @@ class Images:
         with np.load(path) as arrays:
             found: dict[str, NDArray[Any]] = {name: arrays[name] for name in arrays}
         self.recovered: NDArray[np.float32] = found["recovered"]
-        """Of the model."""
+        """Movie of the model."""
         self.recovered_q: NDArray[np.float32] | None = found.get("recovered_q")
         """Stokes Q of a static image, where it was fitted."""
         self.recovered_u: NDArray[np.float32] | None = found.get("recovered_u")
         self.data: NDArray[np.float32] | None = found.get("data")
-        """What was fitted, or simulated; None where no images are known."""
+        """Movie that was fitted, or simulated; None where no images are known."""
         self.time: Floats = found["time"]
         """M."""
         self.hours: Floats | None = found.get("hours")
-        """Where the mass is known."""
+        """Times in hours, where the mass is known."""
         self.field_uas: float | None = float(found["field_uas"][0]) if "field_uas" in found else None
         """Width, where mass and distance are known."""
 

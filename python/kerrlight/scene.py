@@ -148,7 +148,7 @@ class Screen:
     samples_per_pixel: int | None = None
     """Rays per pixel: 1, 4, 9, …, 1024."""
     rings: Literal["resolved", "regular-grid"] | None = None
-    """Whether pixels near the critical curve get more rays."""
+    """True if pixels near the critical curve get more rays."""
     image_error: float | None = None
     """Refine pixels until the relative error of the intensity is below this."""
     total_flux_jy: float | None = None
@@ -159,7 +159,7 @@ class Screen:
 
 @dataclass(kw_only=True)
 class Effects:
-    """What light goes through; an effect that is off costs nothing."""
+    """Effects on light; one that is off costs nothing."""
 
     lensing: bool | None = None
     redshift: bool | None = None
@@ -178,7 +178,7 @@ class Effects:
 
 @dataclass(kw_only=True)
 class Tracer:
-    """How rays are traced."""
+    """Tracer of rays."""
 
     integrator: Literal["elliptic", "taylor-mino", "dop853-mino", "rk45-mino"]
     tolerance: float
@@ -218,7 +218,7 @@ class Plunging:
     intensity: float
     """At that orbit, in the gas frame."""
     exponent: float
-    """Of r/r_isco."""
+    """Power of r/r_isco."""
 
 
 @dataclass(kw_only=True)
@@ -288,7 +288,7 @@ class Mesh:
     rotation_axis: Vector | None = None
     rotation_deg: float | None = None
     position: Vector | None = None
-    """Of the file's origin (M)."""
+    """Position of the file's origin (M)."""
     color: Color | None = None
     velocity: Literal["static", "keplerian"] | None = None
 
@@ -331,7 +331,7 @@ class Catalogue:
 
 @dataclass(kw_only=True)
 class Sky:
-    """What is behind it all: one of these."""
+    """Background: one of these."""
 
     checker: Checker | None = None
     stars: Stars | None = None

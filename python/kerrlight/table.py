@@ -15,11 +15,11 @@ from kerrlight._arrays import Floats
 __all__ = ["Outcome", "Points", "Rays"]
 
 PARAMETERS = ("spin", "inclination", "alpha", "beta")
-"""What derivatives are taken with respect to, in the order of their last axis: per 1, per radian, per M and per M."""
+"""Parameters of derivatives, in the order of their last axis: per 1, per radian, per M and per M."""
 
 
 class Outcome(IntEnum):
-    """What became of a ray that was followed backward in time."""
+    """Outcome of a ray that was followed backward in time."""
 
     CAPTURED = 0
     """It reaches the outer horizon."""
@@ -57,7 +57,7 @@ class Points:
 
     @property
     def count(self) -> NDArray[np.int64]:
-        """How many points each ray has."""
+        """Number of points of each ray."""
         return self._counts.reshape(self._shape)
 
     def __len__(self) -> int:
@@ -168,13 +168,13 @@ class Rays:
         self.shape = shape
         """Shape of the screen coordinates, and of every column."""
         self.outcome: NDArray[np.int8] = table["outcome"].reshape(shape)
-        """What became of each ray: the numbers of :class:`Outcome`."""
+        """Outcome of each ray: the numbers of :class:`Outcome`."""
         self.mino_total: Floats = table["mino_total"].reshape(shape)
         """Mino time of each whole ray (1/M); NaN where unresolved."""
         self.turning_radius: Floats = table["turning_radius"].reshape(shape)
         """Smallest radius of each ray that turns (M); NaN of others."""
         self.crossing_count: NDArray[np.uint32] = table["crossing_count"].reshape(shape)
-        """How many times each ray crosses the equatorial plane."""
+        """Number of times each ray crosses the equatorial plane."""
         self.crossings = Points(table["crossings"], shape, widths[0], by and by["crossings"])
         """The first crossings of the equatorial plane."""
         self.samples = Points(table["samples"], shape, widths[1], by and by["samples"])
@@ -184,12 +184,12 @@ class Rays:
 
     @property
     def captured(self) -> NDArray[np.bool_]:
-        """Which rays reach the horizon."""
+        """Mask of rays that reach the horizon."""
         return self.outcome == Outcome.CAPTURED
 
     @property
     def escaped(self) -> NDArray[np.bool_]:
-        """Which rays return to infinity."""
+        """Mask of rays that return to infinity."""
         return self.outcome == Outcome.ESCAPED
 
     @property

@@ -30,7 +30,7 @@ class Volume:
                 shapes = [self.emission.shape, self.low.shape, self.high.shape]
                 raise ValueError(f"{path}: emission, low and high have the shapes {shapes}, not (x, y, z), (3,) and (3,)")
             self.axis: Floats | None = arrays["axis"] if "axis" in arrays else None
-            """What matter turns about, where the file tells."""
+            """Axis of the rotation, where the file tells."""
 
     def _nodes(self, k: int) -> Floats:
         return np.linspace(self.low[k], self.high[k], self.emission.shape[k])
@@ -51,7 +51,7 @@ class Volume:
         return self._nodes(2)
 
     def to_xarray(self) -> Any:
-        """As an ``xarray.DataArray`` with coordinates; needs xarray."""
+        """Returns an ``xarray.DataArray`` with coordinates; needs xarray."""
         import xarray
 
         coordinates = {name: (name, getattr(self, name), {"units": "M"}) for name in "xyz"}

@@ -123,12 +123,12 @@ class Geodesics:
 
     @property
     def affinesteps(self) -> Floats:
-        """As :attr:`affine_times`."""
+        """The same as :attr:`affine_times`."""
         return self.affine_times
 
     @property
     def sig_s(self) -> Floats:
-        """As :attr:`affine_times`."""
+        """The same as :attr:`affine_times`."""
         return self.affine_times
 
     @property
@@ -279,7 +279,7 @@ def _observer(a: float, observer_coords: Sequence[float]) -> Observer:
 def r_equatorial(
     a: float, r_o: float, th_o: float, mbar: int, alpha: ArrayLike, beta: ArrayLike
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Where rays cross the equatorial plane for the time number ``mbar``, counted from 0 backward from the observer.
+    """Crossings of the equatorial plane for the time number ``mbar``, counted from 0 backward from the observer.
 
     Returns the radius there (M; 0 without such a crossing), the Mino time to there (1/M; NaN without), that of the
     whole ray, and the number of the last crossing, -1 without any; arrays with the shape of ``alpha`` and ``beta`` (M).
