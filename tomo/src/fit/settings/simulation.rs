@@ -238,7 +238,7 @@ pub struct Ring {
     #[serde(default)]
     #[schemars(range(min = -1e15, max = 1e15), extend("unit" = "Jy"))]
     pub u_jy: f64,
-    /// Excess of the brightest side, as a part of its mean.
+    /// Excess of the brightest side over the mean, as a part of the mean.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "a part of the mean brightness"))]
     pub asymmetry: f64,
