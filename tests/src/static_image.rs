@@ -140,6 +140,7 @@ fn exact_two_bands_make_one_image() {
     for (table, own) in [("gains.csv", "ALMA"), ("gains_2.csv", "ALMA")] {
         let text = std::fs::read_to_string(path.join("both").join(table)).unwrap();
         assert!(text.contains(own) && !text.contains("(2)"), "{table}: {text}");
+        assert!(!text.contains("phase"), "phases that nobody solved for: {table}: {text}");
     }
     let page = std::fs::read_to_string(path.join("both/report.html")).unwrap();
     assert!(page.contains("nothing closes across them") && page.contains("ALMA (2)"));

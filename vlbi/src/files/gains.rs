@@ -16,22 +16,28 @@ pub const COLUMNS: [&str; 7] = [
     "phase_deg",
     "phase_error_deg",
 ];
-/// Those that a table may lack.
-const OPTIONAL: [&str; 2] = ["amplitude_error", "phase_error_deg"];
+/// Those that a table may lack: phases are then 0, and errors are not known.
+const OPTIONAL: [&str; 3] = ["amplitude_error", "phase_deg", "phase_error_deg"];
+/// Columns without those of phases.
+const AMPLITUDES: usize = 5;
 
-/// A table as CSV. `amplitude_error` is the standard deviation of |g|; errors that are not known are empty.
+/// A table as CSV. `amplitude_error` is the standard deviation of |g|; errors that are not known are empty. Phases that were
+/// not solved for have no columns.
 pub fn to_csv(table: &GainTable) -> String {
-    let mut text = COLUMNS.join(",") + "\n";
+    let has_phases = table.has_phases();
+    let columns = if has_phases { &COLUMNS[..] } else { &COLUMNS[..AMPLITUDES] };
+    let mut text = columns.join(",") + "\n";
     let known = |x: f64| if x.is_finite() { format!("{x:.6}") } else { String::new() };
     for StationGain { time_h, span_s, station, gain, errors } in &table.gains {
-        let (amplitude, phase) = (gain.norm(), gain.arg().to_degrees());
-        let (of_amplitude, of_phase) =
-            (known(errors[0] * amplitude), known(errors[1].to_degrees()));
+        let amplitude = gain.norm();
+        let of_amplitude = known(errors[0] * amplitude);
         // Writing to a string does not fail.
-        let _ = writeln!(
-            text,
-            "{time_h:.9},{span_s},{station},{amplitude:.9},{of_amplitude},{phase:.7},{of_phase}"
-        );
+        let _ = write!(text, "{time_h:.9},{span_s},{station},{amplitude:.9},{of_amplitude}");
+        if has_phases {
+            let (phase, of_phase) = (gain.arg().to_degrees(), known(errors[1].to_degrees()));
+            let _ = write!(text, ",{phase:.7},{of_phase}");
+        }
+        text.push('\n');
     }
     text
 }
@@ -99,7 +105,8 @@ fn gain(cells: &[&str], places: &Places) -> Result<StationGain, String> {
     if amplitude <= 0.0 {
         return Err(format!("column amplitude: {amplitude} is not allowed: above 0"));
     }
-    let gain = Complex64::from_polar(amplitude, value(5)?.to_radians());
+    let phase = if places[5].is_some() { value(5)? } else { 0.0 };
+    let gain = Complex64::from_polar(amplitude, phase.to_radians());
     let errors = [error(4)? / amplitude, error(6)?.to_radians()];
     Ok(StationGain { time_h, span_s, station: cell(2)?.to_owned(), gain, errors })
 }
@@ -128,6 +135,21 @@ mod tests {
             assert!((a.gain - b.gain).norm() < 1e-8 && a.station == b.station);
             assert!((a.errors[0] - 0.01).abs() < 1e-5 && (a.errors[1] - 0.02).abs() < 1e-5);
         }
+    }
+
+    /// Phases that were not solved for are not told as 0 ± 0; those of gains that were put on are known.
+    #[test]
+    fn exact_unknown_phases_have_no_columns() {
+        let mut table = table();
+        for gain in &mut table.gains {
+            (gain.gain, gain.errors) = (gain.gain.norm().into(), [0.01, 0.0]);
+        }
+        let text = to_csv(&table);
+        assert!(!text.contains("phase"), "{text}");
+        let read = parse(&text).unwrap();
+        assert!(read.gains.iter().all(|gain| gain.gain.arg() == 0.0 && gain.errors[1].is_nan()));
+        table.gains[1].errors[1] = f64::NAN;
+        assert!(to_csv(&table).contains("phase_deg"));
     }
 
     #[test]

@@ -27,6 +27,11 @@ pub struct GainTable {
 }
 
 impl GainTable {
+    /// Returns whether phases are known: those that were not solved for are 0 and have errors of 0.
+    pub fn has_phases(&self) -> bool {
+        self.gains.iter().any(|gain| gain.gain.arg() != 0.0 || gain.errors[1] != 0.0)
+    }
+
     /// The gains by station, to look them up.
     pub fn by_station(&self) -> GainsByStation<'_> {
         let mut stations: HashMap<&str, Vec<&StationGain>> = HashMap::new();

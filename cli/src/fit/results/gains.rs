@@ -26,16 +26,30 @@ pub struct Gains {
     distance: Option<GainDistance>,
 }
 
-/// The gains of the stations of one file of several, by their own names.
-fn of_file(table: &GainTable, measured: &FitData, file: usize) -> GainTable {
-    if measured.files.iter().all(|file| *file == 0) {
-        return table.clone();
+/// Own name of a station of the present file; none of stations of other files.
+pub type OwnName<'a> = dyn Fn(&str) -> Option<String> + 'a;
+
+/// Writes a table of stations for each file of data: `NAME.csv`, `NAME_2.csv`, …
+pub fn write_by_file(
+    name: &str,
+    measured: &FitData,
+    folder: &Folder,
+    table: impl Fn(&OwnName<'_>) -> String,
+) -> anyhow::Result<()> {
+    let last = measured.files.iter().copied().max().unwrap_or(0);
+    for file in 0..=last {
+        let text = table(&|station| {
+            if last == 0 {
+                return Some(station.to_owned());
+            }
+            let (own, of) = station_of_file(station);
+            (of == file).then(|| own.to_owned())
+        });
+        let name =
+            if file == 0 { format!("{name}.csv") } else { format!("{name}_{}.csv", file + 1) };
+        folder.file(&name)?.write(text.as_bytes())?;
     }
-    let own = |gain: &StationGain| {
-        let (station, of) = station_of_file(&gain.station);
-        (of == file).then(|| StationGain { station: station.to_owned(), ..gain.clone() })
-    };
-    GainTable { gains: table.gains.iter().filter_map(own).collect() }
+    Ok(())
 }
 
 /// What the gains of a station are like.
@@ -95,11 +109,12 @@ impl Gains {
     }
 
     fn written(table: GainTable, measured: &FitData, folder: &Folder) -> anyhow::Result<Self> {
-        for file in 0..=measured.files.iter().copied().max().unwrap_or(0) {
-            let own = of_file(&table, measured, file);
-            let name = if file == 0 { TABLE.to_owned() } else { format!("gains_{}.csv", file + 1) };
-            folder.file(&name)?.write(files::gains_to_csv(&own).as_bytes())?;
-        }
+        write_by_file("gains", measured, folder, |is_own| {
+            let gains = table.gains.iter().filter_map(|gain| {
+                Some(StationGain { station: is_own(&gain.station)?, ..gain.clone() })
+            });
+            files::gains_to_csv(&GainTable { gains: gains.collect() })
+        })?;
         let distance = measured.true_gains.as_ref().and_then(|truth| table.distance(truth));
         Ok(Gains { table, distance })
     }
@@ -114,14 +129,9 @@ impl Gains {
         }
     }
 
-    /// Whether phases were solved for: one that was has an error.
-    fn has_phases(&self) -> bool {
-        self.table.gains.iter().any(|gain| gain.errors[1] > 0.0)
-    }
-
     /// For results.json.
     pub fn json(&self) -> Value {
-        let has_phases = self.has_phases();
+        let has_phases = self.table.has_phases();
         let station = |s: Summary<'_>| {
             json!({
                 "station": s.station, "scans": s.scans, "amplitude": s.mean, "scatter": s.scatter,
@@ -145,7 +155,7 @@ impl Gains {
 
     /// Sentences for the report.
     pub fn sentences(&self) -> Vec<String> {
-        let (kind, phases) = match self.has_phases() {
+        let (kind, phases) = match self.table.has_phases() {
             true => ("Complex gains", "Phases count from the station with the strongest data."),
             false => (
                 "Amplitudes of gains",
@@ -168,7 +178,7 @@ impl Gains {
 
     /// A line for every station.
     pub fn details(&self) -> Table {
-        let has_phases = self.has_phases();
+        let has_phases = self.table.has_phases();
         let row = |s: Summary<'_>| {
             vec![
                 s.station.to_owned(),

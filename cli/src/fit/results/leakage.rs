@@ -1,6 +1,7 @@
 //! Leakage between the feeds of stations that a fit has solved for: a table, a picture and numbers.
 
 use super::Estimate;
+use super::gains::write_by_file;
 use crate::fit::folder::Folder;
 use crate::fit::leakage::TABLE;
 use crate::report::{Axis, LinePlot, Marks, Series, Table};
@@ -35,7 +36,12 @@ impl Leakage {
         measured: &FitData,
         folder: &Folder,
     ) -> anyhow::Result<Self> {
-        folder.file(TABLE)?.write(files::leakage_to_csv(&table).as_bytes())?;
+        write_by_file("leakage", measured, folder, |is_own| {
+            let stations = table.stations.iter().filter_map(|leakage| {
+                Some(StationLeakage { station: is_own(&leakage.station)?, ..leakage.clone() })
+            });
+            files::leakage_to_csv(&LeakageTable { stations: stations.collect() })
+        })?;
         Ok(Leakage { table, truth: measured.true_leakage.clone() })
     }
 
