@@ -72,6 +72,8 @@ mod ring;
 
 mod shapes;
 
+mod found;
+
 mod survey;
 
 mod polarized;
@@ -80,6 +82,7 @@ mod polarized;
 mod tests;
 
 pub use beam::blurred;
+pub use found::{Calibration, Candidate, Survey};
 pub use kerrlight_tomo::Error;
 pub use polarized::{
     LinearPolarization, PolarizedCandidate, PolarizedProblem, PolarizedSurvey, survey_polarized,
@@ -88,4 +91,4 @@ pub use problem::{FluxPrior, ImageProblem};
 pub use ring::Ring;
 pub use shapes::{Shape, ShapeFit, fit_shapes};
 pub use solve::Solution;
-pub use survey::{Candidate, Stage, Survey, SurveyWatch, image, survey};
+pub use survey::{Stage, SurveyWatch, image, survey};

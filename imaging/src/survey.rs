@@ -3,13 +3,13 @@
 
 use crate::Error;
 use crate::data;
+use crate::found::{Calibration, Candidate, Survey};
 use crate::problem::{FluxPrior, ImageProblem};
 use crate::ring::Ring;
 use crate::settings::{StaticImageFile, StrengthSettings};
 use crate::shapes::{ShapeFit, fit_shapes};
-use crate::solve::{Solution, solve};
+use crate::solve::solve;
 use crate::start;
-use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_tomo::fit::linear::Prior;
 use kerrlight_tomo::fit::setup::{FitData, Held, best_held};
 use kerrlight_tomo::fit::{FrameTerm, Weighted};
@@ -37,91 +37,6 @@ pub enum Stage {
 /// Told what has been solved of a stage and how many solutions it has; says whether to go on.
 pub type SurveyWatch<'a> = dyn Fn(Stage, usize) -> bool + Sync + 'a;
 
-/// An image with what it was made of.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Candidate {
-    /// Which start.
-    pub start: usize,
-    /// Factor on the penalties.
-    pub strength: f64,
-    /// The image.
-    pub solution: Solution,
-    /// χ² per datum of each kind.
-    pub chi2: Vec<f64>,
-    /// Its ring, where one is wanted and there is one.
-    pub ring: Option<Ring>,
-}
-
-/// What came out.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Survey {
-    /// Strengths with the loss of frames that were held out, of fits that came to a minimum.
-    pub held: Vec<Held>,
-    /// The strength: the largest that predicts held-out frames as well as the best within a standard error.
-    pub strength: f64,
-    /// Images from all starts, in their order.
-    pub starts: Vec<Candidate>,
-    /// The start with the least loss.
-    pub best: usize,
-    /// Images with the other strengths that predict held-out frames as well, from the best start.
-    pub strengths: Vec<Candidate>,
-    /// Images of the measurement of the image with other noise.
-    pub draws: Vec<Candidate>,
-}
-
-impl Survey {
-    /// The image.
-    pub fn found(&self) -> &Candidate {
-        &self.starts[self.best]
-    }
-
-    /// The centre of its ring, to the east and north of the middle of the field, µas; that of its light where it has no ring.
-    pub fn centre_uas(&self, grid: ImageGrid) -> [f64; 2] {
-        let found = self.found();
-        if let Some(ring) = &found.ring {
-            return ring.centre_uas;
-        }
-        let image = &found.solution.image;
-        let mean = |place: &dyn Fn(usize) -> f64| {
-            let moment: f64 = image.iter().enumerate().map(|(k, light)| light * place(k)).sum();
-            moment / image.iter().sum::<f64>() / MICROARCSECOND
-        };
-        [mean(&|k| grid.east(k % grid.width)), mean(&|k| grid.north(k / grid.width))]
-    }
-
-    /// Images that data do not tell from the best: those of other starts with a loss within 1 %, and of other strengths.
-    pub fn alternatives(&self) -> impl Iterator<Item = &Candidate> {
-        let least = self.found().solution.loss;
-        let as_good = move |start: &&Candidate| start.solution.loss <= 1.01 * least;
-        self.starts.iter().filter(as_good).chain(&self.strengths)
-    }
-
-    /// How many of the draws, and of the images that data do not tell from the best, have a ring, and how many these are.
-    pub fn with_ring(&self) -> [usize; 2] {
-        let all = || self.draws.iter().chain(self.alternatives());
-        [all().filter(|image| image.ring.is_some()).count(), all().count()]
-    }
-
-    /// Error of a number of the ring: as [`error`](Self::error), over images that have a ring.
-    pub fn ring_error(&self, number: impl Fn(&Ring) -> f64) -> Option<f64> {
-        self.error(|image| image.ring.as_ref().map(&number))
-    }
-
-    /// Error of a number of the image: root mean square distance of the draws from it, and of the images that data do not tell
-    /// from it, added in quadrature, over those that have the number; none with less than two such draws.
-    pub fn error(&self, number: impl Fn(&Candidate) -> Option<f64>) -> Option<f64> {
-        let here = number(self.found())?;
-        let square = |images: &mut dyn Iterator<Item = &Candidate>| -> (f64, usize) {
-            let apart: Vec<f64> =
-                images.filter_map(&number).map(|there| (there - here).powi(2)).collect();
-            (apart.iter().sum::<f64>() / apart.len().max(1) as f64, apart.len())
-        };
-        let (draws, count) = square(&mut self.draws.iter());
-        let (others, _) = square(&mut self.alternatives());
-        (count >= 2).then(|| (draws + others).sqrt())
-    }
-}
-
 /// Finds the image of measured visibilities, from the starts of the settings and then from shapes that fit the same data; none if
 /// `watch` said no.
 ///
@@ -137,6 +52,7 @@ pub fn survey(
     let terms = measured.visibility_terms(&file.loss, grid.pixels())?;
     let envelope =
         file.envelope.map(|envelope| (start::envelope(envelope.fwhm_uas, grid), envelope.weight));
+    let fitted = shapes;
     let shapes = shapes.iter().map(|fit| start::shape(&fit.shares));
     let begin = file.image.starts.iter().map(|start| start::image(*start, grid)).chain(shapes);
     let (priors, begin) = (file.priors()?, begin.collect());
@@ -164,8 +80,21 @@ pub fn survey(
     // The image's own strength first: it is the one that draws have where the data choose none.
     let chosen = [strength].into_iter().chain(others).collect();
     let others = Others { starts: good, strengths: chosen };
-    let draws = search.draws(measured, (&starts[best], &others), &frames)?;
-    Ok(draws.map(|draws| Survey { held, strength, starts, best, strengths, draws }))
+    let image = &starts[best].solution.image;
+    let count = file.image.draws.unwrap_or(0);
+    let Some(draws) = search.draws(measured, (image, &others), &frames, count)? else {
+        return Ok(None);
+    };
+    let has_ring = starts[best].ring.is_some();
+    let shapes = fitted.iter().filter(|fit| fit.shape.is_ring() || !has_ring);
+    let shape = shapes.min_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    let calibration = match shape {
+        Some(shape) => {
+            search.calibration(measured, (shape, &others), &frames, count.div_ceil(2))?
+        }
+        None => None,
+    };
+    Ok(Some(Survey { held, strength, starts, best, strengths, draws, calibration }))
 }
 
 /// The image of visibilities of a source that does not change, as `kerrlight fit` finds it: from the starts of the settings and
@@ -335,17 +264,18 @@ impl Search<'_> {
         .map(voting)
     }
 
-    /// Images of the measurement of the best image with other noise, with a flux and a width of the envelope drawn from their
-    /// priors, each from one of the starts that are as good, with one of the strengths that are.
+    /// Images of measurements of an image with other noise, with a flux and a width of the envelope drawn from their priors, each
+    /// from one of the starts that are as good as the best, with one of the strengths that are.
     fn draws(
         &self,
         measured: &FitData,
-        (best, others): (&Candidate, &Others<'_>),
+        (image, others): (&[f64], &Others<'_>),
         frames: &[usize],
+        count: usize,
     ) -> Result<Option<Vec<Candidate>>, Error> {
         let one = |k: usize| -> Result<Option<Candidate>, Error> {
             let seed = self.file.seed.wrapping_add(1 + k as u64);
-            let drawn = data::redrawn(measured, &self.file.loss, &best.solution.image, seed)?;
+            let drawn = data::redrawn(measured, &self.file.loss, image, seed)?;
             let terms = drawn.visibility_terms(&self.file.loss, self.grid.pixels())?;
             let mut random = Pcg64::seed_from_u64(seed);
             let [of_flux, of_width]: [f64; 2] = [(); 2].map(|()| random.sample(StandardNormal));
@@ -367,10 +297,26 @@ impl Search<'_> {
             }
             Ok(self.from(Stage::Draws, &problem, &begin, start.start))
         };
-        let draws = self.file.image.draws.unwrap_or(0);
         let all: Result<Vec<Option<Candidate>>, Error> =
-            (0..draws).into_par_iter().map(one).collect();
+            (0..count).into_par_iter().map(one).collect();
         Ok(all?.into_iter().collect())
+    }
+}
+
+impl Search<'_> {
+    /// Images of measurements of a simple shape.
+    fn calibration(
+        &self,
+        measured: &FitData,
+        (shape, others): (&ShapeFit, &Others<'_>),
+        frames: &[usize],
+        count: usize,
+    ) -> Result<Option<Calibration>, Error> {
+        let image: Vec<f64> = shape.shares.iter().map(|share| share * shape.flux_jy).collect();
+        let ring = self.file.ring.as_ref();
+        let ring = ring.and_then(|ring| Ring::measure(&image, self.grid, ring));
+        let images = self.draws(measured, (&image, others), frames, count)?;
+        Ok(images.map(|images| Calibration { flux_jy: shape.flux_jy, ring, images }))
     }
 }
 

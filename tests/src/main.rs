@@ -32,6 +32,7 @@ mod held_out;
 mod interferometry;
 mod kerr_references;
 mod key_tables;
+mod known_skies;
 mod leakage;
 mod lensing;
 mod other_sky;

@@ -3,9 +3,10 @@
 
 use super::{LinearPolarization, PolarizedProblem};
 use crate::Error;
+use crate::found::Survey;
 use crate::settings::{StaticImageFile, StaticPolarization};
 use crate::solve::minimum;
-use crate::survey::{Stage, Survey, SurveyWatch, allowed, held};
+use crate::survey::{Stage, SurveyWatch, allowed, held};
 use kerrlight_tomo::fit::setup::{FitData, Held, SolvedLeakage, best_held};
 use kerrlight_tomo::fit::{FrameTerm, Weighted};
 use kerrlight_vlbi::data_terms::DataTermError;

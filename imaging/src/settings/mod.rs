@@ -80,8 +80,8 @@ pub struct ImageSettings {
     /// Iterations from one start, at most.
     #[schemars(range(min = 1, max = 1_000_000), extend("unit" = "iterations"))]
     pub iterations: usize,
-    /// Fits of the image measured once more with other noise, which give errors; needs a loss of amplitudes or
-    /// visibilities.
+    /// Fits of the image measured once more with other noise, and half as many of a simple shape, which give errors; needs a
+    /// loss of amplitudes or visibilities.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 2, max = 1000), extend("unit" = "draws"))]
     pub draws: Option<usize>,

@@ -168,8 +168,11 @@ fn searched(
     let values = |s: &Option<StrengthSettings>| s.as_ref().map_or(0, |s| s.values.len() * s.folds);
     let draws = file.image.draws.unwrap_or(0);
     let of_polarized = file.polarization.as_ref().map_or(0, |p| values(&p.strength) + 1 + draws);
-    let all =
-        file.image.starts.len() + Shape::ALL.len() + values(&file.strength) + draws + of_polarized;
+    let all = file.image.starts.len()
+        + Shape::ALL.len()
+        + values(&file.strength)
+        + 3 * draws / 2
+        + of_polarized;
     let keeper = SignalGuard::brief(STOPPED);
     let bar = progress::held_out(all as u64);
     let done = AtomicU64::new(0);

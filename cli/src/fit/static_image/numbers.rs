@@ -20,15 +20,17 @@ pub const RING: [(&str, Number); 5] = [
     ("ring_central_brightness", |ring| ring.central_brightness),
 ];
 
-/// The error of a number of the ring. Angles are compared the short way round.
-pub fn error(survey: &Survey, name: &str, number: Number) -> Option<f64> {
-    if name != "ring_position_angle_deg" {
-        return survey.ring_error(number);
-    }
-    let here = survey.found().ring?.position_angle_deg;
-    survey.ring_error(|ring| {
-        here + (ring.position_angle_deg - here + 540.0).rem_euclid(360.0) - 180.0
-    })
+/// A number of the ring with its error. Angles are compared the short way round; the diameter is calibrated.
+pub fn of_ring(survey: &Survey, ring: &Ring, name: &str, number: Number) -> (f64, Option<f64>) {
+    let value = number(ring);
+    let error = match name {
+        "ring_diameter_uas" => return survey.ring_diameter().unwrap_or((value, None)),
+        "ring_position_angle_deg" => survey.ring_error(|ring| {
+            value + (ring.position_angle_deg - value + 540.0).rem_euclid(360.0) - 180.0
+        }),
+        _ => survey.ring_error(number),
+    };
+    (value, error)
 }
 
 /// `42.1 ± 0.8`, or the number alone where its error is not known.
@@ -108,7 +110,7 @@ impl Found<'_> {
             "inputs": self.folder.inputs().files,
             "verdict": verdict::json(&self.judged),
             "flux_jy": found.solution.image.iter().sum::<f64>(),
-            "flux_error_jy": self.flux_error(),
+            "flux_error_jy": self.survey.flux_error(),
             "strength": self.survey.strength,
             "starts": all(&self.survey.starts),
             "strengths": all(&self.survey.strengths),
@@ -139,18 +141,15 @@ impl Found<'_> {
     fn add_ring(&self, results: &mut Value) {
         let Some(ring) = &self.ring() else { return };
         for (name, number) in RING {
-            results[name] = json!(number(ring));
-            results[format!("{name}_error")] = json!(error(&self.survey, name, number));
+            let (value, error) = of_ring(&self.survey, ring, name, number);
+            results[name] = json!(value);
+            results[format!("{name}_error")] = json!(error);
         }
+        results["ring_diameter_of_image_uas"] = json!(ring.diameter_uas);
         results["ring"] = json!({
             "centre_east_uas": ring.centre_uas[0],
             "centre_north_uas": ring.centre_uas[1],
             "diameter_scatter_uas": ring.diameter_scatter_uas,
         });
-    }
-
-    /// Error of the flux, as of numbers of the ring.
-    fn flux_error(&self) -> Option<f64> {
-        self.survey.error(|image| Some(image.solution.image.iter().sum()))
     }
 }

@@ -1,7 +1,7 @@
 //! The page of a static image.
 
 use super::Found;
-use super::numbers::{RING, error, with_error};
+use super::numbers::{RING, of_ring, with_error};
 use super::polarized::Polarized;
 use crate::fit::results::gains::Gains;
 use crate::fit::results::leakage::Leakage;
@@ -19,7 +19,8 @@ const MEANINGS: [(&str, &str, usize, &str); 5] = [
         "diameter of the ring",
         "µas",
         1,
-        "twice the mean distance of the brightest point from the centre, over all directions",
+        "twice the mean distance of the brightest point from the centre, over all directions, less what the method adds to a \
+         ring that is known",
     ),
     (
         "width of the ring",
@@ -93,12 +94,12 @@ impl Found<'_> {
     }
 
     fn outcomes(&self, results: &Value) -> Vec<Outcome> {
-        let of_ring = RING.iter().zip(MEANINGS).filter_map(|((key, number), meaning)| {
+        let numbers = RING.iter().zip(MEANINGS).filter_map(|((key, number), meaning)| {
             let (name, unit, digits, text) = meaning;
-            let value = number(&self.ring()?);
+            let (value, error) = of_ring(&self.survey, &self.ring()?, key, *number);
             Some(Outcome {
                 name: name.to_owned(),
-                value: with_error(value, error(&self.survey, key, *number), digits),
+                value: with_error(value, error, digits),
                 unit: unit.to_owned(),
                 meaning: text.to_owned(),
             })
@@ -120,7 +121,7 @@ impl Found<'_> {
             meaning: "wall time of this run".to_owned(),
         };
         let polarized = self.polarized.iter().flat_map(Polarized::outcomes);
-        of_ring.chain([flux]).chain(polarized).chain([seconds]).collect()
+        numbers.chain([flux]).chain(polarized).chain([seconds]).collect()
     }
 
     /// The loss of held-out frames against the strength.

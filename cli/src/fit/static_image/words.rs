@@ -1,7 +1,7 @@
 //! What is said of a static image: data, model, priors, and what may be concluded.
 
 use super::Found;
-use super::numbers::{RING, error, with_error};
+use super::numbers::{RING, of_ring, with_error};
 use super::polarized::Polarized;
 use crate::fit::closures;
 use crate::fit::results::medium;
@@ -24,7 +24,7 @@ fn ring(survey: &Survey, shapes: &[ShapeFit]) -> String {
         return format!("The image looks like a ring, but {doubt}: no ring is claimed.");
     }
     let [diameter, width, angle, ..] =
-        RING.map(|(name, number)| (number(&ring), error(survey, name, number)));
+        RING.map(|(name, number)| of_ring(survey, &ring, name, number));
     let [with, all] = survey.with_ring();
     let others = match with == all {
         true => String::new(),
@@ -182,6 +182,13 @@ impl Found<'_> {
              held-out frames as well. The kind of penalty, the field and the size of pixels stay what they are: what they \
              decide is in no error."
         )];
+        text.extend(self.survey.calibration.as_ref().map(|known| {
+            format!(
+                "{} images of measurements of the best simple shape tell what the method makes of a known sky: what it adds to \
+                 the diameter of the ring is taken off, and what it adds to the flux is part of the flux's error.",
+                known.images.len()
+            )
+        }));
         text.extend(self.polarized.as_ref().and_then(Polarized::errors));
         text
     }

@@ -1,0 +1,243 @@
+//! Static images of known skies, through the coverage and the errors of a real night, with the settings that `kerrlight fit --data`
+//! assumes.
+
+use crate::fit::results;
+use crate::fit_start::array;
+use crate::static_sky::data;
+use crate::support::succeed;
+use kerrlight_common::units::MICROARCSECOND;
+use kerrlight_vlbi::files;
+use kerrlight_vlbi::noise::{GainErrors, add_thermal_noise, apply_gains};
+use kerrlight_vlbi::observation::Averaging;
+use kerrlight_vlbi::operator::{ImageGrid, Method, Pulse};
+use kerrlight_vlbi::simulate::{Movie, fill};
+use serde_json::Value;
+use std::path::Path;
+
+/// Night of M87* whose stations, times and errors are taken.
+const NIGHT: &str = "SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits";
+/// Side of a simulated sky, µas and pixels.
+const FIELD_UAS: f64 = 160.0;
+const SIDE: usize = 160;
+/// Flux of each sky, Jy.
+const FLUX_JY: f64 = 0.6;
+
+/// A sky: its brightness at a place to the east and north, µas.
+struct Sky {
+    name: &'static str,
+    light: fn(f64, f64) -> f64,
+    /// Diameter of its ring, µas, and the direction in which it is brightest, degrees; none for an even ring.
+    ring: Option<(f64, Option<f64>)>,
+}
+
+/// exp(−4 ln 2 x²/w²).
+fn bell(x: f64, width: f64) -> f64 {
+    (-4.0 * core::f64::consts::LN_2 * (x / width).powi(2)).exp()
+}
+
+/// A ring of a diameter and a width, brighter by a part of the mean at a position angle.
+fn ring([east, north]: [f64; 2], [diameter, width]: [f64; 2], [part, angle]: [f64; 2]) -> f64 {
+    let turn = east.atan2(north) - angle.to_radians();
+    bell(east.hypot(north) - 0.5 * diameter, width) * (1.0 + part * turn.cos())
+}
+
+/// A round Gaussian at a place.
+fn blob([east, north]: [f64; 2], [x, y]: [f64; 2], width: f64) -> f64 {
+    bell((east - x).hypot(north - y), width)
+}
+
+fn skies() -> Vec<Sky> {
+    let sky = |name, light, ring| Sky { name, light, ring };
+    vec![
+        sky("ring", |x, y| ring([x, y], [42.0, 10.0], [0.0, 0.0]), Some((42.0, None))),
+        sky("crescent", |x, y| ring([x, y], [42.0, 10.0], [0.7, 170.0]), Some((42.0, Some(170.0)))),
+        sky("thick ring", |x, y| ring([x, y], [46.0, 20.0], [0.4, 30.0]), Some((46.0, Some(30.0)))),
+        sky(
+            "ring and spot",
+            |x, y| ring([x, y], [44.0, 8.0], [0.0, 0.0]) + 1.5 * blob([x, y], [15.6, -15.6], 12.0),
+            Some((44.0, Some(135.0))),
+        ),
+        sky("disc", |x, y| 1.0 / (1.0 + ((x.hypot(y) - 27.0) / 1.5).exp()), None),
+        sky("Gaussian", |x, y| bell(x / 40.0, 1.0) * bell(y / 50.0, 1.0), None),
+        sky(
+            "double",
+            |x, y| blob([x, y], [10.0, 15.0], 15.0) + 0.7 * blob([x, y], [-10.0, -15.0], 15.0),
+            None,
+        ),
+        sky(
+            "jet",
+            |x, y| {
+                let knot = |k: f64| 0.6f64.powf(k) * blob([x, y], [9.0 * k, 6.0 * k], 12.0);
+                (0..5).map(|k| knot(f64::from(k))).sum()
+            },
+            None,
+        ),
+        sky(
+            "ring and jet",
+            |x, y| {
+                let knot = |k: f64| 0.4 / k * blob([x, y], [26.0 + 8.0 * k, 4.0 * k], 12.0);
+                ring([x, y], [42.0, 10.0], [0.5, 200.0]) + knot(1.0) + knot(2.0)
+            },
+            Some((42.0, None)),
+        ),
+        sky(
+            "knots",
+            |x, y| {
+                blob([x, y], [-18.0, 4.0], 12.0)
+                    + 0.8 * blob([x, y], [14.0, -12.0], 14.0)
+                    + 0.5 * blob([x, y], [4.0, 20.0], 10.0)
+            },
+            None,
+        ),
+    ]
+}
+
+/// The pixels of a sky in Jy, rows from the north, each from the east.
+fn pixels(sky: &Sky) -> Vec<f64> {
+    let place = |k: usize| FIELD_UAS * (0.5 - (k as f64 + 0.5) / SIDE as f64);
+    let light: Vec<f64> =
+        (0..SIDE * SIDE).map(|k| (sky.light)(place(k % SIDE), place(k / SIDE))).collect();
+    let sum: f64 = light.iter().sum();
+    light.iter().map(|light| FLUX_JY * light / sum).collect()
+}
+
+/// Writes the data of a sky: with noise, lost phases, and gains of 10 %, of the LMT 60 %.
+fn observe(sky: &Sky, night: &Path, seed: u64, path: &Path) {
+    let (_, seen) = files::decode(&std::fs::read(night).unwrap()).unwrap();
+    // Phases are lost from minute to minute, and stable within.
+    let mut seen = seen.averaged(Averaging::over(60.0));
+    let grid = ImageGrid::new(SIDE, SIDE, FIELD_UAS * MICROARCSECOND).unwrap();
+    let movie = Movie { grid, pixels: pixels(sky) };
+    fill(&mut seen, &movie, Pulse::Delta, &[0.0], Method::Direct).unwrap();
+    let large = seen.stations.iter().map(|station| station.name.clone());
+    let large = large.filter(|name| ["LM", "LMT"].contains(&&**name)).map(|name| (name, 0.6));
+    let errors = GainErrors {
+        constant_amplitude: 0.0,
+        scan_amplitude: 0.1,
+        random_phases: true,
+        stations: large.collect(),
+    };
+    assert_eq!(errors.stations.len(), 1, "no LMT");
+    apply_gains(&mut seen, &errors, seed);
+    add_thermal_noise(&mut seen, seed);
+    std::fs::write(path, files::write_uvfits(&seen).unwrap()).unwrap();
+}
+
+/// Correlation of two skies in `side`² pixels of a size in µas, both blurred by 10 µas, at the best shift by whole pixels.
+fn correlation([a, b]: [&[f64]; 2], side: usize, pixel: f64) -> f64 {
+    let [a, b] = [a, b].map(|sky| blurred(sky, side, 10.0 / pixel));
+    let size = |sky: &[f64]| sky.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let reach = (30.0 / pixel) as isize;
+    let product = |[right, down]: [isize; 2]| -> f64 {
+        let shifted = |k: usize| {
+            let (row, column) = ((k / side) as isize + down, (k % side) as isize + right);
+            let inside = |x: isize| (0..side as isize).contains(&x);
+            if inside(row) && inside(column) {
+                b[(row * side as isize + column) as usize]
+            } else {
+                0.0
+            }
+        };
+        a.iter().enumerate().map(|(k, x)| x * shifted(k)).sum()
+    };
+    let shifts = (-reach..=reach).flat_map(|x| (-reach..=reach).map(move |y| [x, y]));
+    shifts.map(product).fold(0.0, f64::max) / (size(&a) * size(&b))
+}
+
+/// A sky convolved with a round Gaussian of a width in pixels.
+fn blurred(sky: &[f64], side: usize, width: f64) -> Vec<f64> {
+    let half = (1.5 * width).ceil() as isize;
+    let along = |sky: &[f64], step: usize| -> Vec<f64> {
+        let one = |k: usize| -> f64 {
+            let here = (k / step % side) as isize;
+            (-half..=half)
+                .filter(|d| (0..side as isize).contains(&(here + d)))
+                .map(|d| bell(d as f64, width) * sky[(k as isize + d * step as isize) as usize])
+                .sum()
+        };
+        (0..sky.len()).map(one).collect()
+    };
+    along(&along(sky, 1), side)
+}
+
+/// A sky in pixels of another grid with the same middle, by sums over the places of the finer one.
+fn regridded(sky: &[f64], side: usize, field: f64) -> Vec<f64> {
+    let mut out = vec![0.0; side * side];
+    let place = |k: usize| {
+        let offset = FIELD_UAS * ((k as f64 + 0.5) / SIDE as f64 - 0.5);
+        ((offset / field + 0.5) * side as f64).floor()
+    };
+    for (k, light) in sky.iter().enumerate() {
+        let (row, column) = (place(k / SIDE), place(k % SIDE));
+        let inside = |x: f64| (0.0..side as f64).contains(&x);
+        if inside(row) && inside(column) {
+            out[row as usize * side + column as usize] += light;
+        }
+    }
+    out
+}
+
+/// Distances of what was found from the truth, over their errors.
+fn pull(found: &Value, key: &str, truth: f64, period: Option<f64>) -> Option<f64> {
+    let value = found[key].as_f64()?;
+    let apart = period.map_or(value - truth, |p| (value - truth + 1.5 * p).rem_euclid(p) - 0.5 * p);
+    Some(apart / found[format!("{key}_error")].as_f64()?)
+}
+
+fn told(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".to_owned(), |value| format!("{value:.2}"))
+}
+
+#[test]
+#[ignore = "forty minutes"]
+fn exact_known_skies_through_a_real_night() {
+    let Some(night) = data(NIGHT) else { return };
+    let chosen = std::env::var("KERRLIGHT_SKIES").unwrap_or_default();
+    let seeds = if chosen.is_empty() { 4 } else { 2 };
+    let mut wrong = Vec::new();
+    eprintln!(
+        "sky | seed | ring | correlation | diameter ± error (pull) | width | pull of angle, flux | s"
+    );
+    for sky in skies()
+        .iter()
+        .filter(|sky| chosen.is_empty() || chosen.split(',').any(|name| name == sky.name))
+    {
+        for seed in 1..=seeds {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path();
+            observe(sky, &night, seed, &path.join("sky.uvfits"));
+            succeed(path, &["fit", "--data", "sky.uvfits", "--model", "image", "-o", "run"]);
+            let found = results(&path.join("run"));
+            let image = array(&path.join("run/image.npz"), "recovered.npy");
+            let side = image.len().isqrt();
+            let field = array(&path.join("run/image.npz"), "field_uas.npy")[0];
+            let truth = regridded(&pixels(sky), side, field);
+            let alike = correlation([&truth, &image], side, field / side as f64);
+            let has_ring = found["ring_diameter_uas"].is_number();
+            let of_ring = sky.ring.and_then(|(d, _)| pull(&found, "ring_diameter_uas", d, None));
+            let angle = sky.ring.and_then(|(_, angle)| angle);
+            let of_angle =
+                angle.and_then(|angle| pull(&found, "ring_position_angle_deg", angle, Some(360.0)));
+            let flux = Some(
+                (found["flux_jy"].as_f64().unwrap() - FLUX_JY)
+                    / found["flux_error_jy"].as_f64().unwrap(),
+            );
+            eprintln!(
+                "{} | {seed} | {has_ring} | {alike:.3} | {}: {} ± {} ({}) | {} | {}, {} | {:.0}",
+                sky.name,
+                told(found["ring_diameter_of_image_uas"].as_f64()),
+                told(found["ring_diameter_uas"].as_f64()),
+                told(found["ring_diameter_uas_error"].as_f64()),
+                told(of_ring),
+                told(found["ring_width_uas"].as_f64()),
+                told(of_angle),
+                told(flux),
+                found["cpu_seconds"].as_f64().unwrap(),
+            );
+            if has_ring != sky.ring.is_some() {
+                wrong.push(format!("{} {seed}", sky.name));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "rings where there are none, or none where there is one: {wrong:?}");
+}
