@@ -9,7 +9,7 @@ use kerrlight_vlbi::operator::ImageGrid;
 /// An image with what it was made of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// Which start.
+    /// Index of its start.
     pub start: usize,
     /// Factor on the penalties.
     pub strength: f64,
@@ -21,7 +21,7 @@ pub struct Candidate {
     pub ring: Option<Ring>,
 }
 
-/// What came out.
+/// The image that was found, with others that tell its errors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
     /// Strengths with the loss of frames that were held out, of fits that came to a minimum.
@@ -93,7 +93,8 @@ impl Survey {
         self.starts.iter().filter(as_good).chain(&self.strengths)
     }
 
-    /// How many of the draws, and of the images that data do not tell from the best, have a ring, and how many these are.
+    /// Returns how many of the draws, and of the images that data do not tell from the best, have a ring, and how many these
+    /// are.
     pub fn with_ring(&self) -> [usize; 2] {
         let all = || self.draws.iter().chain(self.alternatives());
         [all().filter(|image| image.ring.is_some()).count(), all().count()]

@@ -18,7 +18,7 @@ pub struct FluxPrior {
     pub sigma_jy: f64,
 }
 
-/// What an image is judged by.
+/// Loss of an image.
 pub struct ImageProblem<'a> {
     /// Data; the loss has their weights times χ² per datum.
     pub terms: &'a [Weighted<dyn FrameTerm<f64>>],

@@ -5,7 +5,7 @@ use core::f64::consts::{PI, TAU};
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::operator::ImageGrid;
 
-/// What is measured of a ring. Angles on the sky in µas, position angles in degrees east of north.
+/// Numbers of a ring. Angles on the sky in µas, position angles in degrees east of north.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ring {
     /// Its centre, to the east and to the north of the middle of the field: where distances of the brightest points vary
@@ -154,7 +154,7 @@ impl Sky<'_> {
         Some((square / (mean * mean) + missing) / DIRECTIONS as f64)
     }
 
-    /// Where distances scatter least: on a grid about the centroid of the light, which is then refined.
+    /// Returns the place from which distances scatter least: on a grid about the centroid of the light, which is then refined.
     fn centre(&self, pixel: f64, most: f64) -> Option<[f64; 2]> {
         let middle = self.centroid();
         let mut centre = middle;

@@ -29,7 +29,7 @@ pub enum Shape {
 /// A shape with the parameters for which it fits best.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShapeFit {
-    /// Which shape.
+    /// Kind of shape.
     pub shape: Shape,
     /// Its sizes: name, value, and unit.
     pub sizes: Vec<(&'static str, f64, &'static str)>,
@@ -49,7 +49,7 @@ impl Shape {
     pub const ALL: [Self; 5] =
         [Self::Gaussian, Self::Disc, Self::Ring, Self::Crescent, Self::Double];
 
-    /// What it is called.
+    /// Returns its name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Gaussian => "Gaussian",
@@ -60,7 +60,7 @@ impl Shape {
         }
     }
 
-    /// Whether it is dark inside.
+    /// Returns whether it is dark inside.
     pub fn is_ring(self) -> bool {
         matches!(self, Self::Ring | Self::Crescent)
     }

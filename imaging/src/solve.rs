@@ -14,7 +14,7 @@ pub struct Solution {
     pub loss: f64,
     /// Iterations that were made.
     pub iterations: usize,
-    /// Whether the gradient says that this is a minimum.
+    /// True if the gradient says that this is a minimum.
     pub has_converged: bool,
 }
 
@@ -25,7 +25,7 @@ const FALL: f64 = 1e-4;
 /// change the loss by less than 0.15 %.
 const FLAT: f64 = 0.15;
 
-/// Where L-BFGS came to.
+/// Result of L-BFGS.
 pub(super) struct Minimum {
     pub parameters: Vec<f64>,
     pub loss: f64,

@@ -21,14 +21,14 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// What is being solved.
+/// Stage of a survey.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// From all starts.
+    /// Images from all starts.
     Starts,
-    /// Without a part of the frames.
+    /// Images without a part of the frames.
     HeldOut,
-    /// With other strengths that held-out frames allow.
+    /// Images with other strengths that held-out frames allow.
     Strengths,
     /// The image measured once more, with other noise.
     Draws,
@@ -125,8 +125,8 @@ pub(super) fn allowed(held: &[Held]) -> Vec<f64> {
     values
 }
 
-/// Without strengths of which fewer than half of the parts are known, then without parts that are not known of all others: NaN
-/// stands for a fit that did not come to a minimum, which says nothing. Nothing is left where fewer than two parts are.
+/// Drops strengths of which fewer than half of the parts are known, then parts that are not known of all others: NaN stands for
+/// a fit that did not come to a minimum, which says nothing. Nothing is left where fewer than two parts are.
 fn voting(mut held: Vec<Held>) -> Vec<Held> {
     let known = |held: &Held| held.losses.iter().filter(|loss| loss.is_finite()).count();
     held.retain(|one| 2 * known(one) >= one.losses.len());
@@ -142,7 +142,7 @@ fn voting(mut held: Vec<Held>) -> Vec<Held> {
     held
 }
 
-/// What `loss` says of each strength and each part of the frames; none if it says nothing of one.
+/// Returns the losses of each strength and each part of the frames; none if one is missing.
 pub(super) fn held(
     settings: &StrengthSettings,
     loss: impl Fn(f64, usize) -> Option<f64> + Sync,
@@ -323,7 +323,7 @@ impl Search<'_> {
 /// Standard deviation of the logarithm of the envelope's width: how far those from different baselines are apart.
 const ENVELOPE_SPREAD: f64 = 0.1;
 
-/// What draws begin from and are penalised by.
+/// Starts and strengths of draws.
 struct Others<'a> {
     /// Starts with a loss within 1 % of the least.
     starts: Vec<&'a Candidate>,

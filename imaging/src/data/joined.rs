@@ -103,7 +103,7 @@ pub fn station_of_file(name: &str) -> (&str, usize) {
     split.unwrap_or((name, 0))
 }
 
-/// Why two observations are not of one image.
+/// Explains why two observations are not of one image.
 fn contradiction(a: &Observation, b: &Observation) -> Option<String> {
     if a.basis != b.basis {
         return Some("one has products of feeds, the other Stokes parameters".to_owned());

@@ -1,4 +1,4 @@
-//! What might as well have been measured of a static image.
+//! Simulated measurements of a static image with other noise.
 
 use crate::Error;
 use kerrlight_tomo::fit::settings::Loss;
@@ -7,7 +7,7 @@ use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::noise::add_thermal_noise;
 use kerrlight_vlbi::operator::{Method, Operator, Transform};
 
-/// What would have been measured of a static image, with the gains that explain the data best beside it and with other
+/// Simulates the measurement of a static image, with the gains that explain the data best beside it and with other
 /// noise. Data without visibilities stay as they are.
 ///
 /// # Errors

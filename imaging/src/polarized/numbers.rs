@@ -1,4 +1,4 @@
-//! What is measured of a polarised image, as the EHT Collaboration (2021, ApJL 910, L13) does; β₂ is that of Palumbo, Wong &
+//! Numbers of a polarised image, as the EHT Collaboration (2021, ApJL 910, L13) defines them; β₂ is that of Palumbo, Wong &
 //! Prather (2020, ApJ 894, 156).
 
 use crate::beam::blurred;
@@ -26,8 +26,8 @@ pub struct LinearPolarization {
 }
 
 impl LinearPolarization {
-    /// Of images of I, Q and U that follow each other; the centre is to the east and north of the middle of the field, µas,
-    /// the beam a full width at half maximum.
+    /// Measures images of I, Q and U that follow each other; the centre is to the east and north of the middle of the field,
+    /// µas, the beam a full width at half maximum.
     pub fn measure(images: &[f64], grid: ImageGrid, centre_uas: [f64; 2], beam_uas: f64) -> Self {
         let n = grid.pixels();
         let all = |k: usize| &images[k * n..(k + 1) * n];

@@ -5,7 +5,7 @@
 
 use kerrlight_tomo::fit::FrameTerm;
 
-/// What the polarisation of an image is judged by.
+/// Loss of the polarisation of an image.
 pub struct PolarizedProblem<'a> {
     /// Data, compared with images of I, Q and U that follow each other.
     pub term: &'a dyn FrameTerm<f64>,

@@ -24,15 +24,15 @@ pub struct PolarizedCandidate {
     pub loss: f64,
     /// Iterations that were made.
     pub iterations: usize,
-    /// Whether the loss had ceased to fall.
+    /// True if the loss had ceased to fall.
     pub has_converged: bool,
     /// χ² per datum.
     pub chi2: f64,
-    /// What is measured.
+    /// Its numbers.
     pub numbers: LinearPolarization,
 }
 
-/// What came out.
+/// The polarisation that was found, with others that tell its errors.
 #[derive(Clone, Debug)]
 pub struct PolarizedSurvey {
     /// Strengths with the loss of frames that were held out.

@@ -46,7 +46,7 @@ fn grid(side: usize) -> ImageGrid {
     ImageGrid::new(side, side, 120.0 * MICROARCSECOND).unwrap()
 }
 
-/// What the array of 2017 measures of it in a night, with thermal noise, gains of 20 % and phases that are lost.
+/// Simulates a night of the array of 2017, with thermal noise, gains of 20 % and phases that are lost.
 fn observed(seed: u64, leakage: Option<f64>) -> Observation {
     let grid = grid(96);
     let mut seen = night().0;
@@ -68,7 +68,7 @@ fn observed(seed: u64, leakage: Option<f64>) -> Observation {
     seen
 }
 
-/// Of radial, tangential and tilted vectors around a ring, and of one direction everywhere.
+/// Numbers of radial, tangential and tilted vectors around a ring, and of one direction everywhere.
 #[test]
 fn exact_numbers_of_known_patterns() {
     let grid = grid(96);
@@ -93,7 +93,7 @@ fn exact_numbers_of_known_patterns() {
     assert!((found.mean_fraction - 0.1).abs() < 1e-9 && found.beta2 < 1e-6, "{found:?}");
 }
 
-/// Beside central differences, for ratios and for visibilities with gains.
+/// Gradients agree with central differences, for ratios and for visibilities with gains.
 #[test]
 fn exact_gradients_of_the_polarised_loss() {
     for (kind, smoothness) in [("polarimetric-ratios", 0.3), ("polarized-visibilities", 0.0)] {

@@ -205,7 +205,7 @@ pub struct StrengthSettings {
     pub folds: usize,
 }
 
-/// Where a ring is looked for.
+/// Radii between which a ring is looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RingSettings {
@@ -260,7 +260,7 @@ impl StaticImageFile {
         &KEYS
     }
 
-    /// Whether a fit's text asks for a static image: it has a table `image`.
+    /// Returns whether a fit's text asks for a static image: it has a table `image`.
     pub fn is_static_image(text: &str) -> bool {
         text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("image"))
     }

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PenaltySettings {
-    /// Which penalty, each at most once.
+    /// Kind of penalty, each at most once.
     pub kind: PenaltyKind,
     /// Factor on its integral over the field, above 0.
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a factor"))]

@@ -38,7 +38,7 @@ pub struct StaticPolarization {
 }
 
 impl StaticPolarization {
-    /// What is compared, as the loss of a fit.
+    /// Returns the loss of a fit that compares the same data.
     pub fn loss(&self) -> Loss {
         let Self { data, least_snr, .. } = *self;
         Loss { least_snr, ..Loss::new(data) }
