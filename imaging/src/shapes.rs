@@ -44,6 +44,23 @@ pub struct ShapeFit {
     pub criterion: f64,
 }
 
+impl ShapeFit {
+    /// Full width at half maximum of the round Gaussian with the same second moment about the centroid, µas.
+    pub fn width_uas(&self, grid: ImageGrid) -> f64 {
+        let places = (0..grid.pixels()).map(|k| {
+            [grid.east(k % grid.width), grid.north(k / grid.width)].map(|x| x / MICROARCSECOND)
+        });
+        let mut moments = [0.0; 3];
+        for (share, [east, north]) in self.shares.iter().zip(places) {
+            moments[0] += share * east;
+            moments[1] += share * north;
+            moments[2] += share * (east * east + north * north);
+        }
+        let [east, north, square] = moments;
+        (4.0 * LN_2 * (square - east * east - north * north)).sqrt()
+    }
+}
+
 impl Shape {
     /// All of them.
     pub const ALL: [Self; 5] =

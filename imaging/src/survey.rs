@@ -6,7 +6,7 @@ use crate::data;
 use crate::found::{Calibration, Candidate, Survey};
 use crate::problem::{FluxPrior, ImageProblem};
 use crate::ring::Ring;
-use crate::settings::{StaticImageFile, StrengthSettings};
+use crate::settings::{EnvelopeSettings, StaticImageFile, StrengthSettings};
 use crate::shapes::{ShapeFit, fit_shapes};
 use crate::solve::solve;
 use crate::start;
@@ -50,13 +50,19 @@ pub fn survey(
 ) -> Result<Option<Survey>, Error> {
     let grid = file.image.grid()?;
     let terms = measured.visibility_terms(&file.loss, grid.pixels())?;
-    let envelope =
-        file.envelope.map(|envelope| (start::envelope(envelope.fwhm_uas, grid), envelope.weight));
     let fitted = shapes;
+    let best = shapes.iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    let width = |envelope: EnvelopeSettings| {
+        let width = envelope.fwhm_uas.or_else(|| Some(best?.width_uas(grid)));
+        width.ok_or_else(|| Error::Failed("envelope.fwhm_uas is needed without shapes".to_owned()))
+    };
+    let envelope_uas = file.envelope.map(width).transpose()?;
+    let weight = file.envelope.map_or(0.0, |envelope| envelope.weight);
+    let envelope = envelope_uas.map(|width| (start::envelope(width, grid), weight));
     let shapes = shapes.iter().map(|fit| start::shape(&fit.shares));
     let begin = file.image.starts.iter().map(|start| start::image(*start, grid)).chain(shapes);
     let (priors, begin) = (file.priors()?, begin.collect());
-    let search = Search { file, grid, priors, envelope, begin, terms: &terms, watch };
+    let search = Search { file, grid, priors, envelope, envelope_uas, begin, terms: &terms, watch };
     let frames: Vec<usize> = (0..measured.times.len()).collect();
     let middle = file.strength.as_ref().map_or(1.0, |s| s.values[s.values.len() / 2]);
     let Some(starts) = search.starts(middle, &frames) else { return Ok(None) };
@@ -94,7 +100,7 @@ pub fn survey(
         }
         None => None,
     };
-    Ok(Some(Survey { held, strength, starts, best, strengths, draws, calibration }))
+    Ok(Some(Survey { envelope_uas, held, strength, starts, best, strengths, draws, calibration }))
 }
 
 /// The image of visibilities of a source that does not change, as `kerrlight fit` finds it: from the starts of the settings and
@@ -188,6 +194,7 @@ struct Search<'a> {
     grid: ImageGrid,
     priors: Vec<Prior>,
     envelope: Option<(Vec<f64>, f64)>,
+    envelope_uas: Option<f64>,
     /// Shares of the flux in the pixels, for each start.
     begin: Vec<Vec<f64>>,
     terms: &'a [Weighted<dyn FrameTerm<f64>>],
@@ -282,9 +289,10 @@ impl Search<'_> {
             let FluxPrior { jy, sigma_jy } = self.flux();
             // A flux below 0 is none: far from it for any prior that says something.
             let flux = FluxPrior { jy: (jy + of_flux * sigma_jy).max(0.01 * jy), sigma_jy };
-            let envelope = self.file.envelope.map(|envelope| {
-                let width = envelope.fwhm_uas * (ENVELOPE_SPREAD * of_width).exp();
-                (start::envelope(width, self.grid), envelope.weight)
+            let envelope = self.envelope_uas.zip(self.envelope.as_ref());
+            let envelope = envelope.map(|(width, (_, weight))| {
+                let width = width * (ENVELOPE_SPREAD * of_width).exp();
+                (start::envelope(width, self.grid), *weight)
             });
             let envelope = envelope.as_ref().map(|(shares, weight)| (&shares[..], *weight));
             let strength = others.strengths[k % others.strengths.len()];

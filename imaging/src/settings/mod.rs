@@ -112,9 +112,10 @@ pub enum StartImage {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EnvelopeSettings {
-    /// Full width at half maximum, µas.
+    /// Full width at half maximum, µas; without it that of a Gaussian with the second moment of the best simple shape.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
-    pub fwhm_uas: f64,
+    pub fwhm_uas: Option<f64>,
     /// Factor on the entropy relative to it.
     #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "a factor"))]
     pub weight: f64,

@@ -112,6 +112,7 @@ impl Found<'_> {
             "flux_jy": found.solution.image.iter().sum::<f64>(),
             "flux_error_jy": self.survey.flux_error(),
             "strength": self.survey.strength,
+            "envelope_fwhm_uas": self.survey.envelope_uas,
             "starts": all(&self.survey.starts),
             "strengths": all(&self.survey.strengths),
             "draws": all(&self.survey.draws),

@@ -142,10 +142,15 @@ impl Found<'_> {
             ),
             format!("Starts: {}; then the simple shapes that fit the data.", starts.join("; ")),
         ];
-        let envelope = self.file.envelope.map(|envelope| {
+        let envelope = self.file.envelope.zip(self.survey.envelope_uas);
+        let envelope = envelope.map(|(envelope, width)| {
+            let of_shape = match envelope.fwhm_uas {
+                Some(_) => "",
+                None => " with the second moment of the best simple shape",
+            };
             format!(
-                "entropy relative to a Gaussian of {} µas (weight {})",
-                envelope.fwhm_uas, envelope.weight
+                "entropy relative to a Gaussian of {width:.1} µas{of_shape} (weight {})",
+                envelope.weight
             )
         });
         let penalties: Vec<String> = envelope.into_iter().chain(penalties).collect();
