@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, Write};
+use std::ops::Deref;
 
 /// Checksum and length of bytes.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -31,6 +32,22 @@ impl Sum {
             bytes += length as u64;
             file.consume(length);
         }
+    }
+}
+
+/// An object that [`sealed`] has written, with its checksum.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Sealed<T> {
+    checksum: String,
+    #[serde(flatten)]
+    object: T,
+}
+
+impl<T> Deref for Sealed<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.object
     }
 }
 

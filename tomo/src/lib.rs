@@ -29,6 +29,8 @@
 //! together. Nothing here knows a path or a terminal: codecs work on bytes.
 
 // In the order of the flow of data: a module imports from those above it.
+mod null;
+
 pub mod exr_picture;
 
 pub mod representation;

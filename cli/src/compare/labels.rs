@@ -1,5 +1,7 @@
 //! What results, levels and numbers are called, and how they are written.
 
+use kerrlight_tomo::recovery::results::HeldOutResults;
+use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -130,9 +132,7 @@ pub fn result(results: &Value, value: &str) -> Option<f64> {
             .filter(|x| x.is_finite());
     }
     if value == "held_out_loss" {
-        let held = &results["held_out"];
-        let values = held["values"].as_array()?;
-        return values.iter().find(|of| of["value"] == held["chosen"])?["loss"].as_f64();
+        return HeldOutResults::deserialize(results.get("held_out")?).ok()?.loss();
     }
     results[value].as_f64().filter(|x| x.is_finite())
 }
@@ -211,9 +211,12 @@ mod tests {
         let two = json!({"chi2_per_datum": {"amplitudes": 1.5, "closure phases": 2.5}});
         assert_eq!(result(&two, "chi2"), None);
         assert_eq!(result(&two, "chi2.closure-phases"), Some(2.5));
-        let held = json!({"held_out": {"chosen": 2.0, "values": [
-            {"value": 1.0, "loss": 7.0}, {"value": 2.0, "loss": 5.0},
-        ]}});
+        let held = json!({"held_out": {
+            "setting": "linear.smoothness", "folds": 2, "chosen": 2.0, "values": [
+                {"value": 1.0, "loss": 7.0, "losses": [6.0, 8.0]},
+                {"value": 2.0, "loss": 5.0, "losses": [4.0, 6.0]},
+            ],
+        }});
         assert_eq!(result(&held, "held_out_loss"), Some(5.0));
         assert_eq!(result(&two, "held_out_loss"), None);
         assert_eq!(described("chi2.closure-phases").0, "χ² per data point of closure phases");

@@ -1,28 +1,36 @@
 //! Plots of a fit to a light curve: what the data say of the geometry, and the loop in Q and U.
 
 use crate::report::{Axis, LinePlot, Marks, Series};
-use serde_json::Value;
+use kerrlight_tomo::recovery::results::BandResults;
 
-/// What shares are told of: key of the results, words, unit.
-const QUANTITIES: [(&str, &str, &str); 4] = [
-    ("inclinations", "inclination", "degrees"),
-    ("position_angle_deg", "position angle of the axis", "degrees east of north"),
-    ("radii", "radius of the orbit", "M"),
-    ("periods", "period of the orbit", "minutes"),
+/// Values with their probabilities.
+type Shares = [[f64; 2]];
+
+/// What probabilities are told of: where they are, words, unit.
+const QUANTITIES: [(fn(&BandResults) -> &Shares, &str, &str); 4] = [
+    (|of| &of.inclinations, INCLINATION, "degrees"),
+    (
+        |of| &of.position_angle_deg.probabilities,
+        "position angle of the axis",
+        "degrees east of north",
+    ),
+    (|of| &of.radii, "radius of the orbit", "M"),
+    (|of| &of.periods, "period of the orbit", "minutes"),
 ];
+const INCLINATION: &str = "inclination";
 /// Curves of a plot, at most.
 const CURVES: usize = 6;
 
 /// The probability of each value of the geometry, one curve for each run that is named.
-pub fn of_runs(runs: &[(String, Value)], caption: &str) -> Vec<LinePlot> {
-    let plot = |(key, words, unit): (&str, &str, &str)| {
-        let curve = |(name, results): &(String, Value)| {
-            let points = shares(&results[key]);
+pub fn of_runs(runs: &[(String, BandResults)], caption: &str) -> Vec<LinePlot> {
+    let plot = |(of, words, unit): (fn(&BandResults) -> &Shares, &str, &str)| {
+        let curve = |(name, results): &(String, BandResults)| {
+            let points = of(results).to_vec();
             (points.len() > 1).then(|| line(name, points))
         };
         let mut series: Vec<Series> = runs.iter().filter_map(curve).take(CURVES).collect();
         let first = series.first()?;
-        if key == "inclinations" && series.len() < CURVES {
+        if words == INCLINATION && series.len() < CURVES {
             let prior = prior(&first.points);
             series.push(line("before any data", prior));
         }
@@ -39,12 +47,6 @@ pub fn of_runs(runs: &[(String, Value)], caption: &str) -> Vec<LinePlot> {
 
 fn line(name: &str, points: Vec<[f64; 2]>) -> Series {
     Series { name: name.to_owned(), points, errors: Vec::new(), marks: Marks::Joined }
-}
-
-fn shares(value: &Value) -> Vec<[f64; 2]> {
-    let list = value.as_array().or_else(|| value["probabilities"].as_array());
-    let pair = |pair: &Value| Some([pair[0].as_f64()?, pair[1].as_f64()?]);
-    list.into_iter().flatten().filter_map(pair).collect()
 }
 
 /// Of axes in any direction, at the inclinations that were looked at.
@@ -85,11 +87,19 @@ mod tests {
 
     #[test]
     fn exact_curves_and_loops_of_results() {
+        let middle = json!({"best": 8.0, "median": 8.0, "low": 7.0, "high": 9.0});
         let results = json!({
             "inclinations": [[10.0, 0.7], [20.0, 0.3]],
             "position_angle_deg": {"best": 0.0, "probabilities": [[0.0, 1.0]]},
-            "radii": [[7.0, 0.5], [8.0, 0.5]],
+            "rotation_factor": {"best": 1.0, "probabilities": [[1.0, 1.0]]},
+            "radii": [[7.0, 0.5], [8.0, 0.5]], "periods": [], "geometries": [], "truth": {},
+            "inclination_deg": middle, "radius": middle, "period_min": middle,
+            "emission_radius": middle, "azimuth_deg": middle,
+            "band": {
+                "radius": 8.0, "width": 2.0, "height": 1.0, "length": 4.0, "power": 1.0, "mean": 1.0,
+            },
         });
+        let results: BandResults = serde_json::from_value(results).unwrap();
         let plots = of_runs(&[("a".to_owned(), results)], "");
         assert_eq!(plots.len(), 2);
         assert_eq!(plots[0].series.len(), 2);

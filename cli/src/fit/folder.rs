@@ -1,11 +1,14 @@
 //! The folder of a run: settings, log, checkpoint, results.
 
 use super::inputs::{self, Inputs, SETTINGS};
+use crate::checksum::{Sealed, sealed};
 use crate::file_sums::FileSums;
 use crate::lock::Lock;
 use crate::output::{self, Output};
 use crate::session;
 use anyhow::{Context, bail};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
@@ -109,8 +112,13 @@ impl Folder {
         self.file(CHECKPOINT)?.write(bytes)
     }
 
+    /// Keeps what a search has found in a file.
+    pub fn keep(&self, name: &str, found: &impl Serialize) -> anyhow::Result<()> {
+        self.file(name)?.write(sealed(serde_json::to_value(found)?).as_bytes())
+    }
+
     /// What a search has kept in a file; none if it has not looked.
-    pub fn found(&self, name: &str) -> anyhow::Result<Option<Value>> {
+    pub fn found<T: DeserializeOwned>(&self, name: &str) -> anyhow::Result<Option<Sealed<T>>> {
         let path = self.path.join(name);
         if !path.exists() {
             return Ok(None);

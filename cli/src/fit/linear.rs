@@ -3,6 +3,7 @@
 use kerrlight_tomo::fit::linear::{Ending, LinearSolution};
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
 use kerrlight_tomo::fit::setup::WarmStarted;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 /// A line of the log.
@@ -64,16 +65,45 @@ pub fn statement(solution: &LinearSolution<f32>) -> String {
     )
 }
 
+/// What results say of the linear grid.
+#[derive(Serialize)]
+pub struct Solved {
+    /// What may be claimed of the solution.
+    pub statement: String,
+    ending: String,
+    relative_gap: Option<f64>,
+    relative_violation: Option<f64>,
+}
+
+/// What of a line of the log they say.
+#[derive(Deserialize)]
+struct Logged {
+    statement: String,
+    ending: String,
+    certificate: Option<Flatness>,
+    stationarity: Option<Flatness>,
+}
+
+/// How far a solution is from the best one, over what it began with.
+#[derive(Deserialize)]
+struct Flatness {
+    relative_gap: Option<f64>,
+    relative_violation: Option<f64>,
+}
+
 /// What results say of the linear grid, from the log of its run.
-pub fn outcome(file: &FitFile, lines: &[Value]) -> Option<Value> {
+pub fn outcome(file: &FitFile, lines: &[Value]) -> Option<Solved> {
     if file.representation.kind != Kind::LinearGrid {
         return None;
     }
-    let linear = &lines.iter().rev().find(|line| line["linear"].is_object())?["linear"];
-    let certificate = &linear["certificate"];
-    let flatness = if certificate.is_object() { certificate } else { &linear["stationarity"] };
-    Some(json!({
-        "statement": linear["statement"], "ending": linear["ending"],
-        "relative_gap": certificate["relative_gap"], "relative_violation": flatness["relative_violation"],
-    }))
+    let linear =
+        lines.iter().rev().find_map(|line| Logged::deserialize(line.get("linear")?).ok())?;
+    let Logged { statement, ending, certificate, stationarity } = linear;
+    let flatness = certificate.as_ref().or(stationarity.as_ref());
+    Some(Solved {
+        statement,
+        ending,
+        relative_gap: certificate.as_ref().and_then(|of| of.relative_gap),
+        relative_violation: flatness.and_then(|of| of.relative_violation),
+    })
 }

@@ -11,7 +11,6 @@ mod data;
 mod device_runner;
 mod failed;
 mod folder;
-mod geometry_results;
 mod geometry_search;
 mod held_out;
 mod init;

@@ -10,6 +10,7 @@ mod found;
 mod pictured;
 mod problem;
 mod progress;
+pub mod results;
 mod search;
 mod start;
 mod steps;

@@ -6,12 +6,12 @@ use crate::fit;
 use crate::output;
 use crate::report::LinePlot;
 use anyhow::Context;
-use serde_json::Value;
+use kerrlight_tomo::recovery::results::BandResults;
 
 impl Figures<'_> {
     /// The probability of each unknown, a curve for each case of the first seed.
     pub(super) fn geometries(&self, asked: &FigureAsked) -> anyhow::Result<Vec<LinePlot>> {
-        let mut runs: Vec<(String, Value)> = Vec::new();
+        let mut runs: Vec<(String, BandResults)> = Vec::new();
         for (case, _) in self.chosen(asked).filter(|(case, _)| case.seed == 1) {
             let path = self.runner.run_of(case).join(fit::BAND);
             if path.exists() {

@@ -21,10 +21,13 @@ use indicatif::ProgressBar;
 use kerrlight_render::volume::{Volume, VolumeFile};
 use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, UnknownGeometry};
 use kerrlight_tomo::fit::setup::GeometryPosterior;
+use kerrlight_tomo::recovery::results::{GeometryResults, PerParameter};
 use kerrlight_tomo::recovery::{Problem, ResolvedFit};
 use kerrlight_tomo::representation::Registry;
+use predictive::Check;
 use sample::{Drawn, Through};
-use serde_json::{Value, json};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -120,8 +123,22 @@ fn numbers(text: &str) -> Result<Numbers, String> {
 struct Kept {
     /// Emission at the reference time.
     pub volume: Volume,
-    /// The geometry, where it is not known, and χ² of each loss.
-    pub numbers: Value,
+    /// What is written beside it.
+    pub numbers: DrawNumbers,
+}
+
+/// Numbers of a draw.
+#[derive(Serialize, Deserialize)]
+struct DrawNumbers {
+    /// The geometry, where it is not known.
+    pub geometry: Option<PerParameter<f64>>,
+    /// χ² of each loss over the number of its data.
+    pub chi2_per_datum: Vec<f64>,
+    /// Noise over the errors of the data.
+    pub noise_factor: f64,
+    /// What posterior predictive checks compare.
+    #[serde(default)]
+    pub predicted: Vec<Check>,
 }
 
 /// Refuses fits around which nothing is drawn.
@@ -175,10 +192,10 @@ fn add_up(
     path: &Path,
     all: &[Kept],
 ) -> anyhow::Result<Answer> {
-    let geometry = folder.found(geometry_search::FILE)?;
+    let geometry = geometry_search::found(folder)?;
     let truth = prepared.measured.truth.as_ref();
     let truth = truth.map(|t| super::results::true_volume(&prepared.settings, t)).transpose()?;
-    let found = summary::Summary::new(&prepared.settings, geometry.as_ref(), all, truth)?;
+    let found = summary::Summary::new(&prepared.settings, geometry.as_deref(), all, truth)?;
     page::write(&found, prepared, path)?;
     let numbers = found.numbers();
     output::Output::new(&path.join(NUMBERS), "")?.write(sealed(numbers.clone()).as_bytes())?;
@@ -197,26 +214,33 @@ fn geometries<'a>(
     prepared: &'a Problem,
     unknown: &'a UnknownGeometry,
     folder: &Folder,
-    geometry: &Value,
+    geometry: &GeometryResults,
 ) -> anyhow::Result<GeometryPosterior<'a>> {
     let free = &unknown.free;
-    let best = geometry_search::geometry_of(&prepared.settings, free, geometry)?;
-    let noise = geometry["noise_factor"].as_f64().unwrap_or(1.0);
-    let spread = geometry_search::spread_of(free, best, geometry)?;
-    // Residuals of the best geometry, but no less than the errors that the search assumed.
-    let left = geometry["chi2_per_datum"].as_f64().unwrap_or(1.0);
+    let best = geometry.geometry_in(&prepared.settings, free);
+    let best = best.with_context(|| folder.damaged(geometry_search::FILE))?;
+    let spread = geometry.spread(best, free);
+    let spread = spread.context("the search for the geometry has no errors")?;
     let is_changing = prepared.settings.change.is_some();
-    let factor = if is_changing { noise_of(folder)? } else { noise.max(left.sqrt()) };
+    // Residuals of the best geometry, but no less than the errors that the search assumed.
+    let left = geometry.noise_factor.max(geometry.chi2_per_datum.sqrt());
+    let factor = if is_changing { noise_of(folder)? } else { left };
     let about = (&prepared.settings, &prepared.measured);
     Ok(GeometryPosterior::new(about, unknown, (best, &spread), factor)?)
+}
+
+/// χ² of each kind of data over their number, of all results of a fit.
+#[derive(Deserialize)]
+struct Explained {
+    chi2_per_datum: BTreeMap<String, Option<f64>>,
 }
 
 /// Noise of a draw over the errors of the data: these are too small where the model does not explain them.
 fn noise_of(folder: &Folder) -> anyhow::Result<f64> {
     let text = output::read_text(&folder.path().join("results.json"))?;
-    let results: Value = serde_json::from_str(&text).context("results.json is damaged")?;
-    let chi2 = results["chi2_per_datum"].as_object().into_iter().flatten();
-    Ok(chi2.filter_map(|(_, value)| value.as_f64()).fold(1.0f64, f64::max).sqrt())
+    let results: Explained = serde_json::from_str(&text).context("results.json is damaged")?;
+    let chi2 = results.chi2_per_datum.values().flatten();
+    Ok(chi2.copied().fold(1.0f64, f64::max).sqrt())
 }
 
 /// What draws are made of.
@@ -240,7 +264,7 @@ impl<'a> Drawing<'a> {
         (unknown, samples): (Option<&'a UnknownGeometry>, u32),
         path: &Path,
     ) -> anyhow::Result<Self> {
-        let geometry = folder.found(geometry_search::FILE)?;
+        let geometry = geometry_search::found(folder)?;
         let complete = (1..=u64::from(samples)).all(|number| names(path, number)[1].is_file());
         let geometries = match (unknown, &geometry) {
             (Some(unknown), Some(geometry)) if !complete => {
@@ -253,7 +277,7 @@ impl<'a> Drawing<'a> {
             None => noise_of(folder)?,
         };
         let file = held_out::settled(&prepared.settings, folder)?;
-        let rays = geometry.as_ref().map_or(1, geometry_search::rays_of);
+        let rays = geometry.as_ref().map_or(1, |geometry| geometry.rays());
         Ok(Self { prepared, file, unknown, geometries, rays, factor })
     }
 
@@ -278,7 +302,7 @@ impl<'a> Drawing<'a> {
         number: u64,
         keeper: &SignalGuard,
         told: &dyn Fn(&str),
-    ) -> anyhow::Result<Option<(Drawn, Value)>> {
+    ) -> anyhow::Result<Option<(Drawn, Option<PerParameter<f64>>)>> {
         let Problem { instrument, measured, motion, registry, .. } = self.prepared;
         let mut file = self.file.clone();
         file.seed = file.seed.wrapping_add(number);
@@ -292,7 +316,7 @@ impl<'a> Drawing<'a> {
             let data = measured.perturbed(&file.loss, self.factor, noise)?;
             let through = Through { file: &file, instrument, motion, registry, measured };
             let drawn = sample::draw(&through, &data, keeper, told)?;
-            return Ok(drawn.map(|drawn| (drawn, Value::Null)));
+            return Ok(drawn.map(|drawn| (drawn, None)));
         };
         told("the geometry");
         let data = geometries.data(noise)?;
@@ -302,8 +326,8 @@ impl<'a> Drawing<'a> {
         let through =
             Through { file: &file, instrument: &instrument, motion: &motion, registry, measured };
         let drawn = sample::draw(&through, &data, keeper, told)?;
-        let values = geometry_search::values_of(&unknown.free, &geometry);
-        Ok(drawn.map(|drawn| (drawn, values)))
+        let values = geometry.values(&unknown.free);
+        Ok(drawn.map(|drawn| (drawn, Some(values))))
     }
 }
 
@@ -340,17 +364,19 @@ fn keep(
     folder: &Path,
     number: u64,
     factor: f64,
-    (drawn, geometry): (Drawn, Value),
+    (drawn, geometry): (Drawn, Option<PerParameter<f64>>),
 ) -> anyhow::Result<Kept> {
     let [volume, numbers] = names(folder, number);
     let file = VolumeFile { volume: drawn.volume.clone(), axis: None };
     output::Output::new(&volume, "")?.write(&file.to_npz())?;
-    let of_draw = json!({
-        "geometry": geometry, "chi2_per_datum": drawn.chi2, "noise_factor": factor,
-        "predicted": drawn.predicted,
-    });
+    let of_draw = DrawNumbers {
+        geometry,
+        chi2_per_datum: drawn.chi2,
+        noise_factor: factor,
+        predicted: drawn.predicted,
+    };
     // Last: with it the draw is whole.
-    let text = sealed(of_draw);
+    let text = sealed(serde_json::to_value(of_draw)?);
     output::Output::new(&numbers, "")?.write(text.as_bytes())?;
     // As a later call reads them, to the last digit.
     Ok(Kept { volume: drawn.volume, numbers: serde_json::from_str(&text)? })

@@ -27,16 +27,12 @@ pub struct Check {
 
 /// Means over the draws, of all kinds of data that every one was compared with.
 pub fn checks(draws: &[Kept]) -> Vec<Check> {
-    let of = |draw: &Kept| -> Vec<Check> {
-        serde_json::from_value(draw.numbers["predicted"].clone()).unwrap_or_default()
-    };
-    let all: Vec<Vec<Check>> = draws.iter().map(of).collect();
-    let kinds = all.first().map_or(&[][..], Vec::as_slice);
-    kinds.iter().filter_map(|kind| check(&kind.data, &all)).collect()
+    let kinds = draws.first().map_or(&[][..], |draw| &draw.numbers.predicted);
+    kinds.iter().filter_map(|kind| check(&kind.data, draws)).collect()
 }
 
-fn check(data: &str, draws: &[Vec<Check>]) -> Option<Check> {
-    let find = |draw: &'_ Vec<Check>| draw.iter().find(|p| p.data == data).cloned();
+fn check(data: &str, draws: &[Kept]) -> Option<Check> {
+    let find = |draw: &'_ Kept| draw.numbers.predicted.iter().find(|p| p.data == data).cloned();
     let of: Vec<Check> = draws.iter().map(find).collect::<Option<_>>()?;
     let mean = |value: &dyn Fn(&Check) -> Option<f64>| -> Option<f64> {
         let values: Vec<f64> = of.iter().map(value).collect::<Option<_>>()?;

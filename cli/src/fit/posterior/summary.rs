@@ -8,6 +8,7 @@ use kerrlight_render::volume::{Coverage, Ensemble, Feature, Volume};
 use kerrlight_tomo::fit::geometry::Parameter;
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::setup;
+use kerrlight_tomo::recovery::results::GeometryResults;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde_json::{Map, Value, json};
@@ -77,21 +78,21 @@ impl Summary {
     /// Of draws of a fit, with what its run has found of the geometry, and the truth where there is one.
     pub fn new(
         file: &FitFile,
-        geometry: Option<&Value>,
+        geometry: Option<&GeometryResults>,
         draws: &[Kept],
         truth: Option<Volume>,
     ) -> anyhow::Result<Self> {
         let volumes: Vec<Volume> = draws.iter().map(|draw| draw.volume.clone()).collect();
         let ensemble = Ensemble::of(&volumes)?;
         let features = ensemble.features(&volumes);
-        let geometry = geometry.map_or(Vec::new(), |geometry| intervals(file, geometry, draws));
+        let geometry = geometry.map_or(Vec::new(), |found| intervals(file, found, draws));
         let coverage = truth.as_ref().map(|truth| covered(file, &ensemble, truth)).transpose()?;
         let ranked = |truth: &Volume| ranks(file, &ensemble, &features, &volumes, truth);
         let ranks = truth.as_ref().map(ranked).transpose()?;
         let certain = certain(&ensemble);
         let open = open(file, &ensemble)?;
         let open_part = open.as_ref().map(|open| part_of_region(file, open, |ratio| ratio > OPEN));
-        let factors = draws.iter().filter_map(|draw| draw.numbers["noise_factor"].as_f64());
+        let factors = draws.iter().map(|draw| draw.numbers.noise_factor);
         let factor = factors.fold(1.0, f64::max);
         Ok(Self {
             ensemble,
@@ -233,33 +234,31 @@ impl Interval {
     }
 }
 
-fn intervals(file: &FitFile, geometry: &Value, draws: &[Kept]) -> Vec<Interval> {
+fn intervals(file: &FitFile, found: &GeometryResults, draws: &[Kept]) -> Vec<Interval> {
     let mut places = Pcg64::seed_from_u64(file.seed.wrapping_add(3));
-    let one = |parameter: Parameter| {
-        let name = parameter.name();
-        let best = geometry["geometry"][name].as_f64()?;
+    let one = |(parameter, best): (&Parameter, &f64)| {
+        let (parameter, best) = (*parameter, *best);
         let unit = parameter.unit();
         // Angles that differ by a whole turn are the same: the short way from the best one.
         let near = |x: f64| best + parameter.difference(x * unit, best * unit) / unit;
-        let of = |draw: &Kept| draw.numbers["geometry"][name].as_f64().map(near);
+        let of = |draw: &Kept| draw.numbers.geometry.as_ref()?.get(&parameter).copied().map(near);
         let values: Vec<f64> = draws.iter().filter_map(of).collect();
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let squares: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
-        let bound = |k: usize| geometry["bounds"][name][k].as_f64().unwrap_or(f64::NAN);
-        let truth = geometry["truth"][name].as_f64().map(near);
+        let truth = found.truth.as_ref().and_then(|truth| truth.get(&parameter)).copied().map(near);
         Some(Interval {
             rank: truth.map(|truth| rank(truth, values.iter().copied(), &mut places)),
             parameter,
             mean,
             deviation: (squares / (n - 1.0)).sqrt(),
             values,
-            bounds: [bound(0), bound(1)],
-            open: geometry["open"][name] == true,
+            bounds: *found.bounds.get(&parameter)?,
+            open: found.open.get(&parameter) == Some(&true),
             truth,
         })
     };
-    Parameter::ALL.into_iter().filter_map(one).collect()
+    found.geometry.iter().filter_map(one).collect()
 }
 
 fn covered(file: &FitFile, ensemble: &Ensemble, truth: &Volume) -> anyhow::Result<[Coverage; 2]> {

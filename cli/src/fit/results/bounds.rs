@@ -4,7 +4,7 @@ use super::{Estimate, Quiescent};
 use kerrlight_render::volume::Volume;
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
 use kerrlight_tomo::representation::Activation;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 /// Part of the largest emission from which on a node is taken to have reached it: a sigmoid never does.
 const REACHED: f64 = 0.95;
@@ -23,6 +23,20 @@ const BRIGHT: f64 = 0.5;
 /// Part of the light that is found there.
 const CUT: f64 = 0.02;
 
+/// A bound that was reached.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Reached {
+    /// The key of the setting.
+    bound: &'static str,
+    /// Its value.
+    value: f64,
+    /// How many nodes or pixels are there, at the ceiling.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    count: Option<usize>,
+    /// Part of the light that is there.
+    light: f64,
+}
+
 impl Estimate<'_> {
     /// Every bound that was reached, with the part of the light that is there.
     pub fn bounds(
@@ -30,7 +44,7 @@ impl Estimate<'_> {
         volume: &Volume,
         parameters: &[f32],
         quiescent: Option<&Quiescent>,
-    ) -> Vec<Value> {
+    ) -> Vec<Reached> {
         let file = self.file;
         let ceiling = ceiling(file).and_then(|(key, most)| {
             // Splines lie below the numbers of their nodes.
@@ -60,16 +74,16 @@ fn ceiling(file: &FitFile) -> Option<(&'static str, f64)> {
     }
 }
 
-fn reached(key: &str, most: f64, values: &[f32]) -> Option<Value> {
+fn reached(bound: &'static str, most: f64, values: &[f32]) -> Option<Reached> {
     let sizes = || values.iter().map(|x| f64::from(x.abs()));
     let at = || sizes().filter(|x| *x >= REACHED * most);
     let (count, light) = (at().count(), at().sum::<f64>() / sizes().sum::<f64>());
     let is_told = count > HANDFUL && light > LIGHT;
-    is_told.then(|| json!({ "bound": key, "value": most, "count": count, "light": light }))
+    is_told.then_some(Reached { bound, value: most, count: Some(count), light })
 }
 
 /// Edges of the region at which light does not end.
-fn edges(file: &FitFile, volume: &Volume) -> Vec<Value> {
+fn edges(file: &FitFile, volume: &Volume) -> Vec<Reached> {
     let region = &file.region;
     let thickness = (EDGE * (region.r_max - region.r_min)).max(NODES * volume.finest());
     if thickness > THICK * region.r_max {
@@ -82,12 +96,12 @@ fn edges(file: &FitFile, volume: &Volume) -> Vec<Value> {
     let nodes: Vec<([f64; 2], f64)> = volume.values().iter().enumerate().map(node).collect();
     let brightest = nodes.iter().map(|(_, value)| *value).fold(0.0, f64::max);
     let light: f64 = nodes.iter().map(|(_, value)| value).sum();
-    let edge = |key: &str, at: f64, inside: &dyn Fn([f64; 2]) -> f64| {
+    let edge = |bound: &'static str, value: f64, inside: &dyn Fn([f64; 2]) -> f64| {
         let there = || nodes.iter().filter(|(place, _)| inside(*place) < thickness);
         let most = there().map(|(_, value)| *value).fold(0.0, f64::max);
         let part = there().map(|(_, value)| value).sum::<f64>() / light;
         let is_cut = most > BRIGHT * brightest && part > CUT;
-        is_cut.then(|| json!({ "bound": key, "value": at, "light": part }))
+        is_cut.then_some(Reached { bound, value, count: None, light: part })
     };
     let (r_min, r_max) = (region.r_min, region.r_max);
     let z_width = region.z_width.filter(|z| *z < r_max).unwrap_or(f64::INFINITY);
@@ -101,31 +115,30 @@ fn edges(file: &FitFile, volume: &Volume) -> Vec<Value> {
     .collect()
 }
 
-/// A sentence for each bound that was reached.
-pub fn sentences(results: &Value) -> Vec<String> {
-    let of = |reached: &Value| {
-        let (key, value) = (reached["bound"].as_str()?, reached["value"].as_f64()?);
-        let percent = 100.0 * reached["light"].as_f64()?;
-        let advice = match key {
+impl Reached {
+    /// Says so.
+    pub fn sentence(&self) -> String {
+        let Reached { bound: key, value, count, light } = self;
+        let percent = 100.0 * light;
+        let advice = match *key {
             "representation.activation" => {
                 "the largest that a sigmoid allows: take activation = \"softplus\", or a larger screen.jy_per_pixel"
             }
             "linear.upper" | "quiescent.upper" => "the largest that is allowed: raise it",
             _ => {
-                return Some(format!(
+                return format!(
                     "{percent:.0} % of the light lies at the edge of the region, {key} = {value}, and is as bright there as \
                      elsewhere: emission beyond it is missing from the model."
-                ));
+                );
             }
         };
-        let count = reached["count"].as_u64()?;
-        let what = if key == "quiescent.upper" { "pixels" } else { "nodes" };
-        let setting = if key == "representation.activation" { "emission" } else { key };
-        Some(format!(
+        let count = count.unwrap_or(0);
+        let what = if *key == "quiescent.upper" { "pixels" } else { "nodes" };
+        let setting = if *key == "representation.activation" { "emission" } else { *key };
+        format!(
             "{count} {what} with {percent:.0} % of the light are at {setting} = {value}, {advice}."
-        ))
-    };
-    results["bounds"].as_array().into_iter().flatten().filter_map(of).collect()
+        )
+    }
 }
 
 #[cfg(test)]
@@ -156,9 +169,9 @@ mod tests {
         for (r, key) in [(9.8, "region.r_max"), (2.2, "region.r_min")] {
             let found = edges(&file, &ball(r));
             assert_eq!(found.len(), 1, "{found:?}");
-            assert_eq!(found[0]["bound"], key);
-            let said = sentences(&json!({ "bounds": found }));
-            assert!(said[0].contains(&format!("the edge of the region, {key} = ")), "{said:?}");
+            assert_eq!(found[0].bound, key);
+            let said = found[0].sentence();
+            assert!(said.contains(&format!("the edge of the region, {key} = ")), "{said:?}");
         }
     }
 
@@ -169,10 +182,10 @@ mod tests {
         assert_eq!(reached("representation.activation", 1.0, &values), None);
         values[..100].fill(0.99);
         let found = reached("representation.activation", 1.0, &values).unwrap();
-        assert_eq!(found["count"], 100);
-        let said = sentences(&json!({ "bounds": [found] }));
+        assert_eq!(found.count, Some(100));
+        let said = found.sentence();
         assert!(
-            said[0].starts_with("100 nodes with 18 % of the light are at emission = 1"),
+            said.starts_with("100 nodes with 18 % of the light are at emission = 1"),
             "{said:?}"
         );
         let kinds = ["grid", "feature-grid", "bhnerf"].map(|kind| format!("representation={kind}"));

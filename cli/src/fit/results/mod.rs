@@ -19,7 +19,6 @@ pub use kerrlight_tomo::recovery::{recovered, true_volume};
 pub use light_curve::TABLE as LIGHT_CURVE;
 
 use super::folder::Folder;
-use crate::checksum::sealed;
 use gains::Gains;
 use kerrlight_common::frames::Frames;
 use kerrlight_common::units::MICROARCSECOND;
@@ -109,14 +108,11 @@ impl Estimate<'_> {
             state,
             begun,
         };
-        let mut results = self.results(trainer, &found)?;
-        let bounds = self.bounds(&found.volume, &state.now.parameters, found.quiescent.as_ref());
-        if !bounds.is_empty() {
-            results["bounds"] = bounds.into();
-        }
-        self.folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
+        let results = self.results(trainer, &found)?;
+        self.folder.keep("results.json", &results)?;
         self.report(&found, &results)?;
-        Ok((numbers::last_line(&found.judged.worth(), &results), results))
+        let last = numbers::last_line(&found.judged.worth(), &results);
+        Ok((last, serde_json::to_value(results)?))
     }
 
     fn evidence(&self) -> Evidence<'_> {

@@ -1,14 +1,24 @@
 //! What was found, in numbers.
 
-use super::{Estimate, Found, bounds, quadrature, verdict};
-use crate::fit::{band_search, closures, geometry_results, geometry_search, held_out, linear};
+use super::bounds::Reached;
+use super::gains::Gains;
+use super::leakage::Leakage;
+use super::quiescent::Quiescent;
+use super::{Estimate, Found, quadrature, verdict};
+use crate::checksum::Sealed;
+use crate::fit::inputs::InputFile;
+use crate::fit::{band_search, closures, geometry_search, held_out, linear};
 use crate::report;
 use crate::session;
 use crate::usage::usage;
 use kerrlight_common::frames::Frames;
 use kerrlight_render::volume::metrics::{self, Mask};
+use kerrlight_tomo::fit::settings::AxisSearch;
 use kerrlight_tomo::fit::{State, Trainer};
-use serde_json::{Value, json};
+use kerrlight_tomo::recovery::results::{BandResults, GeometryResults, HeldOutResults};
+use serde::Serialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
 
 /// What is said of a truth without emission.
 pub const DARK: &str =
@@ -37,122 +47,188 @@ pub fn mask_error(
     Ok((sums[1] > 0.0).then(|| sums[0] / sums[1]))
 }
 
-impl Estimate<'_> {
-    /// All of them, as they are written.
-    pub fn results(&self, trainer: &Trainer<'_, f32>, found: &Found<'_>) -> anyhow::Result<Value> {
-        let names = trainer.objective.names();
-        let chi2: serde_json::Map<String, Value> = names
-            .iter()
-            .zip(&found.loss.terms)
-            .map(|(name, value)| ((*name).to_owned(), json!(value)))
-            .collect();
-        let now = &found.state.now;
-        let mut results = json!({
-            "version": env!("CARGO_PKG_VERSION"),
-            "steps": now.step,
-            "seconds": found.begun.elapsed().as_secs_f64(),
-            "cpu_seconds": usage().map(|usage| usage.cpu_seconds - session::cpu_seconds_before()),
-            "peak_memory_mib": usage().map(|usage| usage.peak_mib),
-            "loss": found.loss.total,
-            "chi2_per_datum": chi2,
-            "axis": now.axis.vector(),
-            "inputs": self.folder.inputs().files,
-            "verdict": verdict::json(&found.judged),
-        });
-        if let Some(device) = &self.device {
-            results["device"] = json!(device);
+/// All numbers of a fit, as results.json has them; what is not known is left out.
+#[derive(Serialize)]
+pub struct Results {
+    version: &'static str,
+    steps: u64,
+    seconds: f64,
+    cpu_seconds: Option<f64>,
+    peak_memory_mib: Option<f64>,
+    loss: f64,
+    /// Of each kind of data.
+    pub chi2_per_datum: BTreeMap<String, f64>,
+    axis: [f64; 3],
+    inputs: Vec<InputFile>,
+    verdict: Value,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    device: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    validation_chi2_per_datum: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gains: Option<Value>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    leakage: Option<Value>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    quiescent: Option<Value>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mask_error: Option<f64>,
+    /// What sums along rays are off by, over the errors of the data.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quadrature_error: Option<f64>,
+    /// How good the solution of a linear grid is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub linear: Option<linear::Solved>,
+    /// The weight that was chosen by held-out data.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<Sealed<HeldOutResults>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    closures: Option<Value>,
+    /// The geometry, where it was not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub geometry: Option<Sealed<GeometryResults>>,
+    /// The same by the light curve of a flare.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub band: Option<Sealed<BandResults>>,
+    /// What a table tells of the two.
+    #[serde(flatten)]
+    of_searches: BTreeMap<String, Option<f64>>,
+    /// What the data cannot tell.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unknown: Vec<String>,
+    /// How close the volume is to the truth, where there is one.
+    #[serde(flatten)]
+    pub closeness: Option<Closeness>,
+    /// Bounds that were reached.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bounds: Vec<Reached>,
+}
+
+/// How close a volume is to the truth.
+#[derive(Serialize)]
+pub struct Closeness {
+    /// Cosine of the angle between the axes.
+    pub axis_dot_truth: f64,
+    /// What is said of a truth of which nothing is defined.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub note: Option<&'static str>,
+    /// Of all nodes.
+    pub psnr_db: Option<f64>,
+    psnr_inside_db: Option<f64>,
+    /// Relative error.
+    pub nrmse: Option<f64>,
+    correlation: Option<f64>,
+    #[serde(flatten)]
+    over_time: Option<OverTime>,
+}
+
+impl Closeness {
+    /// Tells it, the axis where that was looked for.
+    pub fn sentences(&self, axis: &AxisSearch) -> Vec<String> {
+        let mut all = Vec::new();
+        if let (Some(psnr), Some(nrmse)) = (self.psnr_db, self.nrmse) {
+            all.push(format!(
+                "Compared with the truth, the volume has a peak signal-to-noise ratio of {psnr:.2} dB and a relative error of {nrmse:.3} (1 for an empty volume)."
+            ));
         }
-        if let Some(validation) = self.validation(&found.seen)? {
-            results["validation_chi2_per_datum"] = json!(validation);
+        all.extend(self.note.map(|note| format!("Note that {note}.")));
+        if !matches!(axis, AxisSearch::Known {}) {
+            let dot = self.axis_dot_truth;
+            let angle = dot.clamp(-1.0, 1.0).acos().to_degrees();
+            all.push(format!(
+                "The fitted rotation axis is {angle:.2}° from the true one (cosine {dot:.5})."
+            ));
         }
-        if let Some(gains) = &found.gains {
-            results["gains"] = gains.json();
-        }
-        if let Some(leakage) = &found.leakage {
-            results["leakage"] = leakage.json();
-        }
-        if let Some(quiescent) = &found.quiescent {
-            results["quiescent"] = quiescent.json();
-        }
-        if let Some(mask) = found.mask {
-            results["mask_error"] = json!(mask);
-        }
-        if let Some(off) = found.quadrature {
-            results["quadrature_error"] = json!(off);
-        }
-        if let Some(linear) = linear::outcome(self.file, &self.folder.lines()?) {
-            results["linear"] = linear;
-        }
-        if let Some(held_out) = self.folder.found(held_out::FILE)? {
-            results["held_out"] = held_out;
-        }
-        if let Some(closures) = closures::json(self.measured, &self.file.loss) {
-            results["closures"] = closures;
-        }
-        self.add_geometries(&mut results)?;
-        let unknown = self.file.unknowns();
-        if !unknown.is_empty() {
-            results["unknown"] = json!(unknown);
-        }
-        self.add_closeness(&mut results, found)?;
-        Ok(results)
+        all
     }
 }
 
+/// The same of the volumes at the times of all frames.
+#[derive(Serialize)]
+struct OverTime {
+    psnr_over_time_db: Option<f64>,
+    nrmse_over_time: Option<f64>,
+}
+
 impl Estimate<'_> {
+    /// All of them.
+    pub fn results(
+        &self,
+        trainer: &Trainer<'_, f32>,
+        found: &Found<'_>,
+    ) -> anyhow::Result<Results> {
+        let names = trainer.objective.names().into_iter().map(str::to_owned);
+        let now = &found.state.now;
+        let geometry = geometry_search::found(self.folder)?;
+        let band = band_search::found(self.folder)?;
+        // Samples that were not fitted have one χ²: with the errors that a flare's past leaves of them.
+        let is_told = band.as_ref().is_some_and(|of| of.validation_chi2_per_datum.is_some());
+        let validation = if is_told { None } else { self.validation(&found.seen)? };
+        let errors = geometry.as_ref().map(|of| of.errors()).into_iter().flatten();
+        let numbers = band.as_ref().map(|of| of.numbers()).into_iter().flatten();
+        let numbers = numbers.map(|(key, number)| (key.to_owned(), number));
+        Ok(Results {
+            version: env!("CARGO_PKG_VERSION"),
+            steps: now.step,
+            seconds: found.begun.elapsed().as_secs_f64(),
+            cpu_seconds: usage().map(|usage| usage.cpu_seconds - session::cpu_seconds_before()),
+            peak_memory_mib: usage().map(|usage| usage.peak_mib),
+            loss: found.loss.total,
+            chi2_per_datum: names.zip(found.loss.terms.iter().copied()).collect(),
+            axis: now.axis.vector(),
+            inputs: self.folder.inputs().files.clone(),
+            verdict: verdict::json(&found.judged),
+            device: self.device.clone(),
+            validation_chi2_per_datum: validation,
+            gains: found.gains.as_ref().map(Gains::json),
+            leakage: found.leakage.as_ref().map(Leakage::json),
+            quiescent: found.quiescent.as_ref().map(Quiescent::json),
+            mask_error: found.mask,
+            quadrature_error: found.quadrature,
+            linear: linear::outcome(self.file, &self.folder.lines()?),
+            held_out: held_out::found(self.folder)?,
+            closures: closures::json(self.measured, &self.file.loss),
+            of_searches: errors.chain(numbers).collect(),
+            geometry,
+            band,
+            unknown: self.file.unknowns(),
+            closeness: self.closeness(found)?,
+            bounds: self.bounds(&found.volume, &now.parameters, found.quiescent.as_ref()),
+        })
+    }
+
     /// How close the volume is to the truth, where there is one.
-    fn add_closeness(&self, results: &mut Value, found: &Found<'_>) -> anyhow::Result<()> {
+    fn closeness(&self, found: &Found<'_>) -> anyhow::Result<Option<Closeness>> {
         let (Some(truth), Some(volume)) = (&self.measured.truth, &self.true_volume) else {
-            return Ok(());
+            return Ok(None);
         };
         let region = &self.file.region;
         let z_width = region.z_width.unwrap_or(f64::INFINITY);
         let mask = Mask::new(region.r_min, region.r_max, z_width)?;
         let all = metrics::compare(&found.volume, volume, None)?;
         let inside = metrics::compare(&found.volume, volume, Some(&mask))?;
-        results["axis_dot_truth"] = json!(found.state.now.axis.dot(truth.axis()));
-        if all.psnr_db.is_none() {
-            results["note"] = json!(DARK);
-        }
-        results["psnr_db"] = json!(all.psnr_db);
-        results["psnr_inside_db"] = json!(inside.psnr_db);
-        results["nrmse"] = json!(all.nrmse);
-        results["correlation"] = json!(all.correlation);
-        if let Some(changes) = &found.changes {
-            results["psnr_over_time_db"] = json!(changes.closeness.psnr_db());
-            results["nrmse_over_time"] = json!(changes.closeness.nrmse());
-        }
-        Ok(())
-    }
-
-    /// The geometries that were found, where they were not known.
-    fn add_geometries(&self, results: &mut Value) -> anyhow::Result<()> {
-        if let Some(geometry) = self.folder.found(geometry_search::FILE)? {
-            geometry_results::errors(&geometry)
-                .into_iter()
-                .for_each(|(key, value)| results[key] = value);
-            results["geometry"] = geometry;
-        }
-        if let Some(band) = self.folder.found(band_search::FILE)? {
-            band_search::numbers(&band).into_iter().for_each(|(key, value)| results[key] = value);
-            // Samples that were not fitted have one χ²: with the errors that a flare's past leaves of them.
-            if band["validation_chi2_per_datum"].is_number()
-                && let Some(results) = results.as_object_mut()
-            {
-                results.remove("validation_chi2_per_datum");
-            }
-            results["band"] = band;
-        }
-        Ok(())
+        Ok(Some(Closeness {
+            axis_dot_truth: found.state.now.axis.dot(truth.axis()),
+            note: all.psnr_db.is_none().then_some(DARK),
+            psnr_db: all.psnr_db,
+            psnr_inside_db: inside.psnr_db,
+            nrmse: all.nrmse,
+            correlation: all.correlation,
+            over_time: found.changes.as_ref().map(|changes| OverTime {
+                psnr_over_time_db: changes.closeness.psnr_db(),
+                nrmse_over_time: changes.closeness.nrmse(),
+            }),
+        }))
     }
 }
 
 /// The verdict, what is wrong with sums along rays, bounds that were reached and, beside a truth, PSNR with that of an empty volume.
-pub fn last_line(headline: &str, results: &Value) -> String {
-    let said = quadrature::sentence(results).into_iter().chain(bounds::sentences(results));
+pub fn last_line(headline: &str, results: &Results) -> String {
+    let said = results.quadrature_error.and_then(quadrature::sentence);
+    let said = said.into_iter().chain(results.bounds.iter().map(Reached::sentence));
     let headline = std::iter::once(headline.to_owned()).chain(said).collect::<Vec<_>>().join(" ");
-    match (results["psnr_db"].as_f64(), results["nrmse"].as_f64()) {
-        (Some(psnr), Some(nrmse)) => {
+    match results.closeness {
+        Some(Closeness { psnr_db: Some(psnr), nrmse: Some(nrmse), .. }) => {
             let empty = psnr + 20.0 * nrmse.log10();
             format!(
                 "{headline} PSNR beside the truth: {psnr:.2} dB (an empty volume: {empty:.2} dB)."
@@ -164,34 +240,43 @@ pub fn last_line(headline: &str, results: &Value) -> String {
 
 /// A line of the table of results.
 struct Meaning {
-    key: &'static str,
+    of: Number,
     name: &'static str,
     digits: usize,
     unit: &'static str,
     text: &'static str,
 }
 
+/// A number of results; none where it is not defined.
+type Number = fn(&Results) -> Option<f64>;
+
 const fn meaning(
-    key: &'static str,
+    of: Number,
     name: &'static str,
     digits: usize,
     unit: &'static str,
     text: &'static str,
 ) -> Meaning {
-    Meaning { key, name, digits, unit, text }
+    Meaning { of, name, digits, unit, text }
 }
 
 const MEANINGS: [Meaning; 15] = [
-    meaning("loss", "loss", 6, "", "what was minimised, of all data, without penalties"),
     meaning(
-        "validation_chi2_per_datum",
+        |of| Some(of.loss),
+        "loss",
+        6,
+        "",
+        "what was minimised, of all data, without penalties",
+    ),
+    meaning(
+        |of| of.validation_chi2_per_datum,
         "validation",
         4,
         "",
         "χ² per data point of the samples that were not fitted",
     ),
     meaning(
-        "psnr_db",
+        |of| of.closeness.as_ref()?.psnr_db,
         "PSNR",
         2,
         "dB",
@@ -199,73 +284,83 @@ const MEANINGS: [Meaning; 15] = [
          error about a third as large. An empty volume has tens of dB already, as most of space is dark",
     ),
     meaning(
-        "psnr_inside_db",
+        |of| of.closeness.as_ref()?.psnr_inside_db,
         "PSNR inside",
         2,
         "dB",
         "the same, of the nodes inside the region of recovery alone",
     ),
     meaning(
-        "psnr_over_time_db",
+        |of| of.closeness.as_ref()?.over_time.as_ref()?.psnr_over_time_db,
         "PSNR over time",
         2,
         "dB",
         "the same of the volumes at the times of all frames together, for emission that changes",
     ),
     meaning(
-        "nrmse_over_time",
+        |of| of.closeness.as_ref()?.over_time.as_ref()?.nrmse_over_time,
         "relative error over time",
         4,
         "",
         "root mean square error of the volumes at the times of all frames over that of the truth",
     ),
     meaning(
-        "nrmse",
+        |of| of.closeness.as_ref()?.nrmse,
         "relative error",
         4,
         "",
         "root mean square error over that of the truth: 0 is perfect, 1 an empty volume",
     ),
     meaning(
-        "correlation",
+        |of| of.closeness.as_ref()?.correlation,
         "correlation",
         5,
         "",
         "normalised cross-correlation with the truth: 1 is perfect, whatever the scale",
     ),
     meaning(
-        "axis_dot_truth",
+        |of| Some(of.closeness.as_ref()?.axis_dot_truth),
         "axis",
         6,
         "",
         "cosine of the angle between the recovered axis and the true one: 1 is perfect",
     ),
     meaning(
-        "mask_error",
+        |of| of.mask_error,
         "masked light",
         6,
         "",
         "light in places that were taken for empty and left out, as a part of all, in two frames",
     ),
     meaning(
-        "quadrature_error",
+        |of| of.quadrature_error,
         "sums along rays",
         3,
         "of the errors",
         "root mean square difference of the model from the same with twice the nodes on rays, over the errors of the data",
     ),
-    meaning("steps", "steps", 0, "", "steps of the optimiser"),
-    meaning("seconds", "time", 1, "s", "wall time of this run, from its start to these results"),
-    meaning("cpu_seconds", "processor time", 1, "s", "the same, of all threads together"),
-    meaning("peak_memory_mib", "memory", 0, "MiB", "most memory that the process held"),
+    meaning(|of| Some(of.steps as f64), "steps", 0, "", "steps of the optimiser"),
+    meaning(
+        |of| Some(of.seconds),
+        "time",
+        1,
+        "s",
+        "wall time of this run, from its start to these results",
+    ),
+    meaning(|of| of.cpu_seconds, "processor time", 1, "s", "the same, of all threads together"),
+    meaning(|of| of.peak_memory_mib, "memory", 0, "MiB", "most memory that the process held"),
 ];
 
 /// The same as lines of a table; what is not defined is left out.
-pub fn outcomes(results: &Value) -> Vec<report::Outcome> {
+pub fn outcomes(results: &Results) -> Vec<report::Outcome> {
     let one = |meaning: &Meaning| {
         Some(report::Outcome {
             name: meaning.name.to_owned(),
-            value: format!("{:.*}", meaning.digits, results[meaning.key].as_f64()?),
+            value: format!(
+                "{:.*}",
+                meaning.digits,
+                (meaning.of)(results).filter(|x| x.is_finite())?
+            ),
             unit: meaning.unit.to_owned(),
             meaning: meaning.text.to_owned(),
         })

@@ -1,17 +1,18 @@
 //! The report.
 
+use super::bounds::Reached;
 use super::gains::Gains;
 use super::leakage::Leakage;
 use super::medium;
-use super::numbers::outcomes;
+use super::numbers::{Results, outcomes};
 use super::over_time::Changes;
 use super::quiescent::Quiescent;
 use super::verdict;
-use super::{Estimate, Found, bounds, quadrature};
+use super::{Estimate, Found, quadrature};
 use crate::fit::SETTINGS;
 use crate::fit::curves::{loss_plot, psnr_plot};
 use crate::fit::folder::Folder;
-use crate::fit::{band_plots, band_search, band_words, geometry_results, held_out};
+use crate::fit::{band_plots, band_words, held_out};
 use crate::output;
 use crate::report::{self, LinePlot, Report, View3d};
 use anyhow::Context;
@@ -21,21 +22,20 @@ use kerrlight_render::volume::projection::Surroundings;
 use kerrlight_render::volume::slices::Through;
 use kerrlight_tomo::fit::settings::{AxisSearch, DataFiles, FitFile};
 use kerrlight_tomo::fit::setup::PreviewImage;
-use serde_json::Value;
 
 /// Emission in Jy/pixel a M would mean little: 1 M of emission 1 gives `screen.jy_per_pixel`.
 const UNIT: &str = "model units";
 
 impl Estimate<'_> {
     /// Draws and writes it.
-    pub fn report(&self, found: &Found<'_>, results: &Value) -> anyhow::Result<()> {
+    pub fn report(&self, found: &Found<'_>, results: &Results) -> anyhow::Result<()> {
         let lines = self.folder.lines()?;
         let mut plots: Vec<LinePlot> = loss_plot(&lines).into_iter().collect();
         plots.extend(psnr_plot(&lines));
-        plots.extend(held_out::plot(&results["held_out"]));
+        plots.extend(results.held_out.as_deref().map(held_out::plot));
         plots.extend(self.light_curves(&found.seen)?);
-        if let Some(band) = self.folder.found(band_search::FILE)? {
-            plots.extend(band_plots::of_runs(&[("these data".to_owned(), band)], ""));
+        if let Some(band) = results.band.as_deref() {
+            plots.extend(band_plots::of_runs(&[("these data".to_owned(), band.clone())], ""));
         }
         plots.push(self.light_curve(&found.movie)?);
         plots.extend(found.changes.as_ref().map(Changes::plot));
@@ -171,10 +171,10 @@ impl Estimate<'_> {
     }
 
     /// What was fitted to what.
-    fn subject(&self, results: &Value) -> String {
+    fn subject(&self, results: &Results) -> String {
         let file = self.file;
         let data: Vec<&str> = file.loss.iter().map(|l| l.data.label()).collect();
-        let fitted = match band_search::is_seen(&results["band"]) {
+        let fitted = match results.band.as_ref().and_then(|band| band.is_seen()) {
             Some(false) => "was fitted to",
             _ => "was recovered from",
         };
@@ -188,55 +188,35 @@ impl Estimate<'_> {
         )
     }
 
-    fn summary(&self, found: &Found<'_>, results: &Value) -> Vec<String> {
+    fn summary(&self, found: &Found<'_>, results: &Results) -> Vec<String> {
         let file = self.file;
-        let number = |key: &str| results[key].as_f64();
         let mut lines = vec![self.subject(results)];
-        if results["geometry"].is_object() {
-            lines.extend(geometry_results::sentences(&results["geometry"]));
-        }
-        if results["band"].is_object() {
-            lines.extend(band_search::sentences(&results["band"]));
-        }
-        lines.extend(held_out::sentence(&results["held_out"]));
-        lines.extend(quadrature::sentence(results));
-        lines.extend(bounds::sentences(results));
-        if let Some(statement) = results["linear"]["statement"].as_str() {
-            lines.push(format!("The linear grid's solution: {statement}."));
-        }
-        let unknown = results["unknown"].as_array().into_iter().flatten();
-        lines.extend(unknown.filter_map(Value::as_str).map(|open| format!("Note that {open}.")));
-        if let Some(chi2) = results["chi2_per_datum"].as_object() {
-            let each = chi2.iter().map(|(name, value)| {
-                format!("{name}: χ² per data point {:.4}", value.as_f64().unwrap_or(f64::NAN))
-            });
-            lines.push(format!(
-                "{}. χ² per data point is the mean squared residual in units of the error bars: about 1 for the right model and errors, less for noise-free data.",
-                each.collect::<Vec<_>>().join("; ")
-            ));
-        }
+        lines.extend(results.geometry.iter().flat_map(|of| of.sentences()));
+        lines.extend(results.band.iter().flat_map(|of| of.sentences()));
+        lines.extend(results.held_out.as_ref().and_then(|of| of.sentence()));
+        lines.extend(results.quadrature_error.and_then(quadrature::sentence));
+        lines.extend(results.bounds.iter().map(Reached::sentence));
+        lines.extend(
+            results
+                .linear
+                .as_ref()
+                .map(|of| format!("The linear grid's solution: {}.", of.statement)),
+        );
+        lines.extend(results.unknown.iter().map(|open| format!("Note that {open}.")));
+        let chi2 = results.chi2_per_datum.iter();
+        let each = chi2.map(|(name, value)| format!("{name}: χ² per data point {value:.4}"));
+        lines.push(format!(
+            "{}. χ² per data point is the mean squared residual in units of the error bars: about 1 for the right model and errors, less for noise-free data.",
+            each.collect::<Vec<_>>().join("; ")
+        ));
         if let Some(DataFiles::Visibilities { scattering, variability, .. }) = file.data {
             lines.extend(medium::sentences(scattering, variability));
         }
         lines.extend(found.gains.iter().flat_map(Gains::sentences));
         lines.extend(found.leakage.iter().flat_map(Leakage::sentences));
         lines.extend(found.quiescent.iter().flat_map(Quiescent::sentences));
-        if let (Some(psnr), Some(nrmse)) = (number("psnr_db"), number("nrmse")) {
-            lines.push(format!(
-                "Compared with the truth, the volume has a peak signal-to-noise ratio of {psnr:.2} dB and a relative error of {nrmse:.3} (1 for an empty volume)."
-            ));
-        }
-        if let Some(note) = results["note"].as_str() {
-            lines.push(format!("Note that {note}."));
-        }
-        if !matches!(file.axis, AxisSearch::Known {})
-            && let Some(dot) = number("axis_dot_truth")
-        {
-            let angle = dot.clamp(-1.0, 1.0).acos().to_degrees();
-            lines.push(format!(
-                "The fitted rotation axis is {angle:.2}° from the true one (cosine {dot:.5})."
-            ));
-        }
+        let closeness = results.closeness.as_ref();
+        lines.extend(closeness.map(|of| of.sentences(&file.axis)).into_iter().flatten());
         lines
     }
 }

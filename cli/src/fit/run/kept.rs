@@ -16,6 +16,7 @@ use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
 use kerrlight_tomo::fit::setup;
 use kerrlight_tomo::fit::{DeviceRunner, Outcome, State, Trainer, checkpoint, journal};
+use kerrlight_tomo::recovery::results::{BandResults, GeometryResults, HeldOutResults};
 use kerrlight_tomo::recovery::{At, Choice, Event, Found, Now, Problem, Progress, Resumed, Stage};
 use std::time::Instant;
 
@@ -203,18 +204,30 @@ impl<'a> Kept<'a> {
         let folder = self.folder;
         match found {
             Found::Geometry(problem, unknown, found) => {
-                geometry_search::write(folder, problem, unknown, found)?;
-                geometry_search::chosen(folder, &problem.settings)
+                let found = GeometryResults::new(problem, unknown, found)?;
+                folder.keep(geometry_search::FILE, &found)?;
+                self.read(Stage::Geometry)
             }
             Found::Band(problem, scan) => {
-                band_search::write(folder, problem, scan)?;
-                band_search::chosen(folder)
+                folder.keep(band_search::FILE, &BandResults::new(problem, scan)?)?;
+                self.read(Stage::Band)
             }
             Found::Weight(file, held) => {
-                held_out::write(folder, file, held)?;
-                held_out::chosen(folder)
+                let Some(settings) = &file.held_out else { return Ok(None) };
+                folder.keep(held_out::FILE, &HeldOutResults::new(settings, held))?;
+                self.read(Stage::Weight)
             }
             _ => Ok(Some(found.choice())),
+        }
+    }
+
+    /// What the file of a search says, which is told; none if it has not looked.
+    fn read(&self, stage: Stage) -> anyhow::Result<Option<Choice>> {
+        match stage {
+            Stage::Geometry => geometry_search::chosen(self.folder, &self.problem.settings),
+            Stage::Band => band_search::chosen(self.folder),
+            Stage::Weight => held_out::chosen(self.folder),
+            _ => Ok(None),
         }
     }
 }
@@ -244,14 +257,7 @@ impl Progress for Kept<'_> {
     }
 
     fn chosen(&mut self, stage: Stage) -> Result<Option<Choice>, Error> {
-        let folder = self.folder;
-        let found = match stage {
-            Stage::Geometry => geometry_search::chosen(folder, &self.problem.settings),
-            Stage::Band => band_search::chosen(folder),
-            Stage::Weight => held_out::chosen(folder),
-            _ => Ok(None),
-        };
-        found.map_err(kept)
+        self.read(stage).map_err(kept)
     }
 
     fn keep(&mut self, found: &Found<'_>) -> Result<Choice, Error> {

@@ -6,6 +6,7 @@ mod page;
 mod phases;
 mod pictures;
 mod polarized;
+mod results;
 mod words;
 
 use super::closures;
@@ -15,7 +16,6 @@ use super::results::gains::Gains;
 use super::results::leakage::Leakage;
 use super::results::verdict::{DataVerdict, Evidence};
 use crate::answer::Answer;
-use crate::checksum::sealed;
 use crate::interrupt::{Interrupted, SignalGuard};
 use crate::progress;
 use crate::session;
@@ -120,14 +120,13 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
         begun,
     };
     found.images()?;
-    let mut results = found.results();
-    results["ring_sentence"] = found.ring_sentence().into();
-    folder.file("results.json")?.write(sealed(results.clone()).as_bytes())?;
+    let results = found.results();
+    folder.keep("results.json", &results)?;
     found.report(&evidence, &results)?;
     let files = ["report.html", "results.json", "image.npz", "image.fits", "image.png"];
     let files = files.map(|name| folder.path().join(name));
     Ok(Answer::lines(&found.worth(), &files[0].display().to_string())
-        .with_all(results)
+        .with_all(serde_json::to_value(results)?)
         .with("folder", folder.path().display().to_string())
         .files(files.iter().map(|path| path.as_path())))
 }

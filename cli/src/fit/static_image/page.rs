@@ -3,6 +3,7 @@
 use super::Found;
 use super::numbers::{RING, of_ring, with_error};
 use super::polarized::Polarized;
+use super::results::Results;
 use crate::fit::results::gains::Gains;
 use crate::fit::results::leakage::Leakage;
 use crate::fit::results::page::settings;
@@ -11,7 +12,6 @@ use crate::fit::results::{plots, residuals};
 use crate::report::{Axis, LinePlot, Marks, Outcome, Report, Series, Table};
 use kerrlight_imaging::settings::StaticImageFile;
 use kerrlight_imaging::{Candidate, ShapeFit};
-use serde_json::Value;
 
 /// What the numbers of a ring are called, their units and what they mean.
 const MEANINGS: [(&str, &str, usize, &str); 5] = [
@@ -50,7 +50,7 @@ const MEANINGS: [(&str, &str, usize, &str); 5] = [
 
 impl Found<'_> {
     /// Draws and writes it.
-    pub fn report(&self, evidence: &Evidence<'_>, results: &Value) -> anyhow::Result<()> {
+    pub fn report(&self, evidence: &Evidence<'_>, results: &Results) -> anyhow::Result<()> {
         let figure = self.picture()?;
         self.folder.file("image.png")?.write(&figure.png)?;
         let polarized = self.polarized_picture()?;
@@ -93,7 +93,7 @@ impl Found<'_> {
         report.write(&self.folder.file("report.html")?)
     }
 
-    fn outcomes(&self, results: &Value) -> Vec<Outcome> {
+    fn outcomes(&self, results: &Results) -> Vec<Outcome> {
         let numbers = RING.iter().zip(MEANINGS).filter_map(|((key, number), meaning)| {
             let (name, unit, digits, text) = meaning;
             let (value, error) = of_ring(&self.survey, &self.ring()?, key, *number);
@@ -106,17 +106,13 @@ impl Found<'_> {
         });
         let flux = Outcome {
             name: "flux".to_owned(),
-            value: with_error(
-                results["flux_jy"].as_f64().unwrap_or(f64::NAN),
-                results["flux_error_jy"].as_f64(),
-                3,
-            ),
+            value: with_error(results.flux_jy, results.flux_error_jy, 3),
             unit: "Jy".to_owned(),
             meaning: "all light of the field; its prior has a part in it".to_owned(),
         };
         let seconds = Outcome {
             name: "time".to_owned(),
-            value: format!("{:.1}", results["seconds"].as_f64().unwrap_or(f64::NAN)),
+            value: format!("{:.1}", results.seconds),
             unit: "s".to_owned(),
             meaning: "wall time of this run".to_owned(),
         };

@@ -10,7 +10,8 @@ use kerrlight_tomo::fit::FrameTerm;
 use kerrlight_tomo::fit::settings::LossKind;
 use kerrlight_tomo::fit::setup::{FitData, best_held};
 use kerrlight_tomo::fit::verdict::{Errors, Statistics, Tested};
-use serde_json::{Value, json};
+use serde::Serialize;
+use serde_json::Value;
 
 /// A number: its key and period in results.json, name, unit, digits, and meaning.
 struct Number {
@@ -101,6 +102,31 @@ fn name(kind: LossKind) -> &'static str {
     }
 }
 
+/// How polarisation was found, for results.json.
+#[derive(Serialize)]
+pub struct PolarizedNumbers {
+    count: usize,
+    strength: f64,
+    iterations: usize,
+    has_converged: bool,
+    draws: usize,
+    other_strengths: usize,
+}
+
+impl From<&Polarized> for PolarizedNumbers {
+    fn from(of: &Polarized) -> Self {
+        let found = &of.survey.found;
+        Self {
+            count: of.count,
+            strength: found.strength,
+            iterations: found.iterations,
+            has_converged: found.has_converged,
+            draws: of.survey.draws.len(),
+            other_strengths: of.survey.strengths.len(),
+        }
+    }
+}
+
 impl Polarized {
     /// Of what was found of these data, and its residuals to be judged.
     pub fn new(
@@ -128,26 +154,24 @@ impl Polarized {
         (value, self.survey.error(number.of, number.period))
     }
 
-    /// Adds all numbers to results.json.
-    pub fn add_to(&self, results: &mut Value) {
-        let found = &self.survey.found;
-        results["chi2_per_datum"][name(self.settings.data)] = json!(found.chi2);
-        for number in &NUMBERS {
-            let (value, error) = self.value(number);
-            results[format!("polarization_{}", number.key)] = json!(value);
-            results[format!("polarization_{}_error", number.key)] = json!(error);
-        }
-        results["polarization"] = json!({
-            "count": self.count,
-            "strength": found.strength,
-            "iterations": found.iterations,
-            "has_converged": found.has_converged,
-            "draws": self.survey.draws.len(),
-            "other_strengths": self.survey.strengths.len(),
-        });
-        if let Some(leakage) = &self.leakage {
-            results["leakage"] = leakage.json();
-        }
+    /// χ² over the number of its data, with their kind.
+    pub fn chi2(&self) -> (&'static str, f64) {
+        (name(self.settings.data), self.survey.found.chi2)
+    }
+
+    /// Numbers of results.json, with their errors.
+    pub fn numbers(&self) -> Vec<(String, Option<f64>)> {
+        let one = |number: &Number| {
+            let ((value, error), key) =
+                (self.value(number), format!("polarization_{}", number.key));
+            [(key.clone(), Some(value)), (format!("{key}_error"), error)]
+        };
+        NUMBERS.iter().flat_map(one).collect()
+    }
+
+    /// The leakage of stations for results.json, where it was solved for.
+    pub fn leakage(&self) -> Option<Value> {
+        self.leakage.as_ref().map(Leakage::json)
     }
 
     /// The page's numbers.

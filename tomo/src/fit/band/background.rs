@@ -9,19 +9,30 @@ use super::{Band, CurveRows};
 use crate::Error;
 use crate::fit::linear::Roughness;
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
 /// Light that no flare explains, of the same size in each Stokes parameter.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Background {
     /// Standard deviation of what is constant, Jy.
+    #[serde(rename = "constant_jy")]
     pub constant: f64,
     /// Standard deviation of what varies, Jy.
+    #[serde(rename = "variation_jy")]
     pub variation: f64,
     /// Correlation time τ of what varies, minutes.
+    #[serde(rename = "correlation_min")]
     pub minutes: f64,
     /// ν of the Matérn covariance of what varies: exp(−s) with s = |t − t′|/τ, a damped random walk, or
     /// (1 + √5 s + 5 s²/3) exp(−√5 s).
+    #[serde(rename = "matern")]
     pub roughness: Roughness,
+}
+
+impl Default for Background {
+    fn default() -> Self {
+        Self::NONE
+    }
 }
 
 impl Background {

@@ -24,6 +24,7 @@ pub use place::{Interval, Normal, Place, places, together};
 pub use rows::{CurveRows, PolarGrid};
 
 use crate::Error;
+use serde::{Deserialize, Serialize};
 
 /// Prior of the emission: all combinations of these, each as probable.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,7 +84,7 @@ impl BandPrior {
 }
 
 /// One of the combinations.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Band {
     /// ρ₀, M.
     pub radius: f64,
@@ -98,6 +99,7 @@ pub struct Band {
     /// μ.
     pub mean: f64,
     /// Background.
+    #[serde(skip)]
     pub background: Background,
 }
 

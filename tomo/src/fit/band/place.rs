@@ -9,8 +9,10 @@ use super::evidence::Lower;
 use super::field::{BandCovariance, part, some};
 use super::{Band, CurveRows};
 use crate::Error;
+use crate::null::or_nan;
 use core::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
+use serde::{Deserialize, Serialize};
 
 /// A mean and its standard deviation.
 pub type Normal = [f64; 2];
@@ -27,13 +29,16 @@ pub struct Place {
 }
 
 /// Median and 95 % interval.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
     /// Half of the probability is below.
+    #[serde(deserialize_with = "or_nan")]
     pub median: f64,
     /// 2.5 % are below.
+    #[serde(deserialize_with = "or_nan")]
     pub low: f64,
     /// 97.5 % are below.
+    #[serde(deserialize_with = "or_nan")]
     pub high: f64,
 }
 

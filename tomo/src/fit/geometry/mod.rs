@@ -30,9 +30,11 @@ pub use uncertainty::Spread;
 
 use crate::Error;
 use core::f64::consts::{PI, TAU};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// A parameter of the geometry.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Parameter {
     /// a, M; negative where matter that turns right-handed about the axis is retrograde.
     Spin,
@@ -46,6 +48,20 @@ pub enum Parameter {
     BetaR,
     /// β_φ of the same: the same of the angular velocity.
     BetaPhi,
+}
+
+impl Serialize for Parameter {
+    fn serialize<S: Serializer>(&self, writer: S) -> Result<S::Ok, S::Error> {
+        writer.serialize_str(self.name())
+    }
+}
+
+impl<'de> Deserialize<'de> for Parameter {
+    fn deserialize<D: Deserializer<'de>>(reader: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(reader)?;
+        let known = Parameter::ALL.into_iter().find(|parameter| parameter.name() == name);
+        known.ok_or_else(|| D::Error::custom(format!("{name:?} is no parameter of the geometry")))
+    }
 }
 
 /// Number of parameters.

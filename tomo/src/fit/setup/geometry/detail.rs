@@ -1,5 +1,6 @@
 //! What searches hand on to one another.
 
+use super::steps::Resolution;
 use crate::fit::geometry::{Geometry, Spread};
 use crate::fit::journal::Memory;
 use crate::fit::settings::{FitFile, UnknownGeometry};
@@ -22,8 +23,24 @@ pub struct Trial {
     pub further: Option<Geometry>,
 }
 
-/// How sure a geometry is, its χ²/N, and the geometry.
-pub(super) type Sure = (Option<Spread>, f64, Geometry);
+/// A geometry and how sure it is.
+pub(super) struct Sure {
+    /// The best one.
+    pub geometry: Geometry,
+    /// Its errors; none if the data leave a parameter open.
+    pub spread: Option<Spread>,
+    /// χ²/N there, times what χ² is multiplied by.
+    pub reduced_chi2: f64,
+}
+
+/// What was found in detail, and how.
+pub(super) struct Detailed {
+    pub sure: Sure,
+    /// By what χ² was multiplied.
+    pub errors: f64,
+    /// What it was looked at through.
+    pub resolution: Resolution,
+}
 
 /// What is looked at in detail, about one geometry.
 pub(super) struct Detail<'a> {

@@ -1,6 +1,6 @@
 //! From the ends of the coarse searches to the best geometry, and how sure that one is.
 
-use super::detail::{Detail, Sure, Trial};
+use super::detail::{Detail, Detailed, Sure, Trial};
 use super::discretisation;
 use super::posterior::{polished, surely};
 use super::search_data::SearchData;
@@ -24,7 +24,7 @@ impl Detail<'_> {
         reduced_chi2: f64,
         how: &Exploration,
         watch: &mut TrialWatch<'_>,
-    ) -> Result<Option<(Sure, f64, Resolution)>> {
+    ) -> Result<Option<Detailed>> {
         let errors = (self.scale)(reduced_chi2);
         let SearchView { nodes, pixels, .. } = self.unknown.search.fine;
         let at = Resolution { nodes, pixels, rays: 1, panels: 1 };
@@ -39,10 +39,9 @@ impl Detail<'_> {
             true => populated(problem, anchor.geometry, how, watch),
             false => about_volumes(&place.seen, problem, anchor, how, watch),
         })?;
-        let Some((spread, reduced, geometry)) = found else { return Ok(None) };
-        let own = |spread| self.beside_its_own(&place, (spread, reduced));
-        let spread = spread.map(own).transpose()?;
-        Ok(Some(((spread, reduced, geometry), errors, at)))
+        let Some(found) = found else { return Ok(None) };
+        let sure = self.beside_its_own(&place, found)?;
+        Ok(Some(Detailed { sure, errors, resolution: at }))
     }
 
     /// Data at a resolution.
@@ -59,19 +58,17 @@ impl Detail<'_> {
     }
 
     /// With the errors that the model has of itself, where data are of another one.
-    pub fn beside_its_own(
-        &self,
-        place: &Place,
-        (spread, reduced): (Spread, f64),
-    ) -> Result<Spread> {
+    pub fn beside_its_own(&self, place: &Place, sure: Sure) -> Result<Sure> {
+        let Some(spread) = &sure.spread else { return Ok(sure) };
         if !self.is_foreign()? {
-            return Ok(spread);
+            return Ok(sure);
         }
         let about = (self.unknown, spacing(&self.file.screen)?);
         let own = self.through(place, |problem| {
-            discretisation::errors(place, about, problem, (&spread, reduced))
+            discretisation::errors(place, about, problem, (spread, sure.reduced_chi2))
         })?;
-        Ok(spread.beside(&self.unknown.free, own))
+        let spread = sure.spread.map(|spread| spread.beside(&self.unknown.free, own));
+        Ok(Sure { spread, ..sure })
     }
 
     /// Does something with what is looked at.
@@ -139,8 +136,10 @@ fn about_volumes(
     };
     let anchor = Anchor::of(problem, &explored.best);
     let found = seen.about(problem, &anchor, |problem| surely_about((seen, problem), &explored))?;
-    Ok(found
-        .map(|(spread, reduced, geometry)| (spread.filter(|_| reduced < WAY), reduced, geometry)))
+    Ok(found.map(|sure| {
+        let spread = sure.spread.filter(|_| sure.reduced_chi2 < WAY);
+        Sure { spread, ..sure }
+    }))
 }
 
 /// A problem whose volumes tell geometries apart and no more: populations look for where steps begin, with volumes that are
@@ -165,19 +164,17 @@ fn surely_about(
 ) -> Result<Sure> {
     if is_stepped(seen, problem) {
         let (polished, reduced) = polished(problem, &explored.best)?;
-        let spread = surely(problem, None, &polished, reduced)?;
-        let geometry = spread.as_ref().map_or(polished.best.geometry, |spread| spread.geometry);
-        return Ok((spread, reduced, geometry));
+        return surely(problem, None, &polished, reduced);
     }
     valued(problem, explored)
 }
 
 /// How sure it is, by the values of the geometries around.
 fn valued(problem: &GeometryProblem<'_, f32>, explored: &Explored) -> Result<Sure> {
-    let reduced = problem.scale * problem.left(&explored.best)?;
-    let spread = Spread::of(problem.free, &explored.samples, reduced);
+    let reduced_chi2 = problem.scale * problem.left(&explored.best)?;
+    let spread = Spread::of(problem.free, &explored.samples, reduced_chi2);
     let geometry = lower(&quick(problem), explored, spread.as_ref())?;
-    Ok((spread, reduced, geometry))
+    Ok(Sure { geometry, spread, reduced_chi2 })
 }
 
 /// The lowest point of the quadratic form, if it explains the data better than the best geometry that was evaluated.

@@ -1,5 +1,6 @@
 //! How sure a geometry is: the bowl beneath the ripples, along other rays and with other voxels; and draws of geometries.
 
+use super::detail::Sure;
 use super::search_data::SearchData;
 use crate::fit::geometry::{
     Effort, Envelope, Estimate, Free, Geometry, GeometryModel, GeometryProblem, ModelErrors,
@@ -45,13 +46,13 @@ pub(super) fn surely(
     problem: &GeometryProblem<'_, f32>,
     resampled: Resampled<'_>,
     polished: &Polished,
-    reduced: f64,
-) -> Result<Option<Spread>> {
+    reduced_chi2: f64,
+) -> Result<Sure> {
     let n = problem.free.len();
     if polished.covariance.iter().any(|x| !x.is_finite()) {
-        return Ok(None);
+        return Ok(Sure { geometry: polished.best.geometry, spread: None, reduced_chi2 });
     }
-    let inflation = reduced.max(1.0);
+    let inflation = reduced_chi2.max(1.0);
     let envelope = enveloped(problem, resampled, polished, inflation)?;
     let envelope = envelope.unwrap_or_else(|| Envelope {
         geometry: polished.best.geometry,
@@ -67,15 +68,9 @@ pub(super) fn surely(
     let sigma = problem.free.iter().zip(whole).map(|(free, x)| x.min(free.prior.deviation()));
     let sigma: Vec<f64> = sigma.collect();
     let open = problem.free.iter().zip(&sigma).map(|(free, sigma)| free.is_open(*sigma)).collect();
-    Ok(Some(Spread {
-        geometry,
-        sigma,
-        open,
-        correlation,
-        ripple,
-        trials,
-        own: ModelErrors::default(),
-    }))
+    let own = ModelErrors::default();
+    let spread = Spread { geometry, sigma, open, correlation, ripple, trials, own };
+    Ok(Sure { geometry, spread: Some(spread), reduced_chi2 })
 }
 
 /// Data through other pixels, and what of the geometry is not known; none where pixels are those of the data.

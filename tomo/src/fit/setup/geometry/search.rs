@@ -1,6 +1,6 @@
 //! The search for a geometry: from many starts with coarse voxels, then with fine ones.
 
-use super::detail::{Detail, Trial};
+use super::detail::{Detail, Detailed, Trial};
 use super::fine::{PART, nearer};
 use super::search_data::SearchData;
 use super::steps::Resolution;
@@ -73,11 +73,11 @@ pub fn find_geometry(
     // The coarse search has left less than it began with.
     let detail = Detail { file, measured, unknown, memory, scale: &scale };
     let found = detail.search((&mut trials, &best), reduced_chi2, &how, &mut told)?;
-    Ok(found.map(|((spread, reduced, geometry), errors, resolution)| FoundGeometry {
-        geometry,
-        reduced_chi2: reduced / errors,
+    Ok(found.map(|Detailed { sure, errors, resolution }| FoundGeometry {
+        geometry: sure.geometry,
+        reduced_chi2: sure.reduced_chi2 / errors,
         noise_factor: errors.powf(-0.5),
-        spread,
+        spread: sure.spread,
         resolution,
         trials,
     }))

@@ -1,7 +1,7 @@
 //! Steps from the ends of all searches to the best geometry, through voxels, pixels and sums along rays as fine as the data ask
 //! for.
 
-use super::detail::{Detail, Sure, Trial};
+use super::detail::{Detail, Detailed, Sure, Trial};
 use super::posterior::{Resampled, polished, surely};
 use super::search_data::SearchData;
 use crate::fit::geometry::{Free, Geometry, GeometryProblem, Polished, TrialWatch};
@@ -81,7 +81,7 @@ impl Detail<'_> {
         first: Place,
         trials: &mut [Trial],
         watch: &mut TrialWatch<'_>,
-    ) -> Result<Option<(Sure, f64, Resolution)>> {
+    ) -> Result<Option<Detailed>> {
         let ends: Vec<Geometry> = trials.iter().map(|trial| trial.end).collect();
         let Some(near) = self.each(&first, None, &ends, watch)? else { return Ok(None) };
         let mut best = (first, near);
@@ -109,7 +109,7 @@ impl Detail<'_> {
         let errors = (self.scale)(best.reduced / place.errors);
         let place = Place { errors, ..place };
         let sure = self.sure(&place, &best)?;
-        Ok(Some((sure, errors, place.at)))
+        Ok(Some(Detailed { sure, errors, resolution: place.at }))
     }
 
     /// Whether pixels may be means over several rays: those of images that another model has made.
@@ -214,13 +214,10 @@ impl Detail<'_> {
     fn sure(&self, place: &Place, best: &Stepped) -> Result<Sure> {
         let resampled: Resampled<'_> = Some((&place.seen, self.unknown, &place.view));
         let about = best.geometry();
-        let (spread, reduced, geometry) = self.smoothly(place, about, |problem| {
+        let sure = self.smoothly(place, about, |problem| {
             let (polished, reduced) = polished(problem, &best.polished.best)?;
-            let spread = surely(problem, resampled, &polished, reduced)?;
-            let geometry = spread.as_ref().map_or(polished.best.geometry, |spread| spread.geometry);
-            Ok((spread, reduced, geometry))
+            surely(problem, resampled, &polished, reduced)
         })?;
-        let Some(spread) = spread else { return Ok((None, reduced, geometry)) };
-        Ok((Some(self.beside_its_own(place, (spread, reduced))?), reduced, geometry))
+        self.beside_its_own(place, sure)
     }
 }
