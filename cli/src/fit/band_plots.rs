@@ -6,8 +6,11 @@ use kerrlight_tomo::recovery::results::BandResults;
 /// Values with their probabilities.
 type Shares = [[f64; 2]];
 
+/// The shares of a quantity.
+type SharesOf = fn(&BandResults) -> &Shares;
+
 /// What probabilities are told of: where they are, words, unit.
-const QUANTITIES: [(fn(&BandResults) -> &Shares, &str, &str); 4] = [
+const QUANTITIES: [(SharesOf, &str, &str); 4] = [
     (|of| &of.inclinations, INCLINATION, "degrees"),
     (
         |of| &of.position_angle_deg.probabilities,

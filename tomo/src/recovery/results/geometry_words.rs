@@ -154,7 +154,7 @@ impl GeometryResults {
     fn rival(&self) -> Option<String> {
         let elsewhere = self.trials.iter().filter(|trial| !trial.same);
         let nearest = elsewhere.min_by(|a, b| a.above_best.total_cmp(&b.above_best))?;
-        if !(nearest.above_best < ALIKE) {
+        if nearest.above_best.is_nan() || nearest.above_best >= ALIKE {
             return None;
         }
         let value = |(parameter, value): (&Parameter, &f64)| {
