@@ -1,10 +1,22 @@
 //! What searches hand on to one another.
 
-use super::steps::Resolution;
 use crate::fit::geometry::{Geometry, Spread};
 use crate::fit::journal::Memory;
 use crate::fit::settings::{FitFile, UnknownGeometry};
 use crate::fit::setup::FitData;
+
+/// Resolution at which geometries are compared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resolution {
+    /// Voxels along each axis.
+    pub nodes: usize,
+    /// Pixels along each side.
+    pub pixels: usize,
+    /// Rays along each side of a pixel of images, which is their mean.
+    pub rays: usize,
+    /// Panels of a ray for each of the coarsest.
+    pub panels: u32,
+}
 
 /// Where one search ended, in [`Geometry`]'s units.
 #[derive(Clone, Debug)]

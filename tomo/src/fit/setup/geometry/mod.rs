@@ -9,10 +9,9 @@ mod search_data;
 mod steps;
 mod tangent;
 
-pub use detail::Trial;
+pub use detail::{Resolution, Trial};
 pub use posterior::GeometryPosterior;
 pub use search::{FoundGeometry, SearchWatch, find_geometry};
-pub use steps::Resolution;
 
 use super::instrument::ring;
 use super::{FitData, Instrument, Result, axis, motion, spacing};

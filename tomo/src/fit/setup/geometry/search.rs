@@ -1,9 +1,8 @@
 //! The search for a geometry: from many starts with coarse voxels, then with fine ones.
 
-use super::detail::{Detail, Detailed, Trial};
+use super::detail::{Detail, Detailed, Resolution, Trial};
 use super::fine::{PART, nearer};
 use super::search_data::SearchData;
-use super::steps::Resolution;
 use super::tangent::Anchor;
 use crate::fit::geometry::{
     Estimate, Exploration, Explored, Geometry, GeometryProblem, Spread, TrialWatch,

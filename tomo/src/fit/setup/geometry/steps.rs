@@ -1,7 +1,7 @@
 //! Steps from the ends of all searches to the best geometry, through voxels, pixels and sums along rays as fine as the data ask
 //! for.
 
-use super::detail::{Detail, Detailed, Sure, Trial};
+use super::detail::{Detail, Detailed, Resolution, Sure, Trial};
 use super::posterior::{Resampled, polished, surely};
 use super::search_data::SearchData;
 use crate::fit::geometry::{Free, Geometry, GeometryProblem, Polished, TrialWatch};
@@ -9,19 +9,6 @@ use crate::fit::linear::Voxels;
 use crate::fit::settings::SearchView;
 use crate::fit::setup::{Result, spacing};
 use kerrlight_vlbi::operator::Pulse;
-
-/// What geometries are compared through.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Resolution {
-    /// Voxels along each axis.
-    pub nodes: usize,
-    /// Pixels along each side.
-    pub pixels: usize,
-    /// Rays along each side of a pixel of images, which is their mean.
-    pub rays: usize,
-    /// Panels of a ray for each of the coarsest.
-    pub panels: u32,
-}
 
 /// Voxels, and pixels of visibilities, of a finer model over those of a search, along each side.
 const FINER: f64 = 1.5;
