@@ -1,4 +1,4 @@
-//! From an experiment to its cases: every combination of levels and seeds.
+//! Cases of an experiment: every combination of levels and seeds.
 
 use super::experiment::Experiment;
 use super::labels::called;
@@ -18,12 +18,12 @@ pub struct Case {
     pub seed: u64,
 }
 
-/// How a case ended.
+/// Status of a case.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Status<R = serde_json::Value> {
-    /// With these results.
+    /// It ended with these results.
     Done(R),
-    /// With this message.
+    /// It failed with this message.
     Failed(String),
     /// It has not been run, or was interrupted.
     Open,
@@ -46,7 +46,7 @@ impl Case {
         self.recipe.table(self.at(), self.seed).ok()
     }
 
-    /// What is wrong with its settings.
+    /// Returns the error in its settings.
     pub fn error(&self) -> Option<&str> {
         self.recipe.error(self.at())
     }
@@ -87,7 +87,7 @@ impl Case {
         self.levels().find(|(name, _)| *name == factor).map(|(_, level)| level)
     }
 
-    /// Where its level of a factor is on an axis of numbers.
+    /// Returns the place of its level of a factor on an axis of numbers.
     pub fn number(&self, factor: &str) -> Option<f64> {
         self.recipe.levels(self.at()).find(|(name, _)| *name == factor)?.1.number
     }
@@ -155,7 +155,7 @@ pub fn find(
     })
 }
 
-/// What settings of all cases are made of, and the number of seeds.
+/// Returns the recipe of the settings of all cases, and the number of seeds.
 fn recipe(
     experiment: &Experiment,
     source: &Source,
@@ -245,7 +245,7 @@ mod tests {
         assert_eq!(table(&cases[2])["seed"].as_integer(), Some(3));
     }
 
-    /// Of settings in which the seed stands once, several times and not at all.
+    /// Settings in which the seed stands once, several times and not at all.
     #[test]
     fn exact_ids_end_in_checksums_of_settings() {
         for set in [vec![], vec!["title=seed 2".to_owned()], vec!["seed=7".to_owned()]] {
@@ -257,7 +257,7 @@ mod tests {
         }
     }
 
-    /// Of 40 × 40 combinations each level is checked once, and the others when they are run.
+    /// Each level of 40 × 40 combinations is checked once, and the others when they are run.
     #[test]
     fn exact_each_level_of_many_combinations_is_checked() {
         let values = (1..=40).map(|k| if k == 40 { "-1".to_owned() } else { k.to_string() });

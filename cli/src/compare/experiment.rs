@@ -1,4 +1,4 @@
-//! What an experiment's file may say.
+//! Keys of an experiment's file.
 
 use super::labels::{ONE_CHI2, RESULTS};
 use crate::fit::posterior::{RANKED, WITHIN};
@@ -18,14 +18,14 @@ static KEYS: LazyLock<Keys> = LazyLock::new(Keys::of::<Experiment>);
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
-    /// In a few words.
+    /// Title, in a few words.
     pub title: String,
-    /// What is asked.
+    /// Question of the experiment.
     pub question: String,
-    /// What was simulated, how it was fitted and where settings come from, paragraph by paragraph.
+    /// Setup: what was simulated, how it was fitted and where settings come from, paragraph by paragraph.
     #[serde(default)]
     pub setup: Vec<String>,
-    /// How to read what was measured, paragraph by paragraph.
+    /// Reading of the results, paragraph by paragraph.
     #[serde(default)]
     pub reading: Vec<String>,
     /// Seeds 1 to this are run of every case.
@@ -40,10 +40,10 @@ pub struct Experiment {
     #[serde(default)]
     #[schemars(with = "std::collections::BTreeMap<String, schemars::Schema>")]
     pub set: Table,
-    /// What `--quick` changes.
+    /// Changes of `--quick`.
     #[serde(default)]
     pub quick: Quick,
-    /// What the cases differ in.
+    /// Factors in which the cases differ.
     #[serde(default)]
     pub factor: Vec<Factor>,
     /// Combinations of levels, by the factors' names, that are left out.
@@ -57,7 +57,7 @@ pub struct Experiment {
     pub figure: Vec<FigureAsked>,
 }
 
-/// What `--quick` changes: a look at whether an experiment runs, not a measurement.
+/// Changes of `--quick`: a look at whether an experiment runs, not a measurement.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Quick {
@@ -82,7 +82,7 @@ pub struct Quick {
 pub struct Factor {
     /// Its name.
     pub name: String,
-    /// What it may be.
+    /// Its levels.
     #[serde(default)]
     pub level: Vec<Level>,
     /// Instead of levels: a setting with dots ...
@@ -95,13 +95,13 @@ pub struct Factor {
     pub scale: Option<f64>,
 }
 
-/// What a factor may be.
+/// Level of a factor.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Level {
     /// Its name.
     pub name: String,
-    /// Where it is on an axis of numbers.
+    /// Its place on an axis of numbers.
     pub number: Option<f64>,
     /// The fit that these cases change.
     pub fit: Option<PathBuf>,
@@ -121,11 +121,11 @@ pub const QUALITIES: [&str; 4] = ["psnr_db", "psnr_inside_db", "correlation", "a
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TableAsked {
-    /// What it shows.
+    /// Title.
     pub title: String,
-    /// What it says, for someone who has not read the paper.
+    /// Caption, for someone who has not read the paper.
     pub caption: String,
-    /// Which result.
+    /// Name of the result.
     pub value: String,
     /// Factors of the rows.
     pub rows: Vec<String>,
@@ -146,7 +146,7 @@ pub struct TableAsked {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Companion {
-    /// What they are, and whose.
+    /// Name of the numbers, and their source.
     pub name: String,
     /// One for each combination of the columns' levels, the last factor fastest; NaN where there is none.
     #[schemars(with = "Vec<schemars::Schema>")]
@@ -159,9 +159,9 @@ pub struct Companion {
 pub struct FigureAsked {
     /// Which.
     pub kind: FigureKind,
-    /// What it shows.
+    /// Title.
     pub title: String,
-    /// What it says.
+    /// Caption.
     pub caption: String,
     /// Factors of the rows, or of the curves.
     #[serde(default)]
@@ -169,15 +169,15 @@ pub struct FigureAsked {
     /// Factors of the columns; of a curve or map, of the axis to the right.
     #[serde(default)]
     pub columns: Vec<String>,
-    /// Which result.
+    /// Name of the result.
     pub value: Option<String>,
-    /// Whether volumes have a row for every seed, not for the first one alone.
+    /// True if volumes have a row for every seed, not for the first one alone.
     #[serde(default)]
     pub every_seed: bool,
     /// Azimuth and elevation from which volumes are seen, degrees; along the true axis without it.
     pub view: Option<[f64; 2]>,
-    /// Which part of the movie has passed when volumes are shown, carried along from the reference time; at the
-    /// reference time itself without it.
+    /// Part of the movie that has passed when volumes are shown, carried along from the reference time; at the reference
+    /// time itself without it.
     #[schemars(range(min = 0.0, max = 1000.0), extend("unit" = "lengths of the movie"))]
     pub later: Option<f64>,
     /// Levels of the other factors.
@@ -205,7 +205,8 @@ pub enum FigureKind {
     Coverage,
     /// Angular velocities: what was simulated and what was assumed.
     Velocities,
-    /// What light curves say of inclination, position angle, radius and period, a curve for each case of the first seed.
+    /// Probabilities of inclination, position angle, radius and period from light curves, a curve for each case of the
+    /// first seed.
     Geometries,
     /// Loops in Q and U of data and model, a plot for each case of the first seed.
     Loops,

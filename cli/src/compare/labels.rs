@@ -1,4 +1,4 @@
-//! What results, levels and numbers are called, and how they are written.
+//! Names of results, levels and numbers, and how they are written.
 
 use kerrlight_tomo::recovery::results::HeldOutResults;
 use serde::Deserialize;
@@ -108,7 +108,7 @@ pub const RESULTS: [(&str, &str, &str, usize); 80] = [
 /// χ² of one kind of data among several: `chi2.closure-phases`.
 pub const ONE_CHI2: &str = "chi2.";
 
-/// What a result is called with its unit, and its digits.
+/// Returns the name of a result with its unit, and its digits.
 pub fn described(value: &str) -> (String, usize) {
     match RESULTS.iter().find(|(key, ..)| *key == value) {
         Some((_, name, "", digits)) => ((*name).to_owned(), *digits),
@@ -152,7 +152,7 @@ pub fn combinations<'e>(levels: &'e [(String, Vec<String>)]) -> Vec<Vec<(&'e str
     })
 }
 
-/// What a combination is called: levels, with the factor's name before a number.
+/// Returns the name of a combination: levels, with the factor's name before a number.
 pub fn called(levels: &[(&str, &str)]) -> String {
     let one = |(factor, level): &(&str, &str)| match level.parse::<f64>() {
         Ok(_) => format!("{factor} {level}"),
@@ -166,7 +166,7 @@ pub fn pairs(map: &BTreeMap<String, String>) -> Vec<(&str, &str)> {
     map.iter().map(|(factor, level)| (factor.as_str(), level.as_str())).collect()
 }
 
-/// Whether a case explains its data, in a word or two.
+/// Returns whether a case explains its data, in a word or two.
 pub fn verdict_of(results: &Value) -> &'static str {
     match results["verdict"]["outcome"].as_str() {
         Some("explained") => "yes",

@@ -1,4 +1,4 @@
-//! What there is to run, as text and as JSON.
+//! List of the cases, as text and as JSON.
 
 use super::cases::Case;
 use super::runner::TOGETHER;

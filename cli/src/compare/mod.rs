@@ -184,7 +184,7 @@ impl Compare {
         words
     }
 
-    /// What is asked for: by an experiment, or by a folder in which one was begun.
+    /// Returns what is asked for: by an experiment, or by a folder in which one was begun.
     fn asked(&self, name: &Path, program: &Program) -> anyhow::Result<Asked> {
         let begun = if name.is_dir() { Plan::load(name)? } else { None };
         let (plan, text, folder) = match begun {
@@ -250,7 +250,7 @@ impl Compare {
     }
 }
 
-/// What is asked for, and where the results go.
+/// Cases that are asked for, and the folder of their results.
 struct Asked {
     plan: Plan,
     text: String,
@@ -321,7 +321,7 @@ fn end(tables: &str, summary: &Summary, folder: &Path, is_early: bool) -> Answer
     }
 }
 
-/// Why the command fails, where cases are not done or failed.
+/// Returns the error of a command whose cases are not done or failed.
 fn failure(summary: &Summary, folder: &Path) -> Option<anyhow::Error> {
     if summary.open() > 0 {
         let (open, folder) = (summary.open(), folder.display());

@@ -44,7 +44,7 @@ pub fn run(case: &Case, runner: &Runner<'_>, folder: &Path) -> anyhow::Result<An
     }
 }
 
-/// Why a case has failed when it was run last.
+/// Returns the reason why a case failed when it was run last.
 pub fn failure(folder: &Path, case: &Case) -> Option<String> {
     output::read_text(&failure_of(folder, case)).ok()
 }

@@ -1,4 +1,4 @@
-//! What a comparison leaves: results, tables, pictures and one page of them.
+//! Results of a comparison: tables, pictures and one page of them.
 
 use super::cases::{Case, Status};
 use super::experiment::Experiment;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// Most failures that the head of the page tells.
 const TOLD: usize = 20;
 
-/// Where the results are, beside the pictures.
+/// Returns the files of the results, beside the pictures.
 pub fn files(folder: &Path) -> Vec<PathBuf> {
     ["report.html", "results.json", "results.csv", "tables.md"]
         .map(|name| folder.join(name))
@@ -23,11 +23,11 @@ pub fn files(folder: &Path) -> Vec<PathBuf> {
 
 /// All that a page is made of.
 pub struct Page<'a> {
-    /// What was asked.
+    /// Experiment.
     pub experiment: &'a Experiment,
-    /// What of it was run, and how.
+    /// Choice of cases that were run.
     pub choice: &'a Choice,
-    /// What was found.
+    /// Summary of the results.
     pub summary: &'a Summary<'a>,
 }
 
@@ -91,7 +91,7 @@ impl Page<'_> {
         Ok(text)
     }
 
-    /// What ran, and what the experiment asks for.
+    /// Returns the tables: what ran, and what the experiment asks for.
     fn tables(&self) -> Vec<Table> {
         let Page { experiment, summary, .. } = self;
         let asked = experiment.table.iter();
@@ -99,7 +99,7 @@ impl Page<'_> {
         std::iter::once(ran::table(summary)).chain(asked).collect()
     }
 
-    /// What tables.md and the terminal say of a quick look.
+    /// Returns the heading of tables.md and of the terminal, of a quick look.
     fn heading(&self) -> String {
         if !self.choice.quick {
             return String::new();
@@ -108,7 +108,7 @@ impl Page<'_> {
         format!("# {}\n\n{}\n\n", plain::line(&self.experiment.title), notice.text.join("\n\n"))
     }
 
-    /// What came out, how to read it, how it was measured.
+    /// Returns the parts of the page: results, how to read them, how they were measured.
     fn parts(&self, left_out: Vec<String>) -> Vec<Part> {
         let Page { experiment, choice, summary } = self;
         let part = |heading: &str, text: Vec<String>| Part { heading: heading.to_owned(), text };
@@ -146,7 +146,7 @@ impl Page<'_> {
         std::iter::once(caution).chain(experiment.setup.iter().cloned()).collect()
     }
 
-    /// What was asked, what was run.
+    /// Describes the question, and what was run.
     fn sentences(&self) -> Vec<String> {
         let Page { experiment, summary, .. } = self;
         let mut lines = vec![format!("What was asked: {}", experiment.question)];

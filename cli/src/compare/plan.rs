@@ -1,4 +1,4 @@
-//! What a folder of results was begun with: whoever joins runs the same cases, from any current folder.
+//! Plan in a folder of results: whoever joins runs the same cases, from any current folder.
 
 use super::recipe::Choice;
 use super::source::Source;
@@ -19,19 +19,19 @@ pub const FILE: &str = "plan.json";
 /// The experiment's own text beside it.
 pub const EXPERIMENT: &str = "experiment.toml";
 
-/// What another process does in the folder.
+/// Words for another process in the folder.
 pub const BUSY: &str = "compares in";
-/// For how long somebody who begins in a folder that is there may take.
+/// Longest time that somebody who begins in a folder that is there may take.
 const BEGINNING: Duration = Duration::from_secs(5);
 
-/// Which cases of which experiment are run, and how.
+/// Cases of an experiment, and how they are run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// Version of the program.
     version: String,
-    /// Where paths in the experiment start from; none for one that the program carries.
+    /// Folder from which paths in the experiment start; none for one that the program carries.
     base: Option<PathBuf>,
-    /// As on the command line.
+    /// Seeds on the command line.
     seeds: Option<u64>,
     only: Vec<String>,
     quick: bool,
@@ -40,7 +40,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Of a command line.
+    /// Takes the plan of a command line.
     pub fn new(source: &Source, choice: &Choice) -> anyhow::Result<Self> {
         let base = match source {
             Source::BuiltIn => None,
@@ -57,7 +57,7 @@ impl Plan {
         })
     }
 
-    /// Of a folder, with the text of the experiment; nothing if no comparison was begun there.
+    /// Reads the plan in a folder, with the text of the experiment; nothing if no comparison was begun there.
     pub fn load(folder: &Path) -> anyhow::Result<Option<(Self, String)>> {
         let path = folder.join(FILE);
         if !path.is_file() {
@@ -83,12 +83,12 @@ impl Plan {
         Self { version: env!("CARGO_PKG_VERSION").to_owned(), ..self }
     }
 
-    /// Where its experiment's files are.
+    /// Returns the source of its experiment's files.
     pub fn source(&self) -> Source {
         self.base.clone().map_or(Source::BuiltIn, Source::Folder)
     }
 
-    /// Which cases are run.
+    /// Returns the choice of cases.
     pub fn choice(&self, registry: &Registry) -> Choice {
         Choice {
             seeds: self.seeds,
@@ -174,7 +174,7 @@ fn begin_within(plan: &Plan, experiment: &str, folder: &Path) -> anyhow::Result<
     Ok(())
 }
 
-/// Whether there is something in a folder that no comparison leaves there before its plan.
+/// Returns whether there is something in a folder that no comparison leaves there before its plan.
 fn is_foreign(folder: &Path) -> bool {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let names: Vec<_> = entries.map(|entry| entry.file_name()).collect();
@@ -222,7 +222,7 @@ mod tests {
         assert_eq!(fs::read_dir(at.path().join("a")).unwrap().count(), 30);
     }
 
-    /// Of two that want different cases one is refused.
+    /// One of two plans with different cases is refused.
     #[test]
     fn exact_one_plan_wins() {
         let at = tempfile::tempdir().unwrap();

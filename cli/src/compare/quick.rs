@@ -3,7 +3,7 @@
 use super::experiment::Experiment;
 use crate::report::{Notice, Tone};
 
-/// What stands in the heading, on every table and on every picture.
+/// Words in the heading, on every table and on every picture.
 pub const WORDS: &str = "Quick look, not a result";
 
 /// An experiment without all that its full settings would be needed for: texts that speak of those settings, numbers
@@ -27,7 +27,7 @@ pub fn look(experiment: &Experiment) -> (Experiment, Vec<String>) {
     (look, left.collect())
 }
 
-/// What stands first on the page.
+/// Returns the notice at the top of the page.
 pub fn notice() -> Notice {
     Notice {
         tone: Tone::Bad,

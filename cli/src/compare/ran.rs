@@ -1,4 +1,4 @@
-//! What cases need and what they can give, from their settings; what really ran.
+//! Requirements and results of cases, from their settings; and what really ran.
 
 use super::cases::{Case, without_seeds};
 use super::experiment::{Experiment, FigureKind, QUALITIES, TableAsked};
@@ -82,7 +82,7 @@ fn counted(values: impl Iterator<Item = (String, usize)>) -> String {
     }
 }
 
-/// What the cases that came to their end ran with; of all cases, where there are none.
+/// Returns the table of what the cases that came to their end ran with; of all cases, where there are none.
 pub fn table(summary: &Summary) -> Table {
     let done: Vec<&Case> = summary.done().map(|(case, _)| case).collect();
     let cases: Vec<&Case> =
@@ -130,7 +130,7 @@ fn kinds(settings: &toml::Table) -> Vec<String> {
     all.map(str::to_owned).collect()
 }
 
-/// Why a fit with these settings has no such result.
+/// Explains why a fit with these settings has no such result.
 fn missing(settings: &toml::Table, value: &str) -> Option<String> {
     let kinds = kinds(settings);
     let is_beside_truth = QUALITIES.contains(&value) || value == "nrmse";

@@ -1,4 +1,4 @@
-//! What settings of cases are made of. They are made when they are wanted: those of a hundred thousand cases would fill
+//! Recipes of the settings of cases. They are made when they are wanted: those of a hundred thousand cases would fill
 //! the memory, and to check each of them would take minutes.
 
 use super::experiment::{Experiment, Factor, Level};
@@ -14,14 +14,14 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use toml::{Table, Value};
 
-/// Which cases are run, and how.
+/// Choice of cases, and how they are run.
 #[derive(Clone, Default)]
 pub struct Choice {
     /// Seeds, in place of the experiment's.
     pub seeds: Option<u64>,
     /// `factor=level` that are kept.
     pub only: Vec<String>,
-    /// Whether the experiment's quick settings are used.
+    /// True if the experiment's quick settings are used.
     pub quick: bool,
     /// `key=value` for all cases.
     pub set: Vec<String>,
@@ -30,7 +30,7 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// Whether some cases are left out.
+    /// Returns whether some cases are left out.
     pub fn is_restricted(&self) -> bool {
         self.seeds.is_some() || !self.only.is_empty()
     }
@@ -41,12 +41,12 @@ impl Choice {
     }
 }
 
-/// What the settings of all cases are made of.
+/// Recipe of the settings of all cases.
 pub struct Recipe {
     experiment: Experiment,
     source: Source,
     choice: Choice,
-    /// Of each factor.
+    /// Levels of each factor.
     levels: Vec<Vec<Level>>,
     /// Names of levels as a file system likes them.
     words: Vec<Vec<String>>,
@@ -59,10 +59,10 @@ pub struct Recipe {
 struct Variant {
     /// The level of each factor, by number.
     chosen: Box<[u32]>,
-    /// Whether one of its levels is in none of those before.
+    /// True if one of its levels is in none of those before.
     is_new: bool,
     stamp: OnceLock<Stamp>,
-    /// What is wrong with its settings.
+    /// Error in its settings.
     error: OnceLock<Option<String>>,
     cost: OnceLock<f64>,
 }
@@ -70,7 +70,7 @@ struct Variant {
 /// Combinations that are all checked before any is run; of more, each level is checked once.
 const CHECKED: usize = 1000;
 
-/// What checksums of settings with any seed follow from.
+/// Stamp from which checksums of settings with any seed follow.
 enum Stamp {
     /// CRC-32 and length of the text before the seed, and of the text behind it.
     Around([(u32, u64); 2]),
@@ -82,7 +82,7 @@ enum Stamp {
 const MARK: u64 = 4_203_716_935_288_541_207;
 
 impl Recipe {
-    /// Of the combinations that are left of all: these levels (`factor=level`), without those that are skipped.
+    /// Takes the combinations that are left of all: these levels (`factor=level`), without those that are skipped.
     pub fn new(
         experiment: &Experiment,
         source: &Source,
@@ -117,7 +117,7 @@ impl Recipe {
         Ok(recipe)
     }
 
-    /// Whether a combination is kept and not skipped.
+    /// Returns whether a combination is kept and not skipped.
     fn is_wanted(&self, chosen: &[u32], kept: &Kept) -> bool {
         let factors = &self.experiment.factor;
         let of = |factor: &str| {
@@ -131,7 +131,7 @@ impl Recipe {
         !is_skipped && kept.iter().all(is_kept)
     }
 
-    /// How many combinations there are.
+    /// Returns the number of combinations.
     pub fn len(&self) -> usize {
         self.variants.len()
     }
@@ -168,7 +168,7 @@ impl Recipe {
         (0..self.len()).filter(is_it)
     }
 
-    /// What is wrong with the settings of a combination.
+    /// Returns the error in the settings of a combination.
     pub fn error(&self, variant: usize) -> Option<&str> {
         let error = &self.variants[variant].error;
         let check = || self.check(variant).err().map(|error| crate::plain::reasons(&error));
@@ -280,7 +280,7 @@ impl Variant {
 }
 
 impl Stamp {
-    /// Of settings with [`MARK`] as their seed.
+    /// Takes settings with [`MARK`] as their seed.
     fn of(text: &str) -> Self {
         let parts: Vec<&str> = text.split(&MARK.to_string()).collect();
         let sum = |part: &str| (crc32fast::hash(part.as_bytes()), part.len() as u64);

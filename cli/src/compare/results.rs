@@ -1,4 +1,4 @@
-//! What pages show of the results of a case: numbers, a small part of its results.json.
+//! Results of a case on pages: numbers, a small part of its results.json.
 
 use super::labels::{ONE_CHI2, RESULTS, result, verdict_of};
 use serde_json::Value;
@@ -6,16 +6,16 @@ use serde_json::Value;
 /// Numbers of a case by their names, and its verdict.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Results {
-    /// By their places in [`RESULTS`].
+    /// Numbers by their places in [`RESULTS`].
     numbers: Vec<(u8, f64)>,
     /// χ² of each kind of data.
     chi2: Vec<(String, f64)>,
-    /// Whether the case explains its data, in a word or two.
+    /// Verdict: whether the case explains its data, in a word or two.
     pub verdict: &'static str,
 }
 
 impl Results {
-    /// Of the results of a fit.
+    /// Takes the results of a fit.
     pub fn of(results: &Value) -> Self {
         let known = RESULTS.iter().enumerate();
         let number = |(k, (key, ..)): (usize, &(&str, _, _, _))| {
@@ -42,7 +42,7 @@ impl Results {
         self.number(RESULTS.iter().position(|(key, ..)| *key == value)?)
     }
 
-    /// That of a place in [`RESULTS`].
+    /// Returns the number of a place in [`RESULTS`].
     pub fn number(&self, place: usize) -> Option<f64> {
         self.numbers.iter().find(|(k, _)| usize::from(*k) == place).map(|(_, x)| *x)
     }

@@ -35,7 +35,7 @@ pub const TOGETHER: usize = 1024;
 pub const CASES: &str = "cases";
 
 impl<'a> Runner<'a> {
-    /// In `cases` of this folder, whose lock is held by those who run any.
+    /// Runs in `cases` of this folder, whose lock is held by those who run any.
     pub fn new(
         folder: &Path,
         (threads, memory): (Option<u16>, Option<u64>),
@@ -53,7 +53,7 @@ impl<'a> Runner<'a> {
         self.folder.join(case.slug())
     }
 
-    /// What is known of a case without running it.
+    /// Returns the status of a case without running it.
     pub fn known(&self, case: &Case) -> Status {
         let run = &self.run_of(case);
         match results(run) {
@@ -180,30 +180,31 @@ fn wait(mut child: Child, keeper: &SignalGuard) -> anyhow::Result<ExitStatus> {
     }
 }
 
-/// Where the messages of a run go: beside it.
+/// Returns the path of the messages of a run: beside it.
 fn said(run: &Path) -> PathBuf {
     let mut name = run.as_os_str().to_owned();
     name.push(".txt");
     name.into()
 }
 
-/// Whether a fit has ended because a signal told it to, which may reach it before it reaches this process.
+/// Returns whether a fit has ended because a signal told it to, which may reach it before it reaches this
+/// process.
 fn was_told(status: ExitStatus) -> bool {
     status.code().is_some_and(|code| matches!(code, 129 | 130 | 143))
 }
 
-/// What a run has found, if it has come so far, and whether that is as it was written.
+/// Returns the results of a run, if it has come so far, and whether they are as they were written.
 fn results(run: &Path) -> Option<(Value, bool)> {
     let text = output::read_text(&run.join("results.json")).ok()?;
     Some((serde_json::from_str(&text).ok()?, is_whole(&text)))
 }
 
-/// Whether results are of this version of the program: another may find something else.
+/// Returns whether results are of this version of the program: another may find something else.
 fn is_ours(results: &Value) -> bool {
     results["version"] == env!("CARGO_PKG_VERSION")
 }
 
-/// What a process that did not succeed has said at last.
+/// Returns the last words of a process that did not succeed.
 fn failure(status: ExitStatus, said: &str) -> String {
     let last = said.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or_default();
     #[cfg(unix)]

@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use toml::Table;
 
-/// Where an experiment and the fits that it names are read from.
+/// Source of an experiment and of the fits that it names.
 #[derive(Debug, Clone)]
 pub enum Source {
     /// Those that the program carries.

@@ -1,4 +1,4 @@
-//! How the cases of a folder stand: done, running, failed and open.
+//! Status of the cases of a folder: done, running, failed and open.
 
 use super::cases::Case;
 use super::one;
@@ -15,7 +15,7 @@ use std::path::Path;
 /// Failed cases that are named.
 const NAMED: usize = 10;
 
-/// How a case stands.
+/// State of a case.
 enum State {
     Done,
     Running,
@@ -80,7 +80,7 @@ pub fn show(folder: &Path, cases: &[Case]) -> anyhow::Result<Answer> {
         .with("failed", failed.iter().map(told).collect::<Vec<Value>>()))
 }
 
-/// Of a folder in which nothing was begun.
+/// Returns the error of a folder in which nothing was begun.
 pub fn no_comparison(folder: &Path) -> anyhow::Error {
     anyhow!("{} holds no comparison: there is no {} in it", folder.display(), super::plan::FILE)
 }

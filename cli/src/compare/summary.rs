@@ -1,4 +1,4 @@
-//! What the cases of an experiment gave: all of them, and means over seeds.
+//! Summary of the cases of an experiment: all of them, and means over seeds.
 
 use super::cases::{Case, Status};
 use super::labels::{RESULTS, described, number};
@@ -13,15 +13,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Cases and how they ended.
 pub struct Summary<'a> {
-    /// In the order of the cases.
+    /// Cases in their order.
     pub all: Vec<(&'a Case, Status<Results>)>,
-    /// How many seeds there are.
+    /// Number of seeds.
     pub seeds: u64,
-    /// By the factors, by number, that cases are grouped by.
+    /// Groups of cases, by the factors, by number, that they are grouped by.
     groups: Mutex<BTreeMap<Vec<usize>, Arc<Groups>>>,
 }
 
-/// Which cases are at the same levels of some factors, by those levels.
+/// Cases at the same levels of some factors, by those levels.
 type Groups = HashMap<Vec<u32>, Vec<usize>>;
 
 /// The best and the worst case by one result.
@@ -60,12 +60,12 @@ pub struct Spread {
     pub mean: f64,
     /// Standard deviation of one, 0 for a single case.
     pub deviation: f64,
-    /// How many.
+    /// Number of values.
     pub count: usize,
 }
 
 impl Spread {
-    /// Of these values; nothing of none.
+    /// Summarises these values; nothing of none.
     pub fn of(values: &[f64]) -> Option<Self> {
         let count = values.len();
         if count == 0 {
@@ -87,13 +87,14 @@ impl Spread {
 }
 
 impl<'a> Summary<'a> {
-    /// Of these cases.
+    /// Takes these cases.
     pub fn new(all: Vec<(&'a Case, Status<Results>)>) -> Self {
         let seeds = all.iter().map(|(case, _)| case.seed).max().unwrap_or(1);
         Summary { all, seeds, groups: Mutex::default() }
     }
 
-    /// Of these cases, whose settings and results are written for other programs as they are read.
+    /// Takes these cases, whose settings and results are written for other programs as they are
+    /// read.
     pub fn written(
         cases: &'a [Case],
         status: impl Fn(&Case) -> Status + Sync,
@@ -123,7 +124,7 @@ impl<'a> Summary<'a> {
         Ok(Self::new(all))
     }
 
-    /// Which seeds a plot shows.
+    /// Names the seeds that a plot shows.
     pub fn seeds_told(&self) -> String {
         if self.seeds == 1 { "One seed.".to_owned() } else { format!("All {} seeds.", self.seeds) }
     }
@@ -139,7 +140,7 @@ impl<'a> Summary<'a> {
         group.into_iter().filter_map(|k| done(&self.all[k])).collect()
     }
 
-    /// Whether any case, done or not, is at a level.
+    /// Returns whether any case, done or not, is at a level.
     pub fn has(&self, factor: &str, level: &str) -> bool {
         self.group(&[(factor, level)]).is_some()
     }
@@ -180,12 +181,12 @@ impl<'a> Summary<'a> {
         })
     }
 
-    /// How many have not been run to their end.
+    /// Returns the number of cases that have not been run to their end.
     pub fn open(&self) -> usize {
         self.all.iter().filter(|(_, status)| *status == Status::Open).count()
     }
 
-    /// How many cases are done, and what the best and the worst of them have reached.
+    /// Describes how many cases are done, and the best and the worst of their results.
     pub fn worth(&self) -> String {
         let done = format!("{} of {} cases done", self.done().count(), self.all.len());
         self.extremes().map_or(done.clone(), |extremes| format!("{done}; {}", extremes.sentence()))
@@ -238,7 +239,7 @@ fn done<'s>((case, status): &'s (&Case, Status<Results>)) -> Option<(&'s Case, &
     }
 }
 
-/// How a case stands, in a word.
+/// Names the status of a case, in a word.
 fn word<R>(status: &Status<R>) -> &'static str {
     match status {
         Status::Done(_) => "done",
@@ -274,7 +275,7 @@ fn entry(case: &Case, status: &Status) -> Value {
     entry
 }
 
-/// Whether a case is at all of these levels.
+/// Returns whether a case is at all of these levels.
 pub fn is_at(case: &Case, levels: &[(&str, &str)]) -> bool {
     levels.iter().all(|(factor, level)| case.level(factor) == Some(level))
 }

@@ -22,9 +22,9 @@ pub fn levels(
     factors.iter().map(of).collect()
 }
 
-/// What a table shows at some levels.
+/// Cell of a table at some levels.
 pub struct Cell {
-    /// Over seeds.
+    /// Spread over seeds.
     pub spread: Spread,
     /// The best level, where a table asks for it.
     best: Option<String>,
@@ -49,7 +49,7 @@ impl Cell {
         all.max_by(|a, b| a.spread.mean.total_cmp(&b.spread.mean))
     }
 
-    /// As it stands in a table.
+    /// Returns its text in a table.
     pub fn text(&self, digits: usize) -> String {
         let best = self.best.as_ref().map(|level| format!(" ({level})"));
         [self.spread.text(digits), best.unwrap_or_default()].concat()
@@ -110,7 +110,7 @@ pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> 
     }
 }
 
-/// What stands where there is no number.
+/// Text where there is no number.
 const NONE: &str = "–";
 
 /// A row of numbers from elsewhere, of the columns that are shown.
@@ -135,7 +135,7 @@ fn beside(
     std::iter::once(row.name.clone()).chain(columns.iter().map(cell)).collect()
 }
 
-/// What the levels of each factor change.
+/// Describes what the levels of each factor change.
 pub fn levels_told(experiment: &Experiment) -> Table {
     let mut rows = Vec::new();
     for factor in &experiment.factor {

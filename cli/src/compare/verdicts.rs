@@ -1,4 +1,4 @@
-//! What tables of qualities say, in sentences.
+//! Sentences on tables of qualities.
 
 use super::experiment::{Experiment, QUALITIES, TableAsked};
 use super::labels::{called, combinations, described, pairs};
@@ -34,7 +34,7 @@ impl Order {
     }
 }
 
-/// How many cases explain their data.
+/// Describes how many cases explain their data.
 pub fn of_all(summary: &Summary) -> Option<String> {
     let words: Vec<&str> = summary.done().map(|(_, results)| results.verdict).collect();
     let count = |word: &str| words.iter().filter(|other| **other == word).count();

@@ -1,4 +1,4 @@
-//! What comparisons need of fits: settings as text in, checks and what follows from them without a run out.
+//! Interface of fits to comparisons: settings as text in, checks and what follows from them without a run out.
 
 use super::data;
 use super::parse;
@@ -22,7 +22,7 @@ pub fn assigned(text: &str, assignment: &str) -> anyhow::Result<String> {
     apply_override(text, &long).with_context(|| format!("--set {assignment}"))
 }
 
-/// Whether settings make sense, as far as can be told without tracing rays.
+/// Checks that settings make sense, as far as can be told without tracing rays.
 pub fn check(changed: &Changed<'_>, registry: &Registry) -> anyhow::Result<()> {
     match Work::read_changed(changed)? {
         Work::Emission(file) => Ok(setup::check(&file, registry)?),

@@ -9,7 +9,7 @@ type Shares = [[f64; 2]];
 /// The shares of a quantity.
 type SharesOf = fn(&BandResults) -> &Shares;
 
-/// What probabilities are told of: where they are, words, unit.
+/// Quantities with probabilities: their place, words, unit.
 const QUANTITIES: [(SharesOf, &str, &str); 4] = [
     (|of| &of.inclinations, INCLINATION, "degrees"),
     (
@@ -52,7 +52,7 @@ fn line(name: &str, points: Vec<[f64; 2]>) -> Series {
     Series { name: name.to_owned(), points, errors: Vec::new(), marks: Marks::Joined }
 }
 
-/// Of axes in any direction, at the inclinations that were looked at.
+/// Returns the prior of axes in any direction, at the inclinations that were looked at.
 fn prior(at: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let weight = |[degrees, _]: &[f64; 2]| degrees.to_radians().sin().max(1e-6);
     let all: f64 = at.iter().map(weight).sum();

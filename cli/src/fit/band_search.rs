@@ -6,7 +6,7 @@ use anyhow::Context;
 use kerrlight_tomo::recovery::Choice;
 use kerrlight_tomo::recovery::results::BandResults;
 
-/// What was found, in the folder of the run.
+/// Name of the results in the folder of the run.
 pub const FILE: &str = "band.json";
 
 /// Returns what a run has found; none if it has not looked.

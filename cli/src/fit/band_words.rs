@@ -1,4 +1,4 @@
-//! What is said of a light curve and of a flare in a band: data, model, priors, and what may not be concluded.
+//! Words on a light curve and on a flare in a band: data, model, priors, and what may not be concluded.
 
 use crate::report::Part;
 use kerrlight_render::polarization::PolarizationLaw;

@@ -1,4 +1,4 @@
-//! How many of the closure quantities of the data a fit uses.
+//! Numbers of the closure quantities of the data that a fit uses.
 
 use kerrlight_tomo::fit::settings::{Loss, LossKind};
 use kerrlight_tomo::fit::setup::FitData;

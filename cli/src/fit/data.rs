@@ -117,7 +117,7 @@ fn images(file: &FitFile, path: &Path) -> anyhow::Result<WithSize> {
     }
 }
 
-/// Whether an array can be read image by image.
+/// Returns whether an array can be read image by image.
 fn is_in_c_order(path: &Path) -> anyhow::Result<bool> {
     Ok(numpy::Stream::new(BufReader::new(output::open(path)?)).is_ok())
 }

@@ -27,7 +27,7 @@ pub fn delegate(
     Ok(DeviceRunner::new(device, file.training.log_every, file.training.steps))
 }
 
-/// What is told when a device fails, after the checkpoint.
+/// Returns the message when a device fails, after the checkpoint.
 pub fn failed(error: DeviceError, folder: &Folder) -> anyhow::Error {
     let header = |bytes: Vec<u8>| checkpoint::header(&bytes).ok();
     let kept = folder.checkpoint().ok().flatten().and_then(header);
@@ -35,7 +35,7 @@ pub fn failed(error: DeviceError, folder: &Folder) -> anyhow::Error {
     anyhow!("{error}; step {step} is kept; {}", elsewhere(folder))
 }
 
-/// How to go on without the device.
+/// Explains how to go on without the device.
 fn elsewhere(folder: &Folder) -> String {
     format!("on the processor: kerrlight fit --resume {}", folder.path().display())
 }

@@ -6,12 +6,13 @@ use crate::interrupt::Interrupted;
 use kerrlight_tomo::Error;
 use kerrlight_tomo::recovery::Stopped;
 
-/// What went wrong.
+/// A failure of a fit.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Failed(String);
 
-/// What a fit ended with, as the program tells it: what was stopped says how it goes on.
+/// Returns the error with which a fit ended, as the program tells it: one that was stopped says how
+/// it goes on.
 pub fn told(error: anyhow::Error, folder: &Folder) -> anyhow::Error {
     match error.downcast::<Error>() {
         Ok(Error::Stopped(Stopped::Kept)) => Interrupted(folder.stopped()).into(),

@@ -26,7 +26,7 @@ pub struct Folder {
 pub const LOG: &str = "log.jsonl";
 pub const CHECKPOINT: &str = "checkpoint.safetensors";
 
-/// What another process does in a folder.
+/// Words for another process in a folder.
 const BUSY: &str = "fits in";
 
 impl Folder {
@@ -83,12 +83,12 @@ impl Folder {
         Ok((Self { path: path.to_owned(), inputs, _lock: lock }, text))
     }
 
-    /// Where it is.
+    /// Returns its path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What the run has read.
+    /// Returns the files that the run has read.
     pub fn inputs(&self) -> &Inputs {
         &self.inputs
     }
@@ -117,7 +117,7 @@ impl Folder {
         self.file(name)?.write(sealed(serde_json::to_value(found)?).as_bytes())
     }
 
-    /// What a search has kept in a file; none if it has not looked.
+    /// Reads the results of a search from a file; none if it has not looked.
     pub fn found<T: DeserializeOwned>(&self, name: &str) -> anyhow::Result<Option<Sealed<T>>> {
         let path = self.path.join(name);
         if !path.exists() {
@@ -143,7 +143,7 @@ impl Folder {
         Ok(())
     }
 
-    /// What to do about work that was interrupted and is kept.
+    /// Explains what to do about work that was interrupted and is kept.
     pub fn stopped(&self) -> String {
         format!("stopped; resume with: kerrlight fit --resume {}", self.path.display())
     }

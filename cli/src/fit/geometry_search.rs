@@ -7,7 +7,7 @@ use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::recovery::Choice;
 use kerrlight_tomo::recovery::results::GeometryResults;
 
-/// What was found, in the folder of the run.
+/// Name of the results in the folder of the run.
 pub const FILE: &str = "geometry.json";
 
 /// Returns the geometry that a run has found; none if it has not looked.

@@ -1,4 +1,4 @@
-//! What a run has read: one that is resumed reads the same, or is refused.
+//! Files that a run has read: one that is resumed reads the same, or is refused.
 
 use crate::checksum::Sum;
 use crate::file_sums::FileSums;
@@ -13,12 +13,12 @@ pub const SETTINGS: &str = "fit.toml";
 /// Its own name there.
 pub const FILE: &str = "inputs.json";
 
-/// What decides a run beside its seed: the version of the program, settings and files.
+/// Inputs that decide a run beside its seed: the version of the program, settings and files.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Inputs {
     /// Version of the program.
     pub version: String,
-    /// Of the settings in the run's folder.
+    /// Checksum of the settings in the run's folder.
     settings: Sum,
     /// All that was read.
     pub files: Vec<InputFile>,
@@ -27,14 +27,14 @@ pub struct Inputs {
 /// A file that was read.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InputFile {
-    /// Where it lies.
+    /// Path.
     path: PathBuf,
     #[serde(flatten)]
     sum: Sum,
 }
 
 impl Inputs {
-    /// Of a new run with these settings, which has read these files.
+    /// Takes a new run with these settings, which has read these files.
     pub fn new(settings: &str, read: Vec<(PathBuf, Sum)>) -> Self {
         let file = |(path, sum): (PathBuf, Sum)| {
             let path = std::path::absolute(&path).unwrap_or(path);
@@ -54,12 +54,12 @@ impl Inputs {
         }
     }
 
-    /// Whether a file is among those that were read.
+    /// Returns whether a file is among those that were read.
     pub fn holds(&self, file: &Path) -> bool {
         std::path::absolute(file).is_ok_and(|file| self.files.iter().any(|of| of.path == file))
     }
 
-    /// Of the run in a folder.
+    /// Reads those of the run in a folder.
     pub fn load(run: &Path) -> anyhow::Result<Self> {
         let path = run.join(FILE);
         let name = || format!("{}: it is damaged; start a new run with -o", path.display());

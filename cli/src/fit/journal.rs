@@ -1,4 +1,4 @@
-//! What a search has found so far, in a file of its run: an interrupted one resumes where it was.
+//! Journal of a search, in a file of its run: an interrupted one resumes where it was.
 
 use super::folder::Folder;
 use anyhow::Context;
@@ -10,7 +10,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// The file, in the folder of the run, until the search has ended.
 const FILE: &str = "search.log";
-/// How it begins: numbers of another version are not those of this one.
+/// First bytes: numbers of another version are not those of this one.
 const HEAD: &str = concat!("kerrlight ", env!("CARGO_PKG_VERSION"), " search");
 
 /// Numbers by key, all of which are on the disk: a line each, of hexadecimal bits, with its checksum.
@@ -21,7 +21,7 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// That of a run, with what an interrupted search has left there.
+    /// Opens the journal of a run, with what an interrupted search has left there.
     pub fn open(folder: &Folder) -> anyhow::Result<Self> {
         let journal = Self::at(&folder.path().join(FILE))?;
         if !journal.known.is_empty() {

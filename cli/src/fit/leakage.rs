@@ -18,7 +18,7 @@ pub fn keep(folder: &Folder, step: Option<u64>, found: &SolvedLeakage) -> anyhow
     folder.log(&json!({ "step": step, "leakage": { "largest_change": found.moved } }))
 }
 
-/// What a run has found last, if it has solved for leakage.
+/// Returns the leakage that a run has found last, if it has solved for it.
 pub fn kept(measured: &FitData, folder: &Folder) -> anyhow::Result<Option<LeakageTable>> {
     let path = folder.path().join(TABLE);
     if measured.leakage.is_none() || !path.exists() {

@@ -1,4 +1,4 @@
-//! What is said of linear grids, which are solved or started from.
+//! Words on linear grids, which are solved or started from.
 
 use kerrlight_tomo::fit::linear::{Ending, LinearSolution};
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
@@ -40,7 +40,7 @@ pub fn imprinted(found: &WarmStarted) -> Value {
 /// A gap, over the dark field's loss, that certifies nothing.
 const LOOSE: f64 = 0.5;
 
-/// What may be claimed of a solution.
+/// States what may be claimed of a solution.
 pub fn statement(solution: &LinearSolution<f32>) -> String {
     let stopped = !matches!(solution.ending, Ending::Converged | Ending::Rounding);
     if let Some(certificate) = solution.certificate {
@@ -65,17 +65,17 @@ pub fn statement(solution: &LinearSolution<f32>) -> String {
     )
 }
 
-/// What results say of the linear grid.
+/// Results of the linear grid.
 #[derive(Serialize)]
 pub struct Solved {
-    /// What may be claimed of the solution.
+    /// Statement of what may be claimed of the solution.
     pub statement: String,
     ending: String,
     relative_gap: Option<f64>,
     relative_violation: Option<f64>,
 }
 
-/// What of a line of the log they say.
+/// Numbers of a line of the log.
 #[derive(Deserialize)]
 struct Logged {
     statement: String,
@@ -84,14 +84,14 @@ struct Logged {
     stationarity: Option<Flatness>,
 }
 
-/// How far a solution is from the best one, over what it began with.
+/// Distance of a solution from the best one, over that of its start.
 #[derive(Deserialize)]
 struct Flatness {
     relative_gap: Option<f64>,
     relative_violation: Option<f64>,
 }
 
-/// What results say of the linear grid, from the log of its run.
+/// Returns the results of the linear grid, from the log of its run.
 pub fn outcome(file: &FitFile, lines: &[Value]) -> Option<Solved> {
     if file.representation.kind != Kind::LinearGrid {
         return None;

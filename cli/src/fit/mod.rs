@@ -53,7 +53,7 @@ const BUILT_IN: &str = include_str!("built_in.toml");
 /// Arguments of `kerrlight fit`.
 #[derive(Debug, Args)]
 pub struct Fit {
-    /// What to fit; without it a built-in experiment: a flare of Sgr A* seen by the ngEHT
+    /// Fit file; without it a built-in experiment: a flare of Sgr A* seen by the ngEHT
     #[arg(value_name = "FIT.toml")]
     file: Option<PathBuf>,
     /// Folder of the run, new or empty [default: kerrlight-fit, or -2, -3 …]; with --init the file
@@ -89,7 +89,7 @@ pub struct Fit {
     /// experiment
     #[arg(long, value_name = "DATA", num_args = 0..=1, conflicts_with_all = ["file", "set", "resume", "print"])]
     init: Option<Option<PathBuf>>,
-    /// With --data or --init: fit a static image or a volume [default: an image of M87*]
+    /// Model for --data or --init: a static image or a volume [default: an image of M87*]
     #[arg(long, value_enum, hide_possible_values = true, value_name = "image|volume", conflicts_with_all = ["file", "resume"])]
     model: Option<init::Model>,
 }
@@ -203,7 +203,7 @@ impl Fit {
         from_folder(text, base_dir)
     }
 
-    /// For how long to wait for another process: the fit of a comparison that was killed a moment ago is about to end.
+    /// Returns how long to wait for another process: the fit of a comparison that was killed a moment ago is about to end.
     fn patience(&self) -> Duration {
         Duration::from_secs(if self.stop_with_input { 60 } else { 0 })
     }

@@ -1,4 +1,4 @@
-//! What a fit's file asks for: emission around a hole, or a static image.
+//! Kinds of fits that a file asks for: emission around a hole, or a static image.
 
 use super::init;
 use super::posterior;
@@ -70,7 +70,7 @@ impl Work {
         })
     }
 
-    /// With its data, whose relative paths start from `base_dir`.
+    /// Reads its data, whose relative paths start from `base_dir`.
     pub fn prepared(self, base_dir: &Path, registry: &Registry) -> anyhow::Result<Prepared> {
         Ok(match self {
             Work::Emission(file) => {

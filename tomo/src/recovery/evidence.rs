@@ -1,4 +1,4 @@
-//! Whether a fit explains its data: what its residuals are judged by.
+//! Evidence for a fit: what its residuals are judged by.
 
 use crate::Error;
 use crate::fit::settings::{DataFiles, FitFile, Loss, LossKind, Noise};
@@ -10,19 +10,19 @@ use kerrlight_vlbi::products::debiased_amplitude;
 /// A verdict with all that it is made of.
 #[derive(Clone, Debug)]
 pub struct DataVerdict {
-    /// What came out.
+    /// Verdict.
     pub verdict: Verdict,
     /// The kinds of data with their names.
     pub terms: Vec<(String, Tested)>,
     /// Flux at zero spacing, where short baselines have measured it.
     pub flux: Option<ZeroSpacing>,
-    /// Whether a model that lacks it is at fault.
+    /// True if a model that lacks it is at fault.
     pub flux_counts: bool,
     /// Names of the stations.
     pub stations: Vec<String>,
     /// Times of the frames: M; hours of UTC of a static image.
     pub times: Vec<f64>,
-    /// Whether they are those of a static image.
+    /// True if they are those of a static image.
     pub is_static: bool,
 }
 
@@ -36,7 +36,7 @@ fn ordered(losses: &[Loss]) -> impl Iterator<Item = &Loss> {
     of(true).chain(of(false))
 }
 
-/// What σ of a kind of data is.
+/// Returns the meaning of σ of a kind of data.
 fn errors(file: &FitFile, kind: LossKind) -> Errors {
     let of_pixels = matches!(kind, LossKind::Image | LossKind::LightCurve);
     match (&file.data, file.observation()) {
@@ -58,7 +58,7 @@ fn errors(file: &FitFile, kind: LossKind) -> Errors {
 pub struct Evidence<'a> {
     /// Settings; none of a static image, whose errors are those that its data state.
     pub file: Option<&'a FitFile>,
-    /// What is compared.
+    /// Losses that are compared.
     pub losses: &'a [Loss],
     /// Seed of the settings.
     pub seed: u64,
@@ -133,7 +133,7 @@ impl Evidence<'_> {
         })
     }
 
-    /// What baselines have measured that resolve nothing of the field of view.
+    /// Returns the measurements of baselines that resolve nothing of the field of view.
     fn zero_spacing(&self, movie: &Frames<f32>) -> Result<Option<ZeroSpacing>, Error> {
         let (Some((observation, frames)), Some(sky)) =
             (&self.measured.visibilities, self.measured.sky)

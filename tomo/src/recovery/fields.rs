@@ -115,7 +115,7 @@ pub fn true_volume(file: &FitFile, truth: &Truth) -> Result<Volume, Error> {
     nodes.volume(nodes.positions().iter().map(|x| truth.at(*x) as f32).collect())
 }
 
-/// How well the field agrees with the truth.
+/// Compares the field with the truth.
 pub fn compare(
     file: &FitFile,
     trainer: &mut Trainer<'_, f32>,

@@ -1,4 +1,4 @@
-//! What searches find, and what of it a fit goes on with.
+//! Results of searches, and what of them a fit goes on with.
 
 use super::problem::Problem;
 use crate::fit::FluxDatum;
@@ -8,7 +8,7 @@ use crate::fit::settings::{FitFile, UnknownGeometry};
 use crate::fit::setup::{self, BandScan, FoundGeometry, Held};
 use kerrlight_render::dynamics::Axis;
 
-/// What is looked for before the emission is fitted.
+/// Stage before the emission is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Stage {
@@ -20,7 +20,7 @@ pub enum Stage {
     Weight,
 }
 
-/// What a search has found.
+/// Result of a search, with its problem.
 #[derive(Clone, Copy)]
 #[non_exhaustive]
 pub enum Found<'a> {
@@ -32,7 +32,7 @@ pub enum Found<'a> {
     Weight(&'a FitFile, &'a [Held]),
 }
 
-/// What a search has found, of its own.
+/// Result of a search.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum Searched {
@@ -42,7 +42,7 @@ pub enum Searched {
     Band(BandScan),
 }
 
-/// What of it the rest of the fit goes on with.
+/// Choice with which the rest of the fit goes on.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Choice {
@@ -59,9 +59,9 @@ pub enum Choice {
         inclination_deg: f64,
         /// Degrees east of north.
         position_angle_deg: f64,
-        /// Of the angular velocity.
+        /// Factor on the angular velocity.
         rotation_factor: f64,
-        /// What the background is expected to be, Jy with its standard deviation.
+        /// Expected background, Jy with its standard deviation.
         background: Option<Vec<FluxDatum>>,
     },
     /// Dimensionless, in the unit of its setting.
@@ -69,7 +69,7 @@ pub enum Choice {
 }
 
 impl Found<'_> {
-    /// What the fit goes on with.
+    /// Returns the choice with which the fit goes on.
     pub fn choice(&self) -> Choice {
         match self {
             Found::Geometry(_, _, found) => {
@@ -94,7 +94,7 @@ impl Found<'_> {
 /// The axis that a scan has found.
 #[derive(Clone, Debug)]
 pub struct FoundAxis {
-    /// On the whole sphere.
+    /// Scan of the whole sphere.
     pub scan: AxisScan,
     /// Near the best one, with a finer grid.
     pub refined: Option<AxisLoss>,

@@ -34,16 +34,16 @@ use kerrlight_common::frames::Frames;
 use kerrlight_render::volume::Volume;
 use kerrlight_render::volume::metrics::{self, Comparison, Mask};
 
-/// Why a fit ended before its end: it was told to.
+/// Reason why a fit ended before its end: it was told to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Stopped {
-    /// In a search that goes on where it was.
+    /// It was in a search that goes on where it was.
     #[error("stopped")]
     Kept,
-    /// In work of which nothing is kept.
+    /// It was in work of which nothing is kept.
     #[error("stopped while {0}: nothing is kept of that")]
     Lost(&'static str),
-    /// After this step.
+    /// It was after this step.
     #[error("stopped after step {0}")]
     After(u64),
 }
@@ -60,18 +60,18 @@ pub struct Fit<'a, 't> {
     pub measured: &'a FitData,
     /// The truth at the reference time, where data are simulated.
     pub true_volume: Option<Volume>,
-    /// What a search for the geometry has found in this call.
+    /// Result of a search for the geometry in this call.
     pub searched: Option<Searched>,
     /// The fit with its memory.
     pub trainer: Trainer<'t, f32>,
 }
 
-/// What a fit recovers.
+/// Recovered emission, with its evidence.
 #[derive(Debug)]
 pub struct Recovery {
     /// Settings, with what was found of the geometry in place of what was assumed.
     pub settings: FitFile,
-    /// What a search for the geometry has found; none if the geometry was known.
+    /// Result of a search for the geometry; none if the geometry was known.
     pub searched: Option<Searched>,
     /// Emission at the reference time, dimensionless, zero outside the region of recovery.
     pub volume: Volume,
@@ -83,7 +83,7 @@ pub struct Recovery {
     pub loss: Loss,
     /// Residuals of each kind of data, and whether the model explains them.
     pub judged: DataVerdict,
-    /// How close the volume is to the truth inside the region, where data are simulated.
+    /// Distance of the volume from the truth inside the region, where data are simulated.
     pub closeness: Option<Comparison>,
     /// Parameters of the representation, and the axis.
     pub state: State<f32>,
@@ -170,13 +170,13 @@ impl<'t> Fit<'_, 't> {
         Ok(seen)
     }
 
-    /// What the residuals are judged by.
+    /// Returns the evidence by which the residuals are judged.
     pub fn evidence(&self) -> Evidence<'_> {
         let Fit { file, measured, .. } = *self;
         Evidence { file: Some(file), losses: &file.loss, seed: file.seed, measured }
     }
 
-    /// Whether the model explains its data, of which it sees `seen` in `movie`.
+    /// Judges whether the model explains its data, of which it sees `seen` in `movie`.
     ///
     /// # Errors
     /// If images cannot be read.
@@ -227,7 +227,7 @@ impl<'t> Fit<'_, 't> {
         })
     }
 
-    /// How close a volume is to the truth inside the region; none without a truth.
+    /// Returns the distance of a volume from the truth inside the region; none without a truth.
     fn closeness(&self, volume: &Volume) -> Result<Option<Comparison>, Error> {
         let Some(truth) = &self.true_volume else { return Ok(None) };
         let region = self.file.region.limits();

@@ -1,4 +1,4 @@
-//! What is fitted: settings with their data.
+//! Problem of a fit: settings with their data.
 
 use crate::Error;
 use crate::fit::settings::{AxisSearch, FitError, FitFile};
@@ -115,7 +115,7 @@ impl Problem {
         Ok(())
     }
 
-    /// What is minimised, seen through these rays.
+    /// Returns the objective, seen through these rays.
     ///
     /// # Errors
     /// If a loss needs data that are not there.

@@ -1,4 +1,4 @@
-//! What a fit tells while it runs, and what it keeps.
+//! Progress of a fit, and what it keeps.
 
 use super::found::{Choice, Found, FoundAxis, Stage};
 use crate::Error;
@@ -10,15 +10,15 @@ use crate::fit::{DeviceRunner, Outcome, State, Trainer};
 use kerrlight_render::volume::Volume;
 use kerrlight_vlbi::polarimetry::LeakageTable;
 
-/// How far a fit has come.
+/// Position of a fit in its work.
 #[derive(Clone, Copy)]
 #[non_exhaustive]
 pub enum At<'a> {
     /// The search for the geometry.
     Geometry {
-        /// Which search, from 0.
+        /// Number of the search, from 0.
         search: usize,
-        /// Of so many.
+        /// Number of all searches.
         of: usize,
         /// Geometries that it has evaluated.
         trials: usize,
@@ -37,7 +37,7 @@ pub enum At<'a> {
     Step(u64),
 }
 
-/// What a fit has found on its way.
+/// Event of a fit on its way.
 #[derive(Clone, Copy)]
 #[non_exhaustive]
 pub enum Event<'a> {
@@ -65,7 +65,7 @@ pub struct Now<'a, 't> {
     pub true_volume: Option<&'a Volume>,
     /// The fit with its memory.
     pub trainer: &'a mut Trainer<'t, f32>,
-    /// Where it is.
+    /// Present state.
     pub state: &'a State<f32>,
 }
 
@@ -88,7 +88,7 @@ pub trait Progress: Send {
         Ok(Box::new(Forgetful))
     }
 
-    /// What an interrupted fit has chosen in a stage.
+    /// Returns the choice of an interrupted fit in a stage.
     ///
     /// # Errors
     /// If it cannot be read.
@@ -127,7 +127,7 @@ pub trait Progress: Send {
     /// Told what is fitted, before anything is.
     fn begins(&mut self, _: Now<'_, '_>) {}
 
-    /// What an interrupted fit has left; `start` is the state of a new one.
+    /// Returns what an interrupted fit has left; `start` is the state of a new one.
     ///
     /// # Errors
     /// If it cannot be read, or is that of another fit.

@@ -24,7 +24,7 @@ pub struct ResolvedFit {
 }
 
 impl ResolvedFit {
-    /// In a geometry; rays are those of this number near the critical curve.
+    /// Puts the problem in a geometry; rays are those of this number near the critical curve.
     ///
     /// # Errors
     /// If the geometry is out of range.

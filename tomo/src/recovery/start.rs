@@ -1,4 +1,4 @@
-//! What a fit starts from: an axis, the solution of a linear problem, leakage.
+//! Start of a fit: an axis, the solution of a linear problem, leakage.
 
 use super::found::FoundAxis;
 use super::progress::{At, Event, Progress};

@@ -1,4 +1,4 @@
-//! What fits to light curves found.
+//! Results of fits to light curves.
 
 use super::{Figures, MOST};
 use crate::compare::experiment::FigureAsked;

@@ -23,7 +23,7 @@ pub struct Drawn {
     pub figures: Vec<(String, Figure)>,
     /// Plots.
     pub plots: Vec<LinePlot>,
-    /// What could not be drawn, in sentences.
+    /// Figures that could not be drawn, in sentences.
     pub missing: Vec<String>,
 }
 
@@ -32,11 +32,11 @@ const MOST: usize = 12;
 
 /// All that figures are made of.
 pub struct Figures<'a> {
-    /// What is shown.
+    /// Experiment that is shown.
     pub experiment: &'a Experiment,
-    /// What was found.
+    /// Summary of its results.
     pub summary: &'a Summary<'a>,
-    /// Where the runs are.
+    /// Folders of the runs.
     pub runner: &'a Runner<'a>,
 }
 

@@ -61,7 +61,7 @@ impl Figures<'_> {
         Ok(plots)
     }
 
-    /// What a run has logged of a result, against seconds.
+    /// Returns the log of a result, against seconds.
     fn log(&self, case: &Case, value: &str) -> anyhow::Result<Vec<[f64; 2]>> {
         let path = self.runner.run_of(case).join("log.jsonl");
         let text = output::read_text(&path)?;
@@ -175,7 +175,7 @@ impl Figures<'_> {
 
 /// Points of a curve; of more, means and standard deviations of equally many that lie next to each other.
 const POINTS: usize = 600;
-/// In so many groups, where they are too many.
+/// Largest number of groups.
 const BINS: usize = 100;
 
 /// A curve of points in order: as they are, or of too many their means in groups.
@@ -195,7 +195,7 @@ fn binned(name: String, points: Vec<[f64; 2]>) -> Series {
     Series { name, points, errors, marks: Marks::Joined }
 }
 
-/// As many plots as are needed for so many curves.
+/// Splits curves into as many plots as are needed.
 fn series_of(series: Vec<Series>) -> Vec<Vec<Series>> {
     let mut parts = Vec::new();
     let mut rest = series.into_iter().peekable();

@@ -78,7 +78,7 @@ impl Figures<'_> {
         rows.filter(is_there).collect()
     }
 
-    /// What a figure says below.
+    /// Returns the caption of a figure.
     fn caption(&self, asked: &FigureAsked) -> String {
         let from = match asked.view {
             Some([azimuth, elevation]) => {
@@ -174,7 +174,7 @@ fn tile((title, loaded): &(String, Loaded), view: View) -> Tile<'_> {
     Tile { title, volume: &loaded.volume, around: loaded.around, view }
 }
 
-/// From where a figure shows a volume that turns about an axis.
+/// Returns the direction from which a figure shows a volume that turns about an axis.
 fn view_of(asked: &FigureAsked, [x, y, z]: [f64; 3]) -> View {
     match asked.view {
         Some([azimuth, elevation]) => View { azimuth, elevation },
@@ -184,7 +184,7 @@ fn view_of(asked: &FigureAsked, [x, y, z]: [f64; 3]) -> View {
     }
 }
 
-/// What stands above a recovered volume.
+/// Returns the title of a recovered volume.
 fn quality(psnr: Option<f64>, results: &Results) -> String {
     let psnr = psnr.map(|x| format!("{x:.1} dB"));
     let axis = results.get("axis_dot_truth").filter(|x| *x < 1.0 - 1e-9);

@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 
 /// Settings for a file of data.
 pub struct Guess {
-    /// As a commented fit file.
+    /// Text of a commented fit file.
     pub text: String,
-    /// What the file says of itself, a sentence each.
+    /// Facts in the file, a sentence each.
     read: Vec<String>,
-    /// What neither the file nor a published value says, with the reason for what was taken.
+    /// Assumptions that neither the file nor a published value supports, with their reasons.
     assumed: Vec<String>,
-    /// What has to be given.
+    /// Keys that have to be given.
     missing: Vec<Missing>,
 }
 
@@ -53,7 +53,7 @@ pub fn guess(data: &[PathBuf], model: Option<Model>) -> anyhow::Result<Guess> {
     Ok(guess)
 }
 
-/// How lines begin that say what was read.
+/// Begin of lines that say what was read.
 pub const READ: &str = "# Read: ";
 
 impl Guess {
@@ -89,7 +89,7 @@ impl Guess {
         bail!("{} does not say what decides the result; give{lines}", names.join(", "))
     }
 
-    /// What was read and what was assumed, in lines.
+    /// Describes what was read and what was assumed, in lines.
     pub fn sentences(&self, settings: &str) -> String {
         let table: toml::Table = settings.parse().unwrap_or_default();
         let mut text = String::new();

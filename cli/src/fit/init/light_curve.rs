@@ -35,7 +35,7 @@ fraction = 0.75 #! what a spectral index of 1 allows
 normalisation = \"mean-field\"
 turn_deg = 0.0 #! no Faraday rotation is left in the data";
 
-/// What is fitted of a curve.
+/// Parts of a curve that are fitted.
 struct Fitted {
     parameters: Vec<StokesParameter>,
     /// Samples of the span, averaged.
@@ -150,7 +150,7 @@ impl Fitted {
         Ok(Self { parameters, curve, samples, span, average_s })
     }
 
-    /// What is done with the file's samples before they are fitted, line by line.
+    /// Describes what is done with the file's samples before they are fitted, line by line.
     fn prepared(&self) -> String {
         let mut lines = Vec::new();
         if let Some([from, to]) = self.span {
@@ -238,7 +238,7 @@ impl Fitted {
         (sigma, from.to_owned())
     }
 
-    /// What the scatter from one sample to the next says of errors, Jy.
+    /// Returns the errors from the scatter from one sample to the next, Jy.
     fn jumps(&self) -> f64 {
         let jumps = self.parameters.iter().flat_map(|p| {
             let fluxes = self.fluxes(*p);
@@ -248,7 +248,7 @@ impl Fitted {
         median(jumps.collect()).unwrap_or(0.0) / 0.954
     }
 
-    /// What the file says, in a line.
+    /// Describes the file, in a line.
     fn read(&self, name: &str) -> String {
         let hours: Vec<f64> = self.curve.samples.iter().map(|sample| sample.time_h).collect();
         let mut text = format!("{name}: {} samples", self.samples);

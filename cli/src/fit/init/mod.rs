@@ -45,7 +45,7 @@ pub fn explained(error: &ReadError) -> anyhow::Error {
     anyhow::anyhow!("{text}{advice}")
 }
 
-/// Where a key or a table stands now that a table does not have.
+/// Names the present place of a key or a table that a table does not have.
 fn moved(table: &str, key: &str) -> &'static str {
     match (table, key) {
         ("", "world") => {
@@ -64,7 +64,7 @@ fn moved(table: &str, key: &str) -> &'static str {
     }
 }
 
-/// What to write for a key that is missing in a table; `loss.0` is one of the tables `loss`.
+/// Advises on a key that is missing in a table; `loss.0` is one of the tables `loss`.
 fn advice(missing: &str, table: &str) -> String {
     let is_name = |part: &&str| !part.is_empty() && part.parse::<u32>().is_err();
     let place: Vec<&str> = table.split('.').filter(is_name).collect();
@@ -84,7 +84,7 @@ fn advice(missing: &str, table: &str) -> String {
     }
 }
 
-/// What is fitted to visibilities.
+/// Model that is fitted to visibilities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Model {
     /// An image that does not change.
@@ -93,7 +93,7 @@ pub enum Model {
     Volume,
 }
 
-/// Where it goes unless the user says.
+/// Name of the file unless the user says.
 const NAME: &str = "my_fit.toml";
 
 /// Writes the file and says what is left to the user.
@@ -246,8 +246,8 @@ fn called(observation: &Observation, source: Option<&Source>) -> String {
     plain::line(if name.is_empty() { "unnamed source" } else { name }).into_owned()
 }
 
-/// Of visibilities: a static image, if that is wanted, the source is known to stand still for a night, or what it varies is
-/// no more than is known of it.
+/// Guesses settings for visibilities: a static image, if that is wanted, the source is known to stand still for a night, or
+/// what it varies is no more than is known of it.
 fn of_observation(
     observation: &Observation,
     data: &Path,
@@ -323,7 +323,7 @@ fn of_visibilities(observation: &Observation, path: &str, file: &str) -> anyhow:
     complete(include_str!("visibilities.toml"), &fields)
 }
 
-/// Whether closure phases are left of the rows that the template's fit keeps.
+/// Returns whether closure phases are left of the rows that the template's fit keeps.
 fn has_closures(observation: &Observation, long_only: bool) -> bool {
     let settings = VisibilitySettings { average_s: 300.0, uv_min: long_only.then_some(1e8) };
     let Ok(mut kept) = setup::prepared(observation.clone(), &settings) else { return false };
@@ -331,7 +331,7 @@ fn has_closures(observation: &Observation, long_only: bool) -> bool {
     ClosureTerm::<f64>::new(&kept, ClosureKind::Phase, 3.0).is_ok()
 }
 
-/// What is assumed of the gains of the stations.
+/// Describes the assumed gains of the stations.
 fn gains(observation: &Observation) -> String {
     let seen = |k: usize| observation.rows.iter().any(|r| r.stations.contains(&(k as u16)));
     let names = observation.stations.iter().enumerate().filter(|(k, _)| seen(*k));
@@ -342,7 +342,7 @@ fn gains(observation: &Observation) -> String {
     }
 }
 
-/// What the file says, in a line.
+/// Describes the file, in a line.
 fn read(observation: &Observation, file: &str, name: &str, is_known: bool) -> String {
     let rows: Vec<f64> = observation.stokes_i().map(|(row, _)| row.time_h).collect();
     let [first, last] = rows
@@ -360,7 +360,7 @@ fn read(observation: &Observation, file: &str, name: &str, is_known: bool) -> St
     )
 }
 
-/// What a volume leaves of the data.
+/// Names the data that a volume leaves out.
 fn unfitted(observation: &Observation) -> &'static str {
     match observation.is_polarized() {
         true => "; its polarisation is not fitted without [polarization]",

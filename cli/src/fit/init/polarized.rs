@@ -15,8 +15,9 @@ pub struct Tables {
 }
 
 impl Tables {
-    /// Of these data; empty where RL and LR are no more than noise. Files whose name says that leakage was taken out (`dtermcal`) and
-    /// Stokes parameters are compared by ratios; of others leakage is solved for. `varies` says whether the source does.
+    /// Returns the tables for these data; empty where RL and LR are no more than noise. Files whose name says that leakage was
+    /// taken out (`dtermcal`) and Stokes parameters are compared by ratios; of others leakage is solved for. `varies` says
+    /// whether the source does.
     pub fn of(observation: &Observation, file: &str, varies: bool) -> Self {
         if !is_polarized(observation) {
             return Self::default();
@@ -50,7 +51,7 @@ impl Tables {
     }
 }
 
-/// Whether RL and LR, or Q and U, are more than noise: χ² of none is above what chance makes of it.
+/// Returns whether RL and LR, or Q and U, are more than noise: χ² of none is above what chance makes of it.
 fn is_polarized(observation: &Observation) -> bool {
     let crossed = match observation.basis {
         Basis::Circular => [2, 3],

@@ -1,18 +1,19 @@
-//! Whether data of a source that varies ask for motion: a quick static image of them, before settings are guessed.
+//! Test of whether data of a source that varies ask for motion: a quick static image of them, before settings are
+//! guessed.
 
 use kerrlight_imaging::settings::StaticImageFile;
 use kerrlight_imaging::{data, survey};
 use kerrlight_tomo::fit::verdict::CHANCE;
 use kerrlight_vlbi::observation::Observation;
 
-/// What a static image leaves of data.
+/// Residuals of a static image.
 pub struct QuickLook {
     /// Kinds of data with χ² per datum and how many data there are.
     kinds: Vec<(&'static str, f64, usize)>,
 }
 
 impl QuickLook {
-    /// With the settings of a static image, from all of their starts; penalties are as strong as they stand there, and
+    /// Fits a static image from all of the starts in its settings; penalties are as strong as they stand there, and
     /// nothing is drawn. None if these data have no static image.
     pub fn new(settings: &str, observation: &Observation, name: &str) -> Option<Self> {
         let mut file = StaticImageFile::parse(settings).ok()?;
@@ -29,13 +30,13 @@ impl QuickLook {
         Some(Self { kinds: kinds.map(|((name, chi2), n)| (name, *chi2, n)).collect() })
     }
 
-    /// Whether χ² of each kind is what chance allows, or less.
+    /// Returns whether χ² of each kind is what chance allows, or less.
     pub fn explains(&self) -> bool {
         let allowed = |count: usize| 1.0 + CHANCE * (2.0 / count.max(1) as f64).sqrt();
         self.kinds.iter().all(|(_, chi2, count)| *chi2 <= allowed(*count))
     }
 
-    /// What it says, in a sentence.
+    /// Describes the result, in a sentence.
     pub fn sentence(&self) -> String {
         let one = |(name, chi2, _): &(&str, f64, usize)| format!("{chi2:.2} of {name}");
         let all: Vec<String> = self.kinds.iter().map(one).collect();

@@ -4,11 +4,11 @@ use kerrlight_vlbi::earth::SourcePosition;
 
 /// A source whose mass and distance are known.
 pub struct Source {
-    /// What it is called.
+    /// Name.
     pub name: &'static str,
-    /// How names of it in files begin.
+    /// Begins of its names in files.
     pub words: [&'static str; 2],
-    /// Where it is.
+    /// Position.
     pub position: SourcePosition,
     /// Solar masses.
     pub mass_msun: f64,
@@ -20,19 +20,19 @@ pub struct Source {
     pub uv_min: Option<&'static str>,
     /// A setting for the medium that its light has passed.
     pub blur: Option<&'static str>,
-    /// Whether it varies within minutes.
+    /// True if it varies within minutes.
     pub varies: bool,
     /// Flux of what is compact and its standard deviation, Jy, where short baselines see more.
     pub compact_jy: Option<[f64; 2]>,
     /// Field and width of the light in published images, µas, with their source; the longest baseline decides without it.
     pub image: Option<PublishedImages>,
-    /// Where mass and distance come from.
+    /// Source of mass and distance.
     pub mass: &'static str,
-    /// Where the inclination comes from.
+    /// Source of the inclination.
     pub inclination: &'static str,
 }
 
-/// What published images assume.
+/// Assumptions of published images.
 pub struct PublishedImages {
     /// Their field, µas.
     pub field_uas: f64,

@@ -33,7 +33,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 pub use summary::{RANKED, WITHIN};
 
-/// Where draws and what follows from them are, in the folder of a run.
+/// Folder of draws and of what follows from them, in the folder of a run.
 pub const FOLDER: &str = "posterior";
 /// The page.
 pub const PAGE: &str = "report.html";
@@ -123,7 +123,7 @@ fn numbers(text: &str) -> Result<Numbers, String> {
 struct Kept {
     /// Emission at the reference time.
     pub volume: Volume,
-    /// What is written beside it.
+    /// Numbers that are written beside it.
     pub numbers: DrawNumbers,
 }
 
@@ -136,7 +136,7 @@ struct DrawNumbers {
     pub chi2_per_datum: Vec<f64>,
     /// Noise over the errors of the data.
     pub noise_factor: f64,
-    /// What posterior predictive checks compare.
+    /// Posterior predictive checks.
     #[serde(default)]
     pub predicted: Vec<Check>,
 }
@@ -243,7 +243,7 @@ fn noise_of(folder: &Folder) -> anyhow::Result<f64> {
     Ok(chi2.copied().fold(1.0f64, f64::max).sqrt())
 }
 
-/// What draws are made of.
+/// Parts of which draws are made.
 struct Drawing<'a> {
     prepared: &'a Problem,
     /// Settings, with what the run has chosen.
@@ -257,7 +257,7 @@ struct Drawing<'a> {
 }
 
 impl<'a> Drawing<'a> {
-    /// Of draws around the run in `folder`, of which there are to be so many in `path`.
+    /// Draws around the run in `folder`, of which there are to be so many in `path`.
     fn new(
         prepared: &'a Problem,
         folder: &Folder,
@@ -337,7 +337,7 @@ fn other_voxels(nodes: usize, number: u64) -> usize {
     (nodes * PERCENT[number as usize % PERCENT.len()]).div_ceil(100).max(4)
 }
 
-/// Of the noise of a draw: not that of the simulation.
+/// Returns the seed of the noise of a draw: not that of the simulation.
 fn seed(file: &FitFile, number: u64) -> u64 {
     file.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(number)
 }

@@ -115,7 +115,8 @@ fn table(geometry: &[Interval]) -> String {
     format!("{}\n{}", names.join(","), (0..count).map(row).collect::<String>())
 }
 
-/// Whether the draws predict the data, and how often the truth lies inside, where it is known.
+/// Returns the tables: whether the draws predict the data, and how often the truth lies inside, where
+/// it is known.
 fn details(found: &Summary) -> Vec<report::Table> {
     let mut all: Vec<report::Table> = predictive::table(&found.predicted).into_iter().collect();
     all.extend(of_nodes(found));

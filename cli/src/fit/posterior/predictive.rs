@@ -17,9 +17,9 @@ pub struct Check {
     pub chi2_per_datum: f64,
     /// Probability of a larger χ² of all data.
     pub larger_chi2: f64,
-    /// Of a less probable χ² of any baseline, triangle or quadrangle.
+    /// Probability of a less probable χ² of any baseline, triangle or quadrangle.
     pub larger_on_a_baseline: Option<f64>,
-    /// Of a less probable χ² of any frame.
+    /// Probability of a less probable χ² of any frame.
     pub larger_in_a_frame: Option<f64>,
     /// The least of the three if the model has an error as large as the verdict of a fit lets pass.
     pub beyond_what_passes: f64,
@@ -49,7 +49,7 @@ fn check(data: &str, draws: &[Kept]) -> Option<Check> {
 }
 
 impl Check {
-    /// What it says, in words.
+    /// Describes it, in words.
     pub fn sentence(&self) -> String {
         let name = self.data.replace('-', " ");
         let least = [Some(self.larger_chi2), self.larger_on_a_baseline, self.larger_in_a_frame];

@@ -15,10 +15,10 @@ use kerrlight_tomo::fit::{Motion, Objective, State, Trainer};
 use kerrlight_tomo::representation::Registry;
 use std::ops::ControlFlow;
 
-/// Of the random numbers of a prior's field, for the seed of a draw.
+/// Stream of the random numbers of a prior's field, for the seed of a draw.
 const PRIOR: u64 = 0x7072_696f_7200_0000;
 
-/// What a fit goes through.
+/// Problem and settings that a fit goes through.
 pub struct Through<'a> {
     /// Settings, with the geometry that the draw has.
     pub file: &'a FitFile,
@@ -32,13 +32,13 @@ pub struct Through<'a> {
     pub measured: &'a FitData,
 }
 
-/// What a draw found.
+/// Result of a draw.
 pub struct Drawn {
     /// Emission at the reference time.
     pub volume: Volume,
     /// χ² over the number of data, of each loss, beside the data that were fitted.
     pub chi2: Vec<f64>,
-    /// How probable data are that are as far from it as the measured ones.
+    /// Probabilities of data that are as far from it as the measured ones.
     pub predicted: Vec<Check>,
 }
 
@@ -74,7 +74,7 @@ pub fn draw(
     Ok(Some(Drawn { volume, chi2, predicted }))
 }
 
-/// How probable data are that are as far from a draw's images as the measured ones.
+/// Returns the probabilities of data that are as far from a draw's images as the measured ones.
 fn predicted(through: &Through<'_>, movie: &Frames<f32>) -> anyhow::Result<Vec<Check>> {
     let Through { file, instrument, motion, measured, .. } = *through;
     let pixels = file.screen.pixels * file.screen.pixels;

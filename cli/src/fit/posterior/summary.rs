@@ -1,5 +1,5 @@
-//! What follows from draws: intervals of the geometry, mean and spread of the volume, features, and how often a known truth
-//! lies inside.
+//! Summary of draws: intervals of the geometry, mean and spread of the volume, features, and how often a known truth lies
+//! inside.
 
 use super::Kept;
 use super::predictive::{self, Check};
@@ -25,15 +25,15 @@ pub struct Interval {
     pub deviation: f64,
     /// Least and largest value that the prior allows.
     pub bounds: [f64; 2],
-    /// Whether the data say nothing about it.
+    /// True if the data say nothing about it.
     pub open: bool,
-    /// What was simulated.
+    /// Simulated value.
     pub truth: Option<f64>,
     /// Its rank among the draws, 0 to 1.
     pub rank: Option<f64>,
 }
 
-/// What follows from draws.
+/// Summary of draws.
 pub struct Summary {
     /// Mean and standard deviation of the volume.
     pub ensemble: Ensemble,
@@ -41,7 +41,7 @@ pub struct Summary {
     pub geometry: Vec<Interval>,
     /// Bright features, the brightest first.
     pub features: Vec<Feature>,
-    /// How often the truth lies inside: at random nodes of the region, and at those that shine.
+    /// Share of truths inside: at random nodes of the region, and at those that shine.
     pub coverage: Option<[Coverage; 2]>,
     /// Ranks of the truth among the draws: at random nodes, where the mean is bright, and of the first feature's radius.
     pub ranks: Option<[Ranks; 3]>,
@@ -69,13 +69,14 @@ const SHINES: f32 = 0.05;
 /// Nodes are bright where the mean of the draws is above this part of its maximum: which nodes these are must not depend
 /// on the truth.
 const BRIGHT: f32 = 0.25;
-/// What has ranks, as [`Summary::ranks`] and keys of the numbers.
+/// Quantities with ranks, as [`Summary::ranks`] and keys of the numbers.
 pub const RANKED: [&str; 3] = ["random_nodes", "bright_nodes", "feature_radius"];
-/// Between the name of a parameter of the geometry and a part, in keys that say whether the middle draws hold its truth.
+/// Text between the name of a parameter of the geometry and a part, in keys that say whether the middle draws hold its
+/// truth.
 pub const WITHIN: &str = "_drawn_within_";
 
 impl Summary {
-    /// Of draws of a fit, with what its run has found of the geometry, and the truth where there is one.
+    /// Summarises draws of a fit, with the geometry that its run has found, and the truth where there is one.
     pub fn new(
         file: &FitFile,
         geometry: Option<&GeometryResults>,
@@ -149,7 +150,7 @@ impl Summary {
         all
     }
 
-    /// What a person wants to know.
+    /// Describes what a person wants to know.
     pub fn sentences(&self) -> Vec<String> {
         let mut all = Vec::new();
         if self.factor > WRONG {
@@ -196,7 +197,7 @@ impl Interval {
         sorted[below] + (at - at.floor()) * (sorted[above] - sorted[below])
     }
 
-    /// What the interval of 95 % is: that of a normal distribution, inside the bounds.
+    /// Returns the interval of 95 %: that of a normal distribution, inside the bounds.
     pub fn ends(&self) -> [f64; 2] {
         let reach = 1.96 * self.deviation;
         let [low, high] = self.bounds;
@@ -213,7 +214,7 @@ impl Interval {
         (self.parameter.name().to_owned(), value)
     }
 
-    /// Whether the truth lies within the middle 68 and 95 % of the draws, 0 or 1, with their keys.
+    /// Returns whether the truth lies within the middle 68 and 95 % of the draws, 0 or 1, with their keys.
     fn within(&self) -> Vec<(String, f64)> {
         let (name, ranks) = (self.parameter.name(), Ranks::of(self.rank.into_iter()));
         let name = name.strip_suffix("_deg").unwrap_or(name);

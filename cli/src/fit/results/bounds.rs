@@ -30,7 +30,7 @@ pub struct Reached {
     bound: &'static str,
     /// Its value.
     value: f64,
-    /// How many nodes or pixels are there, at the ceiling.
+    /// Number of nodes or pixels at the ceiling.
     #[serde(skip_serializing_if = "Option::is_none")]
     count: Option<usize>,
     /// Part of the light that is there.

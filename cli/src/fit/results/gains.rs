@@ -52,7 +52,7 @@ pub fn write_by_file(
     Ok(())
 }
 
-/// What the gains of a station are like.
+/// Summary of the gains of a station.
 struct Summary<'a> {
     station: &'a str,
     scans: usize,
@@ -129,7 +129,7 @@ impl Gains {
         }
     }
 
-    /// For results.json.
+    /// Returns the gains for results.json.
     pub fn json(&self) -> Value {
         let has_phases = self.table.has_phases();
         let station = |s: Summary<'_>| {

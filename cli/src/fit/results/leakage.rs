@@ -49,7 +49,7 @@ impl Leakage {
         self.table.distance(self.truth.as_ref()?)
     }
 
-    /// For results.json.
+    /// Returns the leakage for results.json.
     pub fn json(&self) -> Value {
         let station = |s: &StationLeakage| {
             json!({

@@ -1,8 +1,8 @@
-//! What light has passed and what the source varies, in sentences.
+//! Words on the medium that light has passed and on the variability of the source.
 
 use kerrlight_tomo::fit::settings::{Scattering, Variability};
 
-/// What was assumed of both.
+/// Describes the assumptions on both.
 pub fn sentences(scattering: Option<Scattering>, variability: Option<Variability>) -> Vec<String> {
     let scattered = scattering.map(|Scattering::SgrA| {
         "Diffractive scattering towards Sgr A* (Johnson et al. 2018) is part of the model: visibilities and errors were divided by its kernel, so that amplitudes below are those of the source behind the screen. Refraction is left out."

@@ -1,4 +1,4 @@
-//! What a run leaves: the volume, the movie, numbers, pictures and the report.
+//! Results of a run: the volume, the movie, numbers, pictures and the report.
 
 mod bounds;
 pub mod gains;
@@ -39,7 +39,7 @@ use verdict::{DataVerdict, Evidence};
 pub struct Estimate<'a> {
     /// Settings.
     pub file: &'a FitFile,
-    /// Where they go.
+    /// Folder of the results.
     pub folder: &'a Folder,
     /// Rays.
     pub instrument: &'a Instrument,
@@ -54,7 +54,7 @@ pub struct Estimate<'a> {
 }
 
 impl<'a> Estimate<'a> {
-    /// Of a fit, in its folder.
+    /// Takes a fit, in its folder.
     pub fn new<'b: 'a>(fit: &mut Fit<'b, '_>, folder: &'a Folder) -> Self {
         let Fit { file, instrument, motion, measured, .. } = *fit;
         let device = fit.trainer.device.take().map(|device| device.name().to_owned());
@@ -167,7 +167,8 @@ impl Estimate<'_> {
         PreviewView { file, instrument, motion, truth: measured.truth.as_ref() }
     }
 
-    /// When the still image is seen, M: at the reference time, or in the middle of the data if that lies outside of them.
+    /// Returns the time of the still image, M: at the reference time, or in the middle of the data if that lies outside
+    /// of them.
     fn time_of_still(&self) -> f64 {
         let (times, reference) = (&self.measured.times, self.motion.reference);
         let within = times.first().is_some_and(|first| reference >= *first)
@@ -176,25 +177,25 @@ impl Estimate<'_> {
     }
 }
 
-/// What was found.
+/// Recovered quantities.
 pub struct Found<'a> {
     volume: Volume,
     /// The emission over time, where it is not the same at all times.
     changes: Option<Changes>,
     still: PreviewImage,
     loss: Loss,
-    /// What the mask of what shines leaves out, of the flux; nothing without a mask.
+    /// Part of the flux that the mask of what shines leaves out; nothing without a mask.
     mask: Option<f64>,
-    /// What sums along rays are off by, over the errors of the data, where that is known.
+    /// Error of sums along rays, over the errors of the data, where that is known.
     quadrature: Option<f64>,
     judged: DataVerdict,
     /// Gains of stations, where they are solved for.
     gains: Option<Gains>,
     /// Leakage of stations, where it is solved for.
     leakage: Option<Leakage>,
-    /// What does not move, where it is recovered.
+    /// Emission that does not move, where it is recovered.
     quiescent: Option<Quiescent>,
-    /// What data see of the movie: the movie itself, its images of Stokes parameters, or its fluxes.
+    /// Quantities of the movie that data depend on: the movie itself, its images of Stokes parameters, or its fluxes.
     seen: Frames<f32>,
     movie: Frames<f32>,
     state: &'a State<f32>,

@@ -1,4 +1,4 @@
-//! What was found, in numbers.
+//! Results in numbers.
 
 use super::bounds::Reached;
 use super::gains::Gains;
@@ -20,7 +20,7 @@ use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// What is said of a truth without emission.
+/// Words on a truth without emission.
 pub const DARK: &str =
     "the truth is dark on all nodes: PSNR, relative error and correlation are not defined";
 
@@ -56,7 +56,7 @@ pub struct Results {
     cpu_seconds: Option<f64>,
     peak_memory_mib: Option<f64>,
     loss: f64,
-    /// Of each kind of data.
+    /// χ² per datum of each kind of data.
     pub chi2_per_datum: BTreeMap<String, f64>,
     axis: [f64; 3],
     inputs: Vec<InputFile>,
@@ -73,10 +73,10 @@ pub struct Results {
     quiescent: Option<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     mask_error: Option<f64>,
-    /// What sums along rays are off by, over the errors of the data.
+    /// Error of sums along rays, over the errors of the data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadrature_error: Option<f64>,
-    /// How good the solution of a linear grid is.
+    /// Quality of the solution of a linear grid.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub linear: Option<linear::Solved>,
     /// The weight that was chosen by held-out data.
@@ -90,13 +90,13 @@ pub struct Results {
     /// The same by the light curve of a flare.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub band: Option<Sealed<BandResults>>,
-    /// What a table tells of the two.
+    /// Numbers of the two in tables.
     #[serde(flatten)]
     of_searches: BTreeMap<String, Option<f64>>,
-    /// What the data cannot tell.
+    /// Quantities that the data cannot tell.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unknown: Vec<String>,
-    /// How close the volume is to the truth, where there is one.
+    /// Distance of the volume from the truth, where there is one.
     #[serde(flatten)]
     pub closeness: Option<Closeness>,
     /// Bounds that were reached.
@@ -104,15 +104,15 @@ pub struct Results {
     pub bounds: Vec<Reached>,
 }
 
-/// How close a volume is to the truth.
+/// Distance of a volume from the truth.
 #[derive(Serialize)]
 pub struct Closeness {
     /// Cosine of the angle between the axes.
     pub axis_dot_truth: f64,
-    /// What is said of a truth of which nothing is defined.
+    /// Note on a truth of which nothing is defined.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub note: Option<&'static str>,
-    /// Of all nodes.
+    /// PSNR of all nodes.
     pub psnr_db: Option<f64>,
     psnr_inside_db: Option<f64>,
     /// Relative error.
@@ -197,7 +197,7 @@ impl Estimate<'_> {
         })
     }
 
-    /// How close the volume is to the truth, where there is one.
+    /// Returns the distance of the volume from the truth, where there is one.
     fn closeness(&self, found: &Found<'_>) -> anyhow::Result<Option<Closeness>> {
         let (Some(truth), Some(volume)) = (&self.measured.truth, &self.true_volume) else {
             return Ok(None);

@@ -14,12 +14,12 @@ pub struct Changes {
     pub recovered: Vec<f64>,
     /// The same of the true one, if it is known.
     pub truth: Option<Vec<f64>>,
-    /// How close the two come.
+    /// Distance of the two.
     pub closeness: OverTime,
 }
 
 impl Estimate<'_> {
-    /// Of emission that may change, or does in the truth; none where matter carries it.
+    /// Returns the changes of emission that may change, or does in the truth; none where matter carries it.
     pub fn changes(
         &self,
         trainer: &mut Trainer<'_, f32>,

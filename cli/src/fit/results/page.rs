@@ -113,7 +113,7 @@ impl Estimate<'_> {
         Ok(figures)
     }
 
-    /// What the movie beside the recovered one is.
+    /// Names the movie beside the recovered one.
     pub fn known_movie(&self) -> &'static str {
         if self.measured.truth.is_some() { "truth" } else { "data" }
     }
@@ -170,7 +170,7 @@ impl Estimate<'_> {
         }
     }
 
-    /// What was fitted to what.
+    /// Describes what was fitted to what.
     fn subject(&self, results: &Results) -> String {
         let file = self.file;
         let data: Vec<&str> = file.loss.iter().map(|l| l.data.label()).collect();
@@ -241,7 +241,7 @@ pub fn settings(
     Ok(all.into_iter().map(row).collect())
 }
 
-/// With four digits behind the point, as far as there are any.
+/// Rounds to four digits behind the point, as far as there are any.
 fn rounded(x: f64) -> f64 {
     (1e4 * x).round() / 1e4
 }

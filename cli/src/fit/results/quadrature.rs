@@ -1,4 +1,4 @@
-//! What the sums along rays are off by, beside the errors of the data.
+//! Error of the sums along rays, beside the errors of the data.
 
 use super::Estimate;
 use kerrlight_tomo::fit::setup::Imaged;

@@ -1,4 +1,4 @@
-//! What does not move, recovered beside the emission: files, a picture and numbers.
+//! Emission that does not move, recovered beside the moving one: files, a picture and numbers.
 
 use super::Estimate;
 use crate::report::{self, Figure, enlarged};
@@ -26,7 +26,7 @@ pub struct Quiescent {
     truth: Option<Vec<Vec<f32>>>,
 }
 
-/// How close an image is to the truth.
+/// Distance of an image from the truth.
 struct Closeness {
     correlation: f64,
     relative_error: f64,
@@ -41,7 +41,7 @@ impl Quiescent {
 }
 
 impl Estimate<'_> {
-    /// What does not move, where it was recovered; writes its files.
+    /// Returns the emission that does not move, where it was recovered; writes its files.
     pub fn quiescent(
         &self,
         trainer: &Trainer<'_, f32>,
@@ -135,7 +135,7 @@ impl Quiescent {
         self.images[k].1.iter().map(|x| f64::from(*x)).sum()
     }
 
-    /// For results.json.
+    /// Returns its numbers for results.json.
     pub fn json(&self) -> Value {
         let one = |k: usize| {
             let name = self.images[k].0.name();

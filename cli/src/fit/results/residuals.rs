@@ -16,7 +16,7 @@ impl Estimate<'_> {
         plots(&found.judged, self.measured)
     }
 
-    /// Where on the sky images or visibilities have light that the model lacks; nothing where data know no places.
+    /// Returns the map of light in images or visibilities that the model lacks; nothing where data know no places.
     pub fn residual_map(&self, found: &Found<'_>) -> anyhow::Result<Option<Figure>> {
         let n = self.file.screen.pixels;
         let of_images = found.judged.terms.iter().map(|(_, tested)| tested);
@@ -40,7 +40,7 @@ impl Estimate<'_> {
         .map(Some)
     }
 
-    /// Where phases are fitted; nothing elsewhere, and nothing without errors.
+    /// Returns the residuals where phases are fitted; nothing elsewhere, and nothing without errors.
     fn dirty_residuals(&self, found: &Found<'_>) -> anyhow::Result<Option<Vec<f32>>> {
         let has_phases = self.file.loss.iter().any(|loss| loss.data == LossKind::Visibilities);
         let (Some((observation, _)), Some(sky)) = (&self.measured.visibilities, self.measured.sky)

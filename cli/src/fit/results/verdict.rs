@@ -1,4 +1,5 @@
-//! Whether a fit explains its data: from the residuals of its last state, in words and for other programs.
+//! Verdict: whether a fit explains its data, from the residuals of its last state, in words and for other
+//! programs.
 
 pub mod parts;
 #[cfg(test)]
@@ -10,7 +11,7 @@ pub use kerrlight_tomo::recovery::{DataVerdict, Evidence};
 use kerrlight_tomo::recovery::{range_of, short};
 use serde_json::{Value, json};
 
-/// For results.json.
+/// Returns the verdict for results.json.
 pub fn json(judged: &DataVerdict) -> Value {
     let outcome = match judged.verdict.outcome {
         Outcome::Explained => "explained",
@@ -78,7 +79,7 @@ fn term(judged: &DataVerdict, name: &str, tested: &Tested) -> Value {
     term
 }
 
-/// What stands first on the page.
+/// Returns the notice at the top of the page.
 pub fn notice(judged: &DataVerdict) -> Notice {
     let tone = match judged.verdict.outcome {
         Outcome::Explained => Tone::Good,

@@ -1,4 +1,4 @@
-//! What follows a fit on the terminal and keeps it in its folder.
+//! Progress of a fit on the terminal, kept in its folder.
 
 use super::folder::{self, Folder};
 use crate::devices::FitDevice;
@@ -37,7 +37,7 @@ fn kept(error: anyhow::Error) -> Error {
     Error::Kept(error.into())
 }
 
-/// What goes on.
+/// Names what goes on.
 fn name(at: At<'_>) -> &'static str {
     match at {
         At::Geometry { .. } => "geometry",
@@ -50,7 +50,7 @@ fn name(at: At<'_>) -> &'static str {
 }
 
 impl<'a> Kept<'a> {
-    /// Of a run of these settings.
+    /// Takes a run of these settings.
     pub fn new(
         problem: &'a Problem,
         text: &'a str,
@@ -67,7 +67,7 @@ impl<'a> Kept<'a> {
         }
     }
 
-    /// What stops work of this kind.
+    /// Returns the guard that stops work of this kind.
     fn keeper(&self, at: At<'_>) -> SignalGuard {
         match at {
             At::Step(_) => {
@@ -221,7 +221,7 @@ impl<'a> Kept<'a> {
         }
     }
 
-    /// What the file of a search says, which is told; none if it has not looked.
+    /// Reads the file of a search, which is told; none if it has not looked.
     fn read(&self, stage: Stage) -> anyhow::Result<Option<Choice>> {
         match stage {
             Stage::Geometry => geometry_search::chosen(self.folder, &self.problem.settings),

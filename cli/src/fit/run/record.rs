@@ -1,4 +1,4 @@
-//! What a run says of its steps.
+//! Messages of a run on its steps.
 
 use super::kept::Kept;
 use crate::progress;

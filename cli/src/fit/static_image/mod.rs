@@ -47,7 +47,7 @@ pub struct Prepared {
     polarized: Option<FitData>,
 }
 
-/// What was found.
+/// The image that was found, with its evidence.
 struct Found<'a> {
     file: &'a StaticImageFile,
     measured: &'a FitData,
@@ -131,7 +131,7 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
         .files(files.iter().map(|path| path.as_path())))
 }
 
-/// What was found of polarisation, and its residuals; writes the leakage of stations, where it was solved for.
+/// Returns the polarisation that was found, and its residuals; writes the leakage of stations, where it was solved for.
 fn told(
     prepared: &Prepared,
     survey: Option<PolarizedSurvey>,
@@ -216,7 +216,7 @@ fn compared<'a>(
     Ok((names, terms.iter().map(|term| of(&*term.term)).collect()))
 }
 
-/// What results call a kind of data.
+/// Returns the name of a kind of data in results.
 fn name(kind: LossKind) -> &'static str {
     match kind {
         LossKind::Amplitudes => "amplitudes",

@@ -13,7 +13,7 @@ use crate::report::{Axis, LinePlot, Marks, Outcome, Report, Series, Table};
 use kerrlight_imaging::settings::StaticImageFile;
 use kerrlight_imaging::{Candidate, ShapeFit};
 
-/// What the numbers of a ring are called, their units and what they mean.
+/// Names of the numbers of a ring, their units and meaning.
 const MEANINGS: [(&str, &str, usize, &str); 5] = [
     (
         "diameter of the ring",

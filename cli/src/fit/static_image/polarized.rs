@@ -86,7 +86,7 @@ const NUMBERS: [Number; 7] = [
 pub struct Polarized {
     /// The settings.
     pub settings: StaticPolarization,
-    /// What was found.
+    /// The polarisation that was found.
     pub survey: PolarizedSurvey,
     /// Leakage of the stations, where it is solved for.
     pub leakage: Option<Leakage>,
@@ -94,7 +94,7 @@ pub struct Polarized {
     count: usize,
 }
 
-/// What results and pages call a kind of data.
+/// Returns the name of a kind of data in results and on pages.
 fn name(kind: LossKind) -> &'static str {
     match kind {
         LossKind::PolarimetricRatios => "polarimetric ratios",
@@ -102,7 +102,7 @@ fn name(kind: LossKind) -> &'static str {
     }
 }
 
-/// How polarisation was found, for results.json.
+/// Numbers of the polarisation, for results.json.
 #[derive(Serialize)]
 pub struct PolarizedNumbers {
     count: usize,
@@ -128,7 +128,7 @@ impl From<&Polarized> for PolarizedNumbers {
 }
 
 impl Polarized {
-    /// Of what was found of these data, and its residuals to be judged.
+    /// Takes the polarisation that was found of these data, and its residuals to be judged.
     pub fn new(
         file: &StaticImageFile,
         measured: &FitData,
@@ -189,7 +189,7 @@ impl Polarized {
         NUMBERS.iter().map(one).collect()
     }
 
-    /// What was found, in a sentence.
+    /// Describes the result, in a sentence.
     pub fn sentence(&self) -> String {
         let [net, _, mean, brightest, direction, beta, angle] =
             NUMBERS.each_ref().map(|number| self.value(number));
@@ -209,7 +209,7 @@ impl Polarized {
         )
     }
 
-    /// What was assumed.
+    /// Describes the assumptions.
     pub fn model(&self) -> Vec<String> {
         let StaticPolarization { leakage_left, smoothness, variability, .. } = &self.settings;
         let mut text = vec![format!(
@@ -233,7 +233,7 @@ impl Polarized {
         text
     }
 
-    /// What errors are made of.
+    /// Describes what errors are made of.
     pub fn errors(&self) -> Option<String> {
         let (draws, others) = (self.survey.draws.len(), self.survey.strengths.len());
         (draws > 1).then(|| {
@@ -245,7 +245,7 @@ impl Polarized {
         })
     }
 
-    /// What the data do not tell.
+    /// Describes what the data do not tell.
     pub fn not_concluded(&self) -> Vec<String> {
         let mut text = vec![
             "Circular polarisation, and Faraday rotation: position angles are those that arrive here. Fractions are lower limits \

@@ -76,14 +76,14 @@ struct HeldLoss {
     losses: Vec<f64>,
 }
 
-/// How many images have a ring.
+/// Number of images with a ring.
 #[derive(Serialize)]
 struct WithRing {
     count: usize,
     of: usize,
 }
 
-/// Where the ring is, and how round.
+/// Place of the ring, and its scatter.
 #[derive(Serialize)]
 struct RingPlace {
     centre_east_uas: f64,

@@ -1,4 +1,4 @@
-//! What is said of a static image: data, model, priors, and what may be concluded.
+//! Words on a static image: data, model, priors, and what may be concluded.
 
 use super::Found;
 use super::numbers::{RING, of_ring, with_error};
@@ -38,7 +38,7 @@ fn ring(survey: &Survey, shapes: &[ShapeFit]) -> String {
     )
 }
 
-/// That the image has no ring, and whether a simple shape with one fits the data better than those without.
+/// States that the image has no ring, and whether a simple shape with one fits the data better than those without.
 fn no_ring(shapes: &[ShapeFit]) -> String {
     let none = "The image has no ring between the radii that were asked for";
     let best = shapes.iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion));
@@ -51,8 +51,8 @@ fn no_ring(shapes: &[ShapeFit]) -> String {
     )
 }
 
-/// Why the ring of an image is not claimed: other images that the data allow have none, or a shape without a hole fits better
-/// than a ring and a crescent.
+/// Explains why the ring of an image is not claimed: other images that the data allow have none, or a shape without a hole
+/// fits better than a ring and a crescent.
 pub fn doubt(survey: &Survey, shapes: &[ShapeFit]) -> Option<String> {
     let [with, all] = survey.with_ring();
     if (with as f64) < LEAST_AGREEMENT * all as f64 {

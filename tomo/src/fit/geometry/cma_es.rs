@@ -18,7 +18,7 @@ pub struct Sample {
     pub value: f64,
 }
 
-/// Where an exploration began and ended.
+/// Begin and end of an exploration.
 #[derive(Clone, Debug)]
 pub struct Explored {
     /// The first geometry.
@@ -27,18 +27,18 @@ pub struct Explored {
     pub best: Estimate,
     /// All geometries that were evaluated.
     pub samples: Vec<Sample>,
-    /// Where the minimum is expected from there, if that is known: populations alone do not say so.
+    /// Minimum that is expected from there, if it is known: populations alone do not say so.
     pub further: Option<Geometry>,
 }
 
-/// How a geometry is looked for.
+/// Settings of an exploration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exploration {
     /// Standard deviation of the first population in units of [`Parameter::scale`](super::Parameter::scale).
     pub width: f64,
     /// Largest number of geometries to evaluate.
     pub trials: usize,
-    /// Of the draws.
+    /// Seed of the draws.
     pub seed: u64,
 }
 
@@ -55,13 +55,13 @@ const ALIKE: f64 = 0.05;
 struct Log {
     samples: Vec<Sample>,
     error: Option<Error>,
-    /// Where data are not convex, the best geometry so far.
+    /// Best geometry so far, where data are not convex.
     best: Option<Estimate>,
 }
 
 impl<T: Float + Default> GeometryProblem<'_, T> {
-    /// From a start to the best geometry that populations find; none if it was cancelled. The same for the same seed on
-    /// any number of threads.
+    /// Explores from a start to the best geometry that populations find; none if it was cancelled. The same for the same seed
+    /// on any number of threads.
     ///
     /// Where data are convex, the volume of each geometry is solved for from a dark one. Others have several minima, which only
     /// many starts tell apart: there volumes follow, population by population, the best one so far, at first that of lit

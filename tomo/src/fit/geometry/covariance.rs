@@ -3,7 +3,7 @@
 use super::{Free, Geometry};
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// Up to this part of every prior's deviation, the second derivatives alone are the answer.
+/// Part of every prior's deviation up to which the second derivatives alone are the answer.
 const NARROW: f64 = 0.3;
 /// Half the distance of the differences of priors, in units of each parameter's scale.
 const WIDTH: f64 = 0.1;

@@ -1,5 +1,5 @@
-//! What finer models would move a geometry by, one Gauss–Newton step of each from the best geometry, and what the χ² that they
-//! leave may.
+//! Discretisation errors: what finer models would move a geometry by, one Gauss–Newton step of each from the best geometry,
+//! and what the χ² that they leave may.
 
 use super::covariance::covariance;
 use super::gauss_newton::{Bowl, Polish};
@@ -21,25 +21,25 @@ pub struct Standing {
 /// A kind of refinement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Refinement {
-    /// What becomes finer.
+    /// Part of the model that becomes finer.
     pub source: &'static str,
-    /// What endless refinement moves the geometry by, over what this one does.
+    /// Ratio of the step of endless refinement to that of this one.
     pub onwards: f64,
 }
 
-/// What a refinement does.
+/// Effect of a refinement.
 pub struct Refined {
     kind: Refinement,
-    /// By what it moves the geometry, in units of scales.
+    /// Step of the geometry, in units of scales.
     step: DVector<f64>,
-    /// By what it lowers χ²/2.
+    /// Decrease of χ²/2.
     gain: f64,
 }
 
 /// An error that the model has of itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelError {
-    /// What of the model makes it.
+    /// Part of the model that makes it.
     pub source: &'static str,
     /// Its covariance row by row, in the free parameters' own units.
     pub covariance: Vec<f64>,
@@ -74,8 +74,8 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         Ok(Standing { best, bowl, excess })
     }
 
-    /// By what χ²/2 lies above that of a right model and above its scatter by chance, where it is this over the number of
-    /// data.
+    /// Returns the excess of χ²/2 over that of a right model and over its scatter by chance, where it is this over the number
+    /// of data.
     pub fn excess(&self, reduced_chi2: f64) -> f64 {
         let data = self.data();
         (0.5 * (data * (reduced_chi2 - 1.0) - BY_CHANCE * (2.0 * data).sqrt())).max(0.0)
@@ -83,7 +83,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
 }
 
 impl Standing {
-    /// What a finer model of the same data does; none if its bowl is not finite.
+    /// Returns the effect of a finer model of the same data; none if its bowl is not finite.
     ///
     /// # Errors
     /// As those of [`polish`](GeometryProblem::polish).
@@ -131,7 +131,7 @@ mod tests {
     use super::*;
     use crate::fit::geometry::{Parameter, Prior};
 
-    /// Of a bowl in which the data leave the spin a standard deviation of 0.001.
+    /// Returns a bowl in which the data leave the spin a standard deviation of 0.001.
     fn standing(excess: f64) -> Standing {
         let best =
             Estimate { geometry: Geometry::new(0.3, 1.0), x: Vec::new(), chi2: 0.0, value: 0.0 };

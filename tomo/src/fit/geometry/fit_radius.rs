@@ -1,4 +1,4 @@
-//! How far from the best geometry its bowl is looked at: until it has risen clearly above the ripples.
+//! Chooses the radius of the quadratic form about the best geometry: until values have risen clearly above the ripples.
 
 use super::gauss_newton::Polished;
 use super::problem::GeometryProblem;
@@ -7,12 +7,12 @@ use crate::Error;
 use kerrlight_common::simd::Float;
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
 
-/// Along each axis values are taken as far away as they have risen by this, in units of −ln of the density.
+/// Rise up to which values along each axis are taken, in units of −ln of the density.
 const RISE: f64 = 8.0;
 /// And by so many ripples.
 const CLEAR: f64 = 2.5;
-/// How often a step is doubled that does not rise so far, at most and, as a parabola through three values leaves nothing, at
-/// least.
+/// Number of times a step is doubled that does not rise so far, at most and, as a parabola through three values leaves
+/// nothing, at least.
 const DOUBLINGS: usize = 6;
 const FEWEST: usize = 1;
 
@@ -34,11 +34,11 @@ struct Parabola {
     left: (f64, usize),
 }
 
-/// How far it is looked.
+/// Radius of the quadratic form.
 pub(super) struct Reach {
     /// Places are these columns times ξ with |ξ| ≤ 1, in units of scales.
     pub columns: DMatrix<f64>,
-    /// Whether ripples asked for a longer way than errors of the data.
+    /// True if ripples asked for a longer way than errors of the data.
     pub is_wide: bool,
     value: f64,
     ripple: f64,
@@ -50,13 +50,13 @@ impl Axis {
         (self.doublings as f64).exp2()
     }
 
-    /// Whether there is more to see: not where bounds end both ways.
+    /// Returns whether there is more to see: not where bounds end both ways.
     fn goes_on(&self) -> bool {
         let far = 0.99 * self.far();
         self.doublings < DOUBLINGS && self.risen.iter().any(|(t, _)| t.abs() > far)
     }
 
-    /// Through the best geometry, whose own ripple counts as those of the others.
+    /// Fits a parabola through the best geometry, whose own ripple counts as those of the others.
     fn parabola(&self) -> Parabola {
         let all = || self.risen.iter().copied().chain([(0.0, 0.0)]);
         let row = |t: f64| Vector3::new(1.0, t, 0.5 * t * t);
@@ -68,7 +68,7 @@ impl Axis {
         Parabola { slope: found[1], bend: found[2], left: (all().map(square).sum(), more) }
     }
 
-    /// What the parabola rises by where values end.
+    /// Returns the rise of the parabola where values end.
     fn rise(&self) -> f64 {
         0.5 * self.parabola().bend * self.far().powi(2)
     }
@@ -94,7 +94,7 @@ impl Reach {
         seen
     }
 
-    /// What the axes alone say; those along which values do not rise are open.
+    /// Returns the form from the axes alone; those along which values do not rise are open.
     pub fn form(&self) -> Form {
         let n = self.axes.len();
         let of = |k: usize| (self.axes[k].parabola(), self.axes[k].far());

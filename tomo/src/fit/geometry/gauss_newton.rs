@@ -14,7 +14,7 @@ use crate::representation::Workspace;
 use kerrlight_common::simd::Float;
 use nalgebra::{DMatrix, DVector};
 
-/// Where Gauss–Newton steps ended.
+/// End of Gauss–Newton steps.
 #[derive(Clone, Debug)]
 pub struct Polished {
     /// The best geometry and its volume.
@@ -22,13 +22,13 @@ pub struct Polished {
     /// Covariance of the free parameters row by row, in their own units: the inverse of half the second derivatives of
     /// χ² with the volume solved for, and of those of the priors; the spread of the priors where the data do not decide.
     pub covariance: Vec<f64>,
-    /// By how much the best volume moves with each free parameter, per its scale.
+    /// Change of the best volume with each free parameter, per its scale.
     pub responses: Vec<Vec<f64>>,
-    /// Where a further step leads; none where there is no bowl.
+    /// End of a further step; none where there is no bowl.
     pub further: Option<Geometry>,
 }
 
-/// How steps are taken.
+/// Settings of the steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Polish {
     /// Steps, at most.
@@ -54,7 +54,7 @@ const ENOUGH: f64 = 0.005;
 pub(super) struct Bowl {
     pub slopes: DVector<f64>,
     pub bends: DMatrix<f64>,
-    /// Of the best volume.
+    /// Responses of the best volume.
     pub responses: Vec<Vec<f64>>,
 }
 
@@ -68,7 +68,7 @@ impl Bowl {
 }
 
 impl<T: Float + Default> GeometryProblem<'_, T> {
-    /// From a geometry and its volume to the best one near it.
+    /// Steps from a geometry and its volume to the best one near it.
     ///
     /// # Errors
     /// If a number is out of its range, or χ² is not finite.
@@ -112,7 +112,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         Ok(None)
     }
 
-    /// About the best volume at a distance from another geometry, in units of scales; bounds hold it.
+    /// Returns the best volume at a distance from another geometry, in units of scales; bounds hold it.
     pub(super) fn along(&self, from: &Estimate, responses: &[Vec<f64>], step: &[f64]) -> Vec<f64> {
         let mut x = from.x.clone();
         for (response, step) in responses.iter().zip(step) {
@@ -171,7 +171,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         Ok(bowl)
     }
 
-    /// What images of a held volume change by per scale of each free parameter.
+    /// Returns the change of images of a held volume per scale of each free parameter.
     fn image_differences(&self, at: &Estimate) -> Result<Vec<Vec<T>>, Error> {
         let one = |free: &super::Free| -> Result<Vec<T>, Error> {
             let ([low, high], here) = (free.bounds(), at.geometry.get(free.parameter));

@@ -1,4 +1,4 @@
-//! What a fit may not know of the geometry beside the emission: the hole, the view of it, and how matter moves.
+//! Unknown geometry beside the emission: the hole, the view of it, and how matter moves.
 //!
 //! [`Geometry`] is a point in the space of these parameters, and [`GeometryModel`] makes a forward model of it.
 
@@ -40,7 +40,7 @@ pub enum Parameter {
     Spin,
     /// Angle from the spin axis to the observer, radians.
     Inclination,
-    /// Of the spin axis on the sky, radians east of north (anticlockwise on images with north up).
+    /// Position angle of the spin axis on the sky, radians east of north (anticlockwise on images with north up).
     PositionAngle,
     /// ξ of [`Law::Infall`]: specific angular momentum over that of circular geodesics, 0 to 1.
     Xi,
@@ -105,7 +105,7 @@ impl Parameter {
         }
     }
 
-    /// What settings and results call it.
+    /// Returns its name in settings and results.
     pub fn name(self) -> &'static str {
         match self {
             Parameter::Spin => "spin",
@@ -117,7 +117,7 @@ impl Parameter {
         }
     }
 
-    /// What one of settings and results is in [`Geometry`]: a degree is π/180.
+    /// Returns the unit of settings and results in [`Geometry`]: a degree is π/180.
     pub fn unit(self) -> f64 {
         match self {
             Parameter::Inclination | Parameter::PositionAngle => PI / 180.0,
@@ -171,7 +171,7 @@ impl Geometry {
         Geometry([spin, inclination, 0.0, 1.0, 1.0, 1.0])
     }
 
-    /// Of a parameter.
+    /// Returns the value of a parameter.
     pub fn get(&self, parameter: Parameter) -> f64 {
         self.0[parameter.index()]
     }

@@ -1,4 +1,4 @@
-//! From a geometry to the forward model of a fit.
+//! Forward model of a fit in a geometry.
 
 use super::{Geometry, Parameter};
 use crate::Error;
@@ -15,7 +15,7 @@ use kerrlight_render::dynamics::{AngularVelocity, Axis};
 use kerrlight_render::polarization::PolarizationLaw;
 use std::sync::Arc;
 
-/// How matter moves.
+/// Law of the motion of matter.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Law {
     /// 1/(r^{3/2} + a): circular geodesics about whatever spin the hole has.
@@ -28,7 +28,7 @@ pub enum Law {
 }
 
 impl Law {
-    /// As it is in a geometry, about an axis.
+    /// Returns the velocity in a geometry, about an axis.
     fn velocity(&self, geometry: &Geometry, axis: Axis) -> Result<AngularVelocity, Error> {
         match self {
             Law::Infall(drag) => infall(*drag, geometry, axis),
@@ -52,10 +52,10 @@ fn infall(drag: Option<f64>, geometry: &Geometry, axis: Axis) -> Result<AngularV
     Ok(AngularVelocity::Falling(Arc::new(Falling::new(law)?)))
 }
 
-/// What all geometries share: the screen, where emission is looked for, the law of motion and the frames.
+/// Properties that all geometries share: the screen, where emission is looked for, the law of motion and the frames.
 #[derive(Clone, Debug)]
 pub struct GeometryModel {
-    /// Where the pixels are, M to the right of the middle of the screen.
+    /// Places of the pixels, M to the right of the middle of the screen.
     pub x: Vec<f64>,
     /// The same, upwards.
     pub y: Vec<f64>,
@@ -66,19 +66,19 @@ pub struct GeometryModel {
     pub parts: Option<(f64, usize)>,
     /// Distance of the observer, M; infinity without one.
     pub observer_radius: Option<f64>,
-    /// Where emission may be.
+    /// Region of the emission.
     pub region: Region,
     /// Nodes of a Gauss–Legendre panel, at most 16.
     pub order: usize,
-    /// Into how many panels each of the coarsest is cut.
+    /// Number of panels into which each of the coarsest is cut.
     pub split: u32,
-    /// Whether light takes its time.
+    /// True if light takes its time.
     pub slow_light: bool,
     /// The power of g that emission goes like; none without redshift.
     pub redshift: Option<Redshift>,
-    /// How fast matter turns.
+    /// Law of the rotation of matter.
     pub law: Law,
-    /// What it turns about.
+    /// Axis of the rotation.
     pub axis: Axis,
     /// Times of the frames, M, and when emission is what a representation says; its velocity
     /// is not used.
@@ -87,7 +87,7 @@ pub struct GeometryModel {
     pub jy: f64,
     /// The law of polarised light, which has a power of g of its own; unpolarised, without one.
     pub polarization: Option<PolarizationLaw>,
-    /// What data see.
+    /// Quantities that data depend on.
     pub seen: Observable,
 }
 
@@ -126,7 +126,7 @@ impl GeometryModel {
         Ok(model)
     }
 
-    /// How polarised light is seen in a geometry.
+    /// Returns the view of polarised light in a geometry.
     pub fn polarized(&self, geometry: &Geometry) -> Option<PolarizedView> {
         let law = self.polarization?;
         let turn = turn(geometry);
@@ -158,7 +158,7 @@ impl GeometryModel {
         Self { ring: self.ring.map(shifted), ..self.clone() }
     }
 
-    /// How matter moves in a geometry.
+    /// Returns the motion of matter in a geometry.
     ///
     /// # Errors
     /// If a parameter of the flow is out of its range.
@@ -166,7 +166,7 @@ impl GeometryModel {
         Ok(Motion { velocity: self.law.velocity(geometry, self.axis)?, ..self.motion.clone() })
     }
 
-    /// Which pixels are nearer to the critical curve of a geometry than a limit, M.
+    /// Returns the pixels that are nearer to the critical curve of a geometry than a limit, M.
     ///
     /// # Errors
     /// If a parameter is out of its range.
@@ -191,7 +191,8 @@ impl GeometryModel {
     }
 }
 
-/// From a place on the screen (M to the right and upwards) to α and β, M: α across the spin's projection, β along it.
+/// Returns the map from a place on the screen (M to the right and upwards) to α and β, M: α across the spin's projection, β
+/// along it.
 pub(super) fn turn(geometry: &Geometry) -> impl Fn([f64; 2]) -> [f64; 2] + Copy {
     let (sin, cos) = geometry.get(Parameter::PositionAngle).sin_cos();
     move |[x, y]| [x * cos + y * sin, y * cos - x * sin]

@@ -7,7 +7,7 @@ use super::quadratic_form::{Envelope, Evaluations, diagonals, ends, fitted};
 use crate::Error;
 use kerrlight_common::simd::Float;
 
-/// What is looked at around a geometry.
+/// Neighbours of a geometry.
 pub struct Surroundings<'a> {
     polished: &'a Polished,
     /// Voxels of the volume, along each axis.
@@ -55,8 +55,8 @@ impl Surroundings<'_> {
 }
 
 impl<T: Float + Default> GeometryProblem<'_, T> {
-    /// What there is around a geometry along the rays of this problem. None if the covariance of the steps that led there is
-    /// not finite.
+    /// Returns the neighbours of a geometry along the rays of this problem. None if the covariance of the steps that led
+    /// there is not finite.
     ///
     /// # Errors
     /// As those of [`polish`](Self::polish).

@@ -1,4 +1,4 @@
-//! What is thought about a parameter of the geometry before any data.
+//! Priors of parameters of the geometry.
 
 use crate::Error;
 
@@ -19,7 +19,7 @@ pub enum Prior {
         /// Its standard deviation, above 0.
         sigma: f64,
     },
-    /// Of an inclination whose axis may point anywhere: sin i between two angles in radians.
+    /// Isotropic axis of an inclination: sin i between two angles in radians.
     Isotropic {
         /// Least inclination.
         low: f64,

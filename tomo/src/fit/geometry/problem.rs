@@ -11,10 +11,10 @@ use crate::representation::Degree;
 use core::f64::consts::TAU;
 use kerrlight_common::simd::Float;
 
-/// From this part of its prior's deviation on, the data say nothing about a parameter.
+/// Part of its prior's deviation from which on the data say nothing about a parameter.
 const OPEN: f64 = 0.8;
 
-/// How much of the probability an interval holds.
+/// Probability that an interval holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
     /// Its part.
@@ -35,7 +35,7 @@ impl Span {
 pub struct Free {
     /// Which.
     pub parameter: Parameter,
-    /// What is thought of it before.
+    /// Its prior.
     pub prior: Prior,
 }
 
@@ -87,13 +87,13 @@ impl Free {
         }
     }
 
-    /// Whether data that leave this standard deviation, in the parameter's own unit, say nothing about it.
+    /// Returns whether data that leave this standard deviation, in the parameter's own unit, say nothing about it.
     pub fn is_open(&self, sigma: f64) -> bool {
         sigma >= OPEN * self.prior.deviation()
     }
 
-    /// Where the parameter lies with the probability of `span`, in its own unit: about its best value, within its
-    /// bounds, or where the data say nothing, the middle of its prior.
+    /// Returns the interval that holds the parameter with the probability of `span`, in its own unit: about its best value,
+    /// within its bounds, or where the data say nothing, the middle of its prior.
     pub fn interval(&self, value: f64, sigma: Option<f64>, span: Span) -> [f64; 2] {
         let Some(sigma) = sigma.filter(|sigma| !self.is_open(*sigma)) else {
             return [-0.5, 0.5].map(|half| self.prior.quantile(0.5 + half * span.probability));
@@ -139,26 +139,26 @@ pub struct GeometryProblem<'a, T: Float> {
     pub flux: Option<f64>,
     /// Penalties on the volume, in units of χ².
     pub penalties: &'a [Penalty],
-    /// How emission may change while matter carries it, its weight in units of χ²; [`Change::NONE`] is the usual.
+    /// Change of emission while matter carries it, its weight in units of χ²; [`Change::NONE`] is the usual.
     pub change: Change,
     /// A Gaussian prior of the voxels that are solved for, if there is one.
     pub gaussian: Option<&'a GaussianField>,
-    /// By what χ² is multiplied against the priors: 1 for data with errors.
+    /// Factor of χ² against the priors: 1 for data with errors.
     pub scale: f64,
-    /// What is solved for each geometry.
+    /// Effort of the solution for each geometry.
     pub effort: Effort,
-    /// What an earlier search has found, where data are convex.
+    /// Results of an earlier search, where data are convex.
     pub memory: Memory<'a>,
 }
 
-/// How a volume is solved for.
+/// Effort of the solution for a volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
     /// Voxels along each axis.
     pub nodes: usize,
-    /// What is between them.
+    /// Degree of the interpolation.
     pub degree: Degree,
-    /// How long it is looked for.
+    /// Rule that stops the solution.
     pub patience: StopRule,
 }
 
@@ -202,7 +202,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         Ok(self.estimate(geometry, least))
     }
 
-    /// Whether χ² is convex in the volume of each geometry.
+    /// Returns whether χ² is convex in the volume of each geometry.
     pub fn is_convex(&self) -> bool {
         self.terms.iter().all(|data| data.term.is_convex())
     }

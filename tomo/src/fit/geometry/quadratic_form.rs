@@ -37,7 +37,7 @@ pub(super) struct Evaluations {
     pub values: Vec<f64>,
 }
 
-/// What is fitted to the values of all lattices: a constant and a slope of each, and second derivatives of all.
+/// Form that is fitted to the values of all lattices: a constant and a slope of each, and second derivatives of all.
 pub(super) struct Form {
     pub slopes: Vec<DVector<f64>>,
     pub bends: DMatrix<f64>,
@@ -122,7 +122,8 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     }
 }
 
-/// What the scatter of so few is too small by: the variance of Student's t with n − 1 degrees of freedom, where it has one.
+/// Returns the factor by which the scatter of so few is too small: the variance of Student's t with n − 1 degrees of freedom,
+/// where it has one.
 fn few(count: f64) -> f64 {
     if count > 3.0 { (count - 1.0) / (count - 3.0) } else { 3.0 }
 }

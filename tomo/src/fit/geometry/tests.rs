@@ -164,7 +164,7 @@ fn of_hot_spot<'a>(
     }
 }
 
-/// From nearby to the best geometry, with images of other rays and noise of 1 %: the errors hold what is left.
+/// Steps lead from nearby to the best geometry, with images of other rays and noise of 1 %: the errors hold what is left.
 #[test]
 fn exact_steps_lead_to_the_best_geometry() {
     let (mut model, side) = (screen(20, 12), 20);

@@ -1,17 +1,17 @@
-//! How sure a geometry is: a quadratic form through the values of geometries near the best one.
+//! Errors of a geometry: a quadratic form through the values of geometries near the best one.
 
 use super::covariance::covariance;
 use super::{Free, Geometry, ModelError, ModelErrors, Sample};
 use nalgebra::{DMatrix, DVector};
 
-/// What the values near the best geometry say.
+/// Errors from the values near the best geometry.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spread {
     /// The lowest point of the quadratic form, inside the bounds.
     pub geometry: Geometry,
     /// Standard deviation of each free parameter, in its own unit.
     pub sigma: Vec<f64>,
-    /// Whether the data say nothing about a free parameter: its standard deviation is that of its prior.
+    /// True if the data say nothing about a free parameter: its standard deviation is that of its prior.
     pub open: Vec<bool>,
     /// Correlations of the free parameters, row by row.
     pub correlation: Vec<f64>,
@@ -19,7 +19,7 @@ pub struct Spread {
     pub ripple: f64,
     /// Geometries that the form was fitted to.
     pub trials: usize,
-    /// What of `sigma` the model makes itself.
+    /// Part of `sigma` that the model makes itself.
     pub own: ModelErrors,
 }
 
@@ -29,7 +29,7 @@ const PLENTY: usize = 2;
 const CLEAR: f64 = 4.0;
 
 impl Spread {
-    /// Of geometries sorted by their values, of data with this χ²/N at the best; none if there are too few, or the values
+    /// Fits geometries sorted by their values, of data with this χ²/N at the best; none if there are too few, or the values
     /// have no lowest point that is clear of their ripples.
     ///
     /// The form goes through the fewest of the best geometries over which it rises clearly above the ripples: values that
@@ -46,7 +46,7 @@ impl Spread {
         counts.filter_map(|count| Self::through(free, best, &samples[..count], reduced_chi2)).next()
     }
 
-    /// About another geometry near by: how far it is from this one is part of its error.
+    /// Moves the errors to another geometry near by: its distance from this one is part of its error.
     #[must_use]
     pub fn moved(&self, free: &[Free], geometry: Geometry) -> Self {
         let step = free.iter().map(|Free { parameter, .. }| {
@@ -57,7 +57,7 @@ impl Spread {
         Self { geometry, ..self.widened(free, &both) }
     }
 
-    /// With errors that the model has of itself.
+    /// Adds errors that the model has of itself.
     #[must_use]
     pub fn beside(self, free: &[Free], own: ModelErrors) -> Self {
         let known = own.known.iter();
@@ -65,7 +65,8 @@ impl Spread {
         Self { own, ..whole }
     }
 
-    /// What χ²/2 above that of a right model can make of errors that have grown with χ²/N already; none if there is no excess.
+    /// Returns the effect of χ²/2 above that of a right model on errors that have grown with χ²/N already; none if there is no
+    /// excess.
     pub fn unexplained(&self, excess: f64, reduced_chi2: f64) -> Option<ModelError> {
         let (n, factor) = (self.sigma.len(), 2.0 * excess / reduced_chi2.max(1.0));
         let of = |a: usize, b: usize| self.correlation[a * n + b] * self.sigma[a] * self.sigma[b];
@@ -73,7 +74,7 @@ impl Spread {
         (excess > 0.0).then_some(ModelError { source: ModelError::UNEXPLAINED, covariance })
     }
 
-    /// With errors of this covariance, row by row in the parameters' own units, beside its own.
+    /// Adds errors of this covariance, row by row in the parameters' own units.
     fn widened(&self, free: &[Free], more: &[f64]) -> Self {
         let n = free.len();
         let covariance = |a: usize, b: usize| {
@@ -129,7 +130,7 @@ struct Form {
     slopes: Vec<f64>,
     bends: Vec<f64>,
     ripple: f64,
-    /// How far geometries lie from the best one.
+    /// Distances of geometries from the best one.
     reach: Vec<f64>,
 }
 

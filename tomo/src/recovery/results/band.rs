@@ -23,7 +23,7 @@ pub struct BandResults {
     pub inclinations: Shares,
     /// Angular velocity over that of the law.
     pub rotation_factor: Probabilities,
-    /// Of the spin, degrees east of north.
+    /// Position angle of the spin, degrees east of north.
     pub position_angle_deg: Probabilities,
     /// Probability that matter turns clockwise on the sky.
     pub clockwise: Option<f64>,
@@ -43,13 +43,13 @@ pub struct BandResults {
     pub periods: Shares,
     /// ln of the probability of the data with a flare over that without one.
     pub ln_bayes_factor: Option<f64>,
-    /// What shines beside the flare, where that is assumed.
+    /// Background of the flare, where that is assumed.
     pub background: Option<Background>,
-    /// What it is expected to be at all data.
+    /// Expected background at all data.
     pub background_jy: Option<Vec<FluxDatum>>,
     /// χ² of the samples that were not fitted, over their number.
     pub validation_chi2_per_datum: Option<f64>,
-    /// What was simulated.
+    /// Simulated band.
     pub truth: TrueBand,
     /// All geometries.
     pub geometries: Vec<WeighedGeometry>,
@@ -75,7 +75,7 @@ pub struct Probabilities {
     pub probabilities: Shares,
 }
 
-/// What was simulated.
+/// Simulated band.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrueBand {
     /// Angle from the spin to the observer, degrees.
@@ -193,7 +193,7 @@ fn normalised(mut all: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     all
 }
 
-/// How probable each radius is in each geometry, up to a factor.
+/// Returns the probability of each radius in each geometry, up to a factor.
 fn orbits(scan: &BandScan) -> Vec<Vec<f64>> {
     let all = scan.geometries.iter().flat_map(|geometry| geometry.by_radius.iter().copied());
     let most = all.fold(f64::NEG_INFINITY, f64::max);

@@ -1,4 +1,4 @@
-//! What is said of a flare in an orbital band.
+//! Words on a flare in an orbital band.
 
 use super::band::BandResults;
 use crate::fit::band::Interval;
@@ -49,7 +49,7 @@ impl BandResults {
     }
 }
 
-/// Whether a flare is seen before a background.
+/// Describes whether a flare is seen before a background.
 fn flare(ln: f64) -> String {
     let factor = match ln.abs() {
         size if size < 5.0 => format!("{:.2}", ln.exp()),
@@ -70,10 +70,10 @@ fn flare(ln: f64) -> String {
 /// ln of 20, above which a Bayes factor is called strong (Kass & Raftery 1995).
 const SEEN: f64 = 3.0;
 
-/// From this width on an interval of azimuths is the whole circle, degrees: 95 % of it.
+/// Width from which on an interval of azimuths is the whole circle, degrees: 95 % of it.
 const ROUND: f64 = 0.95 * 360.0 - 5.0;
 
-/// Where the middle of a flare is, from median and interval of its azimuth in degrees.
+/// Describes the middle of a flare, from median and interval of its azimuth in degrees.
 fn place_of(Interval { median, low, high }: Interval) -> String {
     if high - low > ROUND {
         return "its middle may be at any azimuth".to_owned();

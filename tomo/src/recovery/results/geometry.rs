@@ -24,13 +24,13 @@ pub struct GeometryResults {
     pub flow_error: Option<f64>,
     /// Standard deviations; none without a form that tells them.
     pub sigma: PerParameter<Option<f64>>,
-    /// Whether the data say nothing about a parameter.
+    /// True if the data say nothing about a parameter.
     pub open: PerParameter<bool>,
     /// Ends of the 68 % intervals.
     pub interval_68: PerParameter<[f64; 2]>,
     /// Ends of the 95 % intervals.
     pub interval_95: PerParameter<[f64; 2]>,
-    /// What of `sigma` each part of the model makes itself.
+    /// Part of `sigma` that each part of the model makes itself.
     pub model_error: Option<BTreeMap<String, PerParameter<Option<f64>>>>,
     /// The kind of data for which that is not known.
     pub model_error_left_out: Option<String>,
@@ -40,7 +40,7 @@ pub struct GeometryResults {
     pub ripple: Option<f64>,
     /// Ends of the priors.
     pub bounds: PerParameter<[f64; 2]>,
-    /// What was simulated.
+    /// Simulated values.
     pub truth: Option<PerParameter<f64>>,
     /// χ² of the best geometry over the number of data.
     #[serde(deserialize_with = "or_nan")]
@@ -48,17 +48,17 @@ pub struct GeometryResults {
     /// Errors that the search took over those of the data.
     #[serde(deserialize_with = "or_nan")]
     pub noise_factor: f64,
-    /// What the best geometry was looked at through.
+    /// Resolution at which the best geometry was found.
     pub resolution: ResolutionResults,
     /// Searches from places all over the priors.
     pub starts: usize,
-    /// How many of them ended at the best one.
+    /// Number of searches that ended at the best one.
     pub ended_at_the_best: usize,
     /// Each of them.
     pub trials: Vec<TrialResults>,
 }
 
-/// What geometries were looked at through.
+/// Resolution at which geometries were compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ResolutionResults {
     /// Voxels along each axis.
@@ -74,18 +74,18 @@ pub struct ResolutionResults {
 /// One search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrialResults {
-    /// Where it began.
+    /// Geometry at its start.
     pub start: PerParameter<f64>,
-    /// Where it ended.
+    /// Geometry at its end.
     pub end: PerParameter<f64>,
     /// −ln of the probability above that of the best.
     #[serde(deserialize_with = "or_nan")]
     pub above_best: f64,
     /// Geometries that were evaluated.
     pub trials: usize,
-    /// Whether it ended where no step leads on.
+    /// True if it ended where no step leads on.
     pub converged: bool,
-    /// Whether it ended at the best one.
+    /// True if it ended at the best one.
     pub same: bool,
 }
 
@@ -205,8 +205,8 @@ fn trials(
 /// Radii at which velocities are compared.
 const RADII: usize = 64;
 
-/// How far a flow is from the true one: the root mean square difference of (dr/dt, r dφ/dt) over the radii of the region,
-/// over the root mean square of the true velocity.
+/// Returns the distance of a flow from the true one: the root mean square difference of (dr/dt, r dφ/dt) over the radii of
+/// the region, over the root mean square of the true velocity.
 fn flow_error(file: &FitFile, trials: [&Geometry; 2]) -> Result<Option<f64>, Error> {
     let laws = trials.map(|geometry| setup::motion(&settled(file, geometry), Vec::new()));
     let [found, truth] = laws;
@@ -228,7 +228,7 @@ fn true_geometry(file: &FitFile, measured: &FitData) -> Result<Option<Geometry>,
     measured.truth.as_ref().map(|_| setup::true_geometry(file)).transpose()
 }
 
-/// By what the model itself may have moved each free parameter, part by part, in its unit.
+/// Returns the errors of each free parameter by the model itself, part by part, in its unit.
 fn own(free: &[Free], spread: &Spread) -> BTreeMap<String, PerParameter<Option<f64>>> {
     let part = |error: &ModelError| {
         let moved = each(free, |k, parameter| {
@@ -240,7 +240,7 @@ fn own(free: &[Free], spread: &Spread) -> BTreeMap<String, PerParameter<Option<f
     spread.own.known.iter().map(part).collect()
 }
 
-/// Whether what a search expects farther on is no farther away than a standard deviation of every parameter.
+/// Returns whether what a search expects farther on is no farther away than a standard deviation of every parameter.
 fn has_converged(free: &[Free], trial: &Trial, sigma: &dyn Fn(usize) -> Option<f64>) -> bool {
     trial.further.is_some_and(|further| {
         free.iter().enumerate().all(|(k, Free { parameter, .. })| {
@@ -250,8 +250,8 @@ fn has_converged(free: &[Free], trial: &Trial, sigma: &dyn Fn(usize) -> Option<f
     })
 }
 
-/// Whether a search ended where the best one did: within the 95 % interval about it, or at a geometry that is as probable and
-/// nearer than 1.5 of each parameter's scale, the width of a first population.
+/// Returns whether a search ended where the best one did: within the 95 % interval about it, or at a geometry that is as
+/// probable and nearer than 1.5 of each parameter's scale, the width of a first population.
 fn is_same(
     free: &[Free],
     trial: &Trial,

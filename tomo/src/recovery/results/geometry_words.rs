@@ -1,4 +1,4 @@
-//! What is said of a geometry that was found: lines, sentences, and distances from a known one.
+//! Words on a geometry that was found: lines, sentences, and distances from a known one.
 
 use super::geometry::{ALIKE, GeometryResults, PerParameter};
 use crate::fit::geometry::Parameter;
@@ -110,13 +110,13 @@ impl GeometryResults {
         all
     }
 
-    /// What keeps a geometry from being as sure as its intervals say.
+    /// Names what keeps a geometry from being as sure as its intervals say.
     fn notes(&self) -> impl Iterator<Item = String> {
         let before = [self.small_residuals(), self.rival(), self.unfinished()];
         before.into_iter().flatten().chain(self.edges()).chain(self.unexplained())
     }
 
-    /// How much of the error of each parameter the model makes itself, and what errors leave out; nothing where data are
+    /// Describes the model's own part of the error of each parameter, and what errors leave out; nothing where data are
     /// simulated.
     fn own(&self) -> Vec<String> {
         let left_out = self.model_error_left_out.as_ref().map(|data| {
@@ -170,7 +170,7 @@ impl GeometryResults {
         ))
     }
 
-    /// How many searches have ended before they had converged, most at the limit on their geometries.
+    /// Describes how many searches have ended before they had converged, most at the limit on their geometries.
     fn unfinished(&self) -> Option<String> {
         let open = self.trials.iter().filter(|trial| !trial.converged).count();
         (open > 0).then(|| {
@@ -205,12 +205,12 @@ impl GeometryResults {
         self.geometry.iter().filter_map(of).collect()
     }
 
-    /// Whether the errors have grown by what the model may be wrong by.
+    /// Returns whether the errors have grown by what the model may be wrong by.
     fn has_own(&self) -> bool {
         self.model_error.as_ref().is_some_and(|parts| !parts.is_empty())
     }
 
-    /// What it means for a geometry that its volume leaves data unexplained.
+    /// Explains what it means for a geometry that its volume leaves data unexplained.
     fn unexplained(&self) -> Option<String> {
         let chi2 = Some(self.chi2_per_datum).filter(|chi2| *chi2 > ROUGH)?;
         let means = match self.has_own() {
@@ -224,7 +224,7 @@ impl GeometryResults {
         ))
     }
 
-    /// What errors of the geometry mean where residuals are much smaller than the errors of the data.
+    /// Explains what errors of the geometry mean where residuals are much smaller than the errors of the data.
     fn small_residuals(&self) -> Option<String> {
         let factor = Some(self.noise_factor).filter(|factor| *factor < 1.0)?;
         Some(format!(

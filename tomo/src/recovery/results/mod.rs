@@ -1,4 +1,4 @@
-//! What searches find, as a run's folder keeps it and as it is told.
+//! Results of searches, as a run's folder keeps them and as they are told.
 
 mod band;
 mod band_words;

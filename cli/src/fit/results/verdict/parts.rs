@@ -18,7 +18,8 @@ fn series<'a>(name: &str, parts: impl Iterator<Item = (f64, &'a Part)>) -> Serie
     Series { name: name.to_owned(), points, errors, marks: Marks::Points }
 }
 
-/// With a line where χ² is expected, on a logarithmic axis if most of it would be lost on a linear one.
+/// Draws a plot with a line where χ² is expected, on a logarithmic axis if most of it would be lost on a linear
+/// one.
 fn plot(
     [title, caption]: [&str; 2],
     [label, unit]: [&str; 2],
@@ -54,7 +55,7 @@ fn plot(
     })
 }
 
-/// Where χ² of the first data with errors is expected.
+/// Returns the expected χ² of the first data with errors.
 fn expected(judged: &DataVerdict) -> Option<f64> {
     let noisy = |tested: &&Tested| tested.errors != Errors::Weight;
     judged.terms.iter().map(|(_, tested)| tested).find(noisy).map(|tested| tested.expected.chi2)
@@ -120,7 +121,7 @@ pub fn by_station(judged: &DataVerdict) -> Option<Table> {
     })
 }
 
-/// For results.json: χ² per data point by station.
+/// Returns χ² per data point by station, for results.json.
 pub(super) fn station_values(
     judged: &DataVerdict,
     tested: &Tested,

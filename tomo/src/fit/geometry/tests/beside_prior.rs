@@ -3,8 +3,8 @@
 use super::*;
 use crate::fit::linear::{GaussianField, Matern, Roughness, Voxels};
 
-/// What is minimised for a geometry is χ² and the square of the prior's white noise, from images and prior alone, and half of
-/// it is the geometry's value.
+/// The objective for a geometry is χ² and the square of the prior's white noise, from images and prior alone, and half of it
+/// is the geometry's value.
 #[test]
 fn exact_a_prior_of_voxels_is_part_of_the_value() {
     let (model, side) = (screen(20, 12), 20);

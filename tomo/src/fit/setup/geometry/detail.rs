@@ -1,4 +1,4 @@
-//! What searches hand on to one another.
+//! Parts that searches hand on to one another.
 
 use crate::fit::geometry::{Geometry, Spread};
 use crate::fit::journal::Memory;
@@ -18,12 +18,12 @@ pub struct Resolution {
     pub panels: u32,
 }
 
-/// Where one search ended, in [`Geometry`]'s units.
+/// End of one search, in [`Geometry`]'s units.
 #[derive(Clone, Debug)]
 pub struct Trial {
-    /// Where it began.
+    /// Geometry at its start.
     pub start: Geometry,
-    /// Where it ended.
+    /// Geometry at its end.
     pub end: Geometry,
     /// χ² over the number of data there.
     pub reduced_chi2: f64,
@@ -45,25 +45,25 @@ pub(super) struct Sure {
     pub reduced_chi2: f64,
 }
 
-/// What was found in detail, and how.
+/// Result of the detailed search.
 pub(super) struct Detailed {
     pub sure: Sure,
-    /// By what χ² was multiplied.
+    /// Factor of χ².
     pub errors: f64,
-    /// What it was looked at through.
+    /// Resolution of the result.
     pub resolution: Resolution,
 }
 
-/// What is looked at in detail, about one geometry.
+/// Data and settings of the detailed search, about one geometry.
 pub(super) struct Detail<'a> {
     /// Settings.
     pub file: &'a FitFile,
     /// Data.
     pub measured: &'a FitData,
-    /// What is not known.
+    /// Unknown parameters.
     pub unknown: &'a UnknownGeometry,
-    /// What an earlier search has found.
+    /// Results of an earlier search.
     pub memory: Memory<'a>,
-    /// By what χ² is multiplied where it leaves so much of each datum.
+    /// Factor of χ², of what it leaves of each datum.
     pub scale: &'a dyn Fn(f64) -> f64,
 }

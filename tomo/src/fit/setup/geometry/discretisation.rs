@@ -94,7 +94,7 @@ fn pixels(
     })
 }
 
-/// What endless refinement does over what a `finer`-fold one does, where errors go with this power of the size of parts.
+/// Returns the ratio of endless refinement to a `finer`-fold one, where errors go with this power of the size of parts.
 fn onwards(power: f64, finer: f64) -> f64 {
     1.0 / (1.0 - finer.powf(-power))
 }

@@ -1,4 +1,4 @@
-//! From the ends of the coarse searches to the best geometry, and how sure that one is.
+//! Detailed search, from the ends of the coarse searches to the best geometry and its errors.
 
 use super::detail::{Detail, Detailed, Resolution, Sure, Trial};
 use super::discretisation;
@@ -15,9 +15,8 @@ use crate::fit::setup::drawn::is_drawn_elsewhere;
 use crate::fit::setup::{Result, spacing};
 
 impl Detail<'_> {
-    /// From the ends of the coarse searches, the best of which leaves so much of each datum, to the best geometry, by what χ²
-    /// was multiplied there, and what it was looked at through; none if it was cancelled. Where steps lead on from the ends,
-    /// these move.
+    /// Searches from the ends of the coarse searches, the best of which leaves so much of each datum, for the best geometry;
+    /// none if it was cancelled. Where steps lead on from the ends, these move.
     pub fn search(
         &self,
         (trials, anchor): (&mut [Trial], &Anchor),
@@ -52,12 +51,12 @@ impl Detail<'_> {
         Ok(Place { seen, at, view, errors })
     }
 
-    /// Whether data are of another model than that of the fit.
+    /// Returns whether data are of another model than that of the fit.
     pub fn is_foreign(&self) -> Result<bool> {
         Ok(self.file.data.is_some() || is_drawn_elsewhere(self.file)?)
     }
 
-    /// With the errors that the model has of itself, where data are of another one.
+    /// Adds the errors that the model has of itself, where data are of another one.
     pub fn beside_its_own(&self, place: &Place, sure: Sure) -> Result<Sure> {
         let Some(spread) = &sure.spread else { return Ok(sure) };
         if !self.is_foreign()? {
@@ -149,7 +148,7 @@ fn quick<'a>(problem: &GeometryProblem<'a, f32>) -> GeometryProblem<'a, f32> {
     GeometryProblem { effort: Effort { patience, ..problem.effort }, ..*problem }
 }
 
-/// Whether steps along differences of images follow a search: χ² has to be smooth, and they know one volume.
+/// Returns whether steps along differences of images follow a search: χ² has to be smooth, and they know one volume.
 pub(super) fn is_stepped(seen: &SearchData, problem: &GeometryProblem<'_, f32>) -> bool {
     (problem.model.ring.is_some() || seen.is_images()) && !problem.change.is_any()
 }
@@ -157,7 +156,7 @@ pub(super) fn is_stepped(seen: &SearchData, problem: &GeometryProblem<'_, f32>) 
 /// χ²/N above which a search about volumes is still on its way: the bowl there says nothing about where it leads.
 const WAY: f64 = 3.0;
 
-/// How sure the best of the geometries that were explored is.
+/// Returns the errors of the best of the geometries that were explored.
 fn surely_about(
     (seen, problem): (&SearchData, &GeometryProblem<'_, f32>),
     explored: &Explored,
@@ -169,7 +168,7 @@ fn surely_about(
     valued(problem, explored)
 }
 
-/// How sure it is, by the values of the geometries around.
+/// Returns the errors by the values of the geometries around.
 fn valued(problem: &GeometryProblem<'_, f32>, explored: &Explored) -> Result<Sure> {
     let reduced_chi2 = problem.scale * problem.left(&explored.best)?;
     let spread = Spread::of(problem.free, &explored.samples, reduced_chi2);

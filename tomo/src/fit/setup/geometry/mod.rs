@@ -1,4 +1,4 @@
-//! From settings to a geometry that is not known: its model, its parameters, the search for them and their errors.
+//! Unknown geometry of a fit, from settings: its model, its parameters, the search for them and their errors.
 
 mod detail;
 mod discretisation;
@@ -39,8 +39,8 @@ pub fn true_geometry(file: &FitFile) -> Result<Geometry> {
     Ok(known_geometry(&file.simulated()?))
 }
 
-/// What a fit looks through in a geometry, and how matter moves there. A pixel is the mean over so many rays along each side
-/// of it; those near the critical curve are of a number, 0 for the usual ones.
+/// Returns the instrument of a fit in a geometry, and the motion of matter there. A pixel is the mean over so many rays
+/// along each side of it; those near the critical curve are of a number, 0 for the usual ones.
 ///
 /// # Errors
 /// If a setting is missing or out of range.
@@ -69,7 +69,7 @@ pub fn in_geometry(
     Ok((found, model.motion_of(geometry)?))
 }
 
-/// What all geometries share.
+/// Returns the properties that all geometries share.
 fn model(file: &FitFile, instrument: &Instrument, motion: &Motion) -> Result<GeometryModel> {
     let Sampling::Gauss { order, split } = file.region.nodes else {
         let why = "a number with a prior needs region.nodes = { gauss = { order, split } }: nodes equidistant in Mino time \

@@ -1,4 +1,4 @@
-//! How sure a geometry is: the bowl beneath the ripples, along other rays and with other voxels; and draws of geometries.
+//! Errors of a geometry: the bowl beneath the ripples, along other rays and with other voxels; and draws of geometries.
 
 use super::detail::Sure;
 use super::search_data::SearchData;
@@ -15,7 +15,7 @@ use rand_pcg::Pcg64;
 
 /// Other rays that the best geometry is looked for through.
 const LATTICES: u64 = 3;
-/// Of the random numbers of draws.
+/// Stream of the random numbers of draws.
 const DRAWS: u64 = 0x6f70_656e_0000_0000;
 /// The number of a draw that has as many voxels as the fit.
 const SAME: u64 = 0;
@@ -123,7 +123,7 @@ pub struct GeometryPosterior<'a> {
 }
 
 impl<'a> GeometryPosterior<'a> {
-    /// About a geometry whose errors a search has found, in data whose noise is `factor` times their errors.
+    /// Takes a geometry whose errors a search has found, in data whose noise is `factor` times their errors.
     ///
     /// # Errors
     /// If a prior is out of its range.

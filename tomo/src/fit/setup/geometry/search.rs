@@ -18,14 +18,14 @@ use rayon::prelude::*;
 pub struct FoundGeometry {
     /// The best geometry.
     pub geometry: Geometry,
-    /// How sure it is; none if the data leave a parameter open.
+    /// Errors; none if the data leave a parameter open.
     pub spread: Option<Spread>,
     /// χ² of the fine search's best geometry over the number of its data.
     pub reduced_chi2: f64,
     /// Errors that the search took over those of the data: below 1 where residuals are much smaller than the errors,
     /// as those of images without noise.
     pub noise_factor: f64,
-    /// What it was looked at through in the end.
+    /// Resolution at the end.
     pub resolution: Resolution,
     /// The searches from all starts.
     pub trials: Vec<Trial>,
@@ -82,7 +82,7 @@ pub fn find_geometry(
     }))
 }
 
-/// What the coarse searches have found: their best end, with χ²/N there.
+/// Result of the coarse searches: their best end, with χ²/N there.
 struct Found {
     best: Anchor,
     reduced_chi2: f64,
@@ -119,14 +119,14 @@ fn from_starts(
 
 /// Geometries whose lit fields are tried, for each from which a search begins.
 const LIT: usize = 16;
-/// So many of them at a time.
+/// Number of geometries at a time.
 const AT_A_TIME: usize = 8;
 
-/// Where a search begins, with its volume from lit fields where data are not convex.
+/// Begin of a search, with its volume from lit fields where data are not convex.
 type Beginning = (Geometry, Option<Estimate>);
 
-/// Where searches begin: places all over the priors. Where data are not convex, the best of many such places, with their
-/// volumes: geometries far from the truth then lead to other minima, and lit fields tell them apart.
+/// Returns the begins of searches: places all over the priors. Where data are not convex, the best of many such places,
+/// with their volumes: geometries far from the truth then lead to other minima, and lit fields tell them apart.
 fn beginnings(
     problem: &GeometryProblem<'_, f32>,
     starts: usize,
@@ -181,7 +181,8 @@ fn lowest(problem: &GeometryProblem<'_, f32>, explored: &Explored) -> Result<Opt
     Ok(Spread::of(problem.free, &explored.samples, reduced).map(|form| form.geometry))
 }
 
-/// Where a search has ended, or a short one from the mirror solution of that geometry, if that ends at a better one.
+/// Returns the end of a search, or of a short one from the mirror solution of that geometry, if that ends at a better
+/// one.
 fn or_twin(
     problem: &GeometryProblem<'_, f32>,
     mut explored: Explored,
@@ -215,7 +216,7 @@ fn least(problem: &GeometryProblem<'_, f32>, starts: usize) -> Result<f64> {
 /// χ²/N below which errors say nothing about residuals.
 const TOO_SMALL: f64 = 0.5;
 
-/// By what χ² is multiplied so that errors are as large as residuals, where these are much smaller: data without noise
+/// Returns the factor of χ² that makes errors as large as residuals, where these are much smaller: data without noise
 /// whose errors are only a scale.
 fn scale(reduced_chi2: f64) -> f64 {
     if reduced_chi2 > 0.0 && reduced_chi2 < TOO_SMALL { 1.0 / reduced_chi2 } else { 1.0 }

@@ -33,13 +33,13 @@ const RESAMPLED: [f64; 3] = [1.15, 0.87, 1.25];
 const SETTLING: usize = 6;
 
 impl SearchData {
-    /// For a search all over: volumes are told apart by a few iterations.
+    /// Prepares a search all over: volumes are told apart by a few iterations.
     pub fn coarsely(file: &FitFile, measured: &FitData, view: &SearchView) -> Result<Self> {
         Self::new(file, measured, view, 0)
     }
 
-    /// For a search among geometries that are much alike, whose volumes are solved for nearly to the end; and the same through
-    /// other pixels.
+    /// Prepares a search among geometries that are much alike, whose volumes are solved for nearly to the end; and the same
+    /// through other pixels.
     pub fn finely(file: &FitFile, measured: &FitData, view: &SearchView) -> Result<Self> {
         let mut seen = Self::exactly(file, measured, view)?;
         if measured.pulse == Pulse::Delta && !has_images(file) {
@@ -164,7 +164,7 @@ impl SearchData {
         work(&GeometryProblem { terms: &terms, memory, ..*problem })
     }
 
-    /// Whether images are all that is compared.
+    /// Returns whether images are all that is compared.
     pub fn is_images(&self) -> bool {
         self.view.file.loss.iter().all(|loss| loss.data == LossKind::Image)
     }

@@ -22,11 +22,11 @@ pub(super) struct Place {
     pub seen: SearchData,
     pub at: Resolution,
     pub view: SearchView,
-    /// By what χ² is multiplied.
+    /// Factor of χ².
     pub errors: f64,
 }
 
-/// Where steps from a geometry have ended.
+/// End of steps from a geometry.
 #[derive(Clone)]
 struct Stepped {
     polished: Polished,
@@ -58,7 +58,7 @@ pub(super) fn finer(count: usize) -> usize {
 }
 
 impl Detail<'_> {
-    /// From the ends of all searches, which move to where steps lead, to the best geometry; none if it was cancelled.
+    /// Steps from the ends of all searches, which move to where steps lead, to the best geometry; none if it was cancelled.
     ///
     /// Coarse voxels displace ends, so that the best of them need not lead to the best geometry. Pixels of images are samples
     /// or means: steps are taken with both. Some pixels are left out, at first those near the critical curve of each end:
@@ -99,7 +99,7 @@ impl Detail<'_> {
         Ok(Some(Detailed { sure, errors, resolution: place.at }))
     }
 
-    /// Whether pixels may be means over several rays: those of images that another model has made.
+    /// Returns whether pixels may be means over several rays: those of images that another model has made.
     fn may_be_means(&self, place: &Place) -> Result<bool> {
         let is_plain = self.file.polarization.is_none();
         Ok(place.seen.is_images() && is_plain && self.is_foreign()?)
@@ -197,7 +197,7 @@ impl Detail<'_> {
         Ok(all)
     }
 
-    /// How sure the best geometry is, with the errors that the model has of itself.
+    /// Returns the errors of the best geometry, with those that the model has of itself.
     fn sure(&self, place: &Place, best: &Stepped) -> Result<Sure> {
         let resampled: Resampled<'_> = Some((&place.seen, self.unknown, &place.view));
         let about = best.geometry();

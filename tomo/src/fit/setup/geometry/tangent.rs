@@ -86,7 +86,7 @@ impl FitData {
         Ok(Some(ScanTerm::new("visibilities with free phases", pixels, true, scans)))
     }
 
-    /// What is known of gains; amplitudes where nothing is said of them.
+    /// Returns the priors of gains; amplitudes where nothing is said of them.
     fn free_phases(&self, part: &Observation) -> GainPriors {
         let known = vec![0.0; part.stations.len()];
         let priors = || GainPriors { free_phases: true, amplitude_sigma: known };
