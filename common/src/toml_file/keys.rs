@@ -474,7 +474,7 @@ mod tests {
         let law = keys.at("law").unwrap();
         assert_eq!((&*law.meaning, law.is_required), ("The law of motion.", false));
         assert_eq!(law.kind, "\"rigid\", { power = … }, { perturbed = … }");
-        assert_eq!(keys.at("law.power.radius").unwrap().meaning, "Where the rate is.");
+        assert_eq!(keys.at("law.power.radius").unwrap().meaning, "Radius of the rate.");
         let nodes = keys.at("nodes").unwrap();
         assert_eq!((nodes.default.as_deref(), nodes.is_required), (Some("4"), false));
         assert_eq!(keys.at("radii").unwrap().range.unwrap().most, Some(9.0));
