@@ -89,6 +89,6 @@ pub use polarized::{
 };
 pub use problem::{FluxPrior, ImageProblem};
 pub use ring::Ring;
-pub use shapes::{Shape, ShapeFit, fit_shapes};
+pub use shapes::{Shape, ShapeFit, best_shape, fit_shapes};
 pub use solve::Solution;
 pub use survey::{Stage, SurveyWatch, image, survey};

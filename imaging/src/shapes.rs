@@ -176,6 +176,11 @@ impl Shape {
     }
 }
 
+/// The shape that fits best by its criterion.
+pub fn best_shape<'a>(shapes: impl Iterator<Item = &'a ShapeFit>) -> Option<&'a ShapeFit> {
+    shapes.min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+}
+
 /// A width of this logarithm in a picture: nothing is narrower than its pixels tell.
 fn drawn(ln: f64, pixel: f64) -> f64 {
     ln.clamp(-5.0, 9.0).exp().hypot(pixel)

@@ -7,7 +7,7 @@ use crate::found::{Calibration, Candidate, Survey};
 use crate::problem::{FluxPrior, ImageProblem};
 use crate::ring::Ring;
 use crate::settings::{EnvelopeSettings, StaticImageFile, StrengthSettings};
-use crate::shapes::{ShapeFit, fit_shapes};
+use crate::shapes::{ShapeFit, best_shape, fit_shapes};
 use crate::solve::solve;
 use crate::start;
 use kerrlight_tomo::fit::linear::Prior;
@@ -50,8 +50,7 @@ pub fn survey(
 ) -> Result<Option<Survey>, Error> {
     let grid = file.image.grid()?;
     let terms = measured.visibility_terms(&file.loss, grid.pixels())?;
-    let fitted = shapes;
-    let best = shapes.iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    let best = best_shape(shapes.iter());
     let width = |envelope: EnvelopeSettings| {
         let width = envelope.fwhm_uas.or_else(|| Some(best?.width_uas(grid)));
         width.ok_or_else(|| Error::Failed("envelope.fwhm_uas is needed without shapes".to_owned()))
@@ -59,8 +58,8 @@ pub fn survey(
     let envelope_uas = file.envelope.map(width).transpose()?;
     let weight = file.envelope.map_or(0.0, |envelope| envelope.weight);
     let envelope = envelope_uas.map(|width| (start::envelope(width, grid), weight));
-    let shapes = shapes.iter().map(|fit| start::shape(&fit.shares));
-    let begin = file.image.starts.iter().map(|start| start::image(*start, grid)).chain(shapes);
+    let of_shapes = shapes.iter().map(|fit| start::shape(&fit.shares));
+    let begin = file.image.starts.iter().map(|start| start::image(*start, grid)).chain(of_shapes);
     let (priors, begin) = (file.priors()?, begin.collect());
     let search = Search { file, grid, priors, envelope, envelope_uas, begin, terms: &terms, watch };
     let frames: Vec<usize> = (0..measured.times.len()).collect();
@@ -92,8 +91,7 @@ pub fn survey(
         return Ok(None);
     };
     let has_ring = starts[best].ring.is_some();
-    let shapes = fitted.iter().filter(|fit| fit.shape.is_ring() || !has_ring);
-    let shape = shapes.min_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    let shape = best_shape(shapes.iter().filter(|fit| fit.shape.is_ring() || !has_ring));
     let calibration = match shape {
         Some(shape) => {
             search.calibration(measured, (shape, &others), &frames, count.div_ceil(2))?

@@ -283,7 +283,7 @@ fn exact_the_gradient_says_whether_a_fit_has_converged() {
 fn exact_shapes_tell_a_ring_from_what_has_no_hole() {
     let file = StaticImageFile::parse(SETTINGS).unwrap();
     let found = fit_shapes(&file, &measured(&file, 2), &|| true).unwrap().unwrap();
-    let best = found.iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion)).unwrap();
+    let best = best_shape(found.iter()).unwrap();
     assert_eq!(best.shape, Shape::Crescent, "{found:?}");
     let [diameter, width, direction] = [0, 1, 2].map(|k| best.sizes[k].1);
     assert!((diameter - 44.0).abs() < 2.0 && (width - 16.0).abs() < 5.0, "{diameter} {width}");

@@ -3,6 +3,7 @@
 
 use crate::fit::results;
 use crate::fit_start::array;
+use crate::static_image::{bell, correlation};
 use crate::static_sky::data;
 use crate::support::succeed;
 use kerrlight_common::units::MICROARCSECOND;
@@ -28,11 +29,6 @@ struct Sky {
     light: fn(f64, f64) -> f64,
     /// Diameter of its ring, µas, and the direction in which it is brightest, degrees; none for an even ring.
     ring: Option<(f64, Option<f64>)>,
-}
-
-/// exp(−4 ln 2 x²/w²).
-fn bell(x: f64, width: f64) -> f64 {
-    (-4.0 * core::f64::consts::LN_2 * (x / width).powi(2)).exp()
 }
 
 /// A ring of a diameter and a width, brighter by a part of the mean at a position angle.
@@ -123,60 +119,6 @@ fn observe(sky: &Sky, night: &Path, seed: u64, path: &Path) {
     std::fs::write(path, files::write_uvfits(&seen).unwrap()).unwrap();
 }
 
-/// Correlation of two skies in `side`² pixels of a size in µas, both blurred by 10 µas, at the best shift by whole pixels.
-fn correlation([a, b]: [&[f64]; 2], side: usize, pixel: f64) -> f64 {
-    let [a, b] = [a, b].map(|sky| blurred(sky, side, 10.0 / pixel));
-    let size = |sky: &[f64]| sky.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let reach = (30.0 / pixel) as isize;
-    let product = |[right, down]: [isize; 2]| -> f64 {
-        let shifted = |k: usize| {
-            let (row, column) = ((k / side) as isize + down, (k % side) as isize + right);
-            let inside = |x: isize| (0..side as isize).contains(&x);
-            if inside(row) && inside(column) {
-                b[(row * side as isize + column) as usize]
-            } else {
-                0.0
-            }
-        };
-        a.iter().enumerate().map(|(k, x)| x * shifted(k)).sum()
-    };
-    let shifts = (-reach..=reach).flat_map(|x| (-reach..=reach).map(move |y| [x, y]));
-    shifts.map(product).fold(0.0, f64::max) / (size(&a) * size(&b))
-}
-
-/// A sky convolved with a round Gaussian of a width in pixels.
-fn blurred(sky: &[f64], side: usize, width: f64) -> Vec<f64> {
-    let half = (1.5 * width).ceil() as isize;
-    let along = |sky: &[f64], step: usize| -> Vec<f64> {
-        let one = |k: usize| -> f64 {
-            let here = (k / step % side) as isize;
-            (-half..=half)
-                .filter(|d| (0..side as isize).contains(&(here + d)))
-                .map(|d| bell(d as f64, width) * sky[(k as isize + d * step as isize) as usize])
-                .sum()
-        };
-        (0..sky.len()).map(one).collect()
-    };
-    along(&along(sky, 1), side)
-}
-
-/// A sky in pixels of another grid with the same middle, by sums over the places of the finer one.
-fn regridded(sky: &[f64], side: usize, field: f64) -> Vec<f64> {
-    let mut out = vec![0.0; side * side];
-    let place = |k: usize| {
-        let offset = FIELD_UAS * ((k as f64 + 0.5) / SIDE as f64 - 0.5);
-        ((offset / field + 0.5) * side as f64).floor()
-    };
-    for (k, light) in sky.iter().enumerate() {
-        let (row, column) = (place(k / SIDE), place(k % SIDE));
-        let inside = |x: f64| (0.0..side as f64).contains(&x);
-        if inside(row) && inside(column) {
-            out[row as usize * side + column as usize] += light;
-        }
-    }
-    out
-}
-
 /// Distances of what was found from the truth, over their errors.
 fn pull(found: &Value, key: &str, truth: f64, period: Option<f64>) -> Option<f64> {
     let value = found[key].as_f64()?;
@@ -211,8 +153,7 @@ fn exact_known_skies_through_a_real_night() {
             let image = array(&path.join("run/image.npz"), "recovered.npy");
             let side = image.len().isqrt();
             let field = array(&path.join("run/image.npz"), "field_uas.npy")[0];
-            let truth = regridded(&pixels(sky), side, field);
-            let alike = correlation([&truth, &image], side, field / side as f64);
+            let alike = correlation(&image, side, field, sky.light);
             let has_ring = found["ring_diameter_uas"].is_number();
             let of_ring = sky.ring.and_then(|(d, _)| pull(&found, "ring_diameter_uas", d, None));
             let angle = sky.ring.and_then(|(_, angle)| angle);

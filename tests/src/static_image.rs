@@ -241,7 +241,7 @@ fn exact_the_experiment_of_m87_has_its_tables() {
 /// cross-correlation of their images.
 type Sky = (&'static str, fn(f64, f64) -> f64, f64);
 
-fn bell(x: f64, fwhm: f64) -> f64 {
+pub fn bell(x: f64, fwhm: f64) -> f64 {
     (-4.0 * 2f64.ln() * (x / fwhm).powi(2)).exp()
 }
 
@@ -276,7 +276,7 @@ fn convolved(image: &[f64], side: usize, field: f64) -> Vec<f64> {
 }
 
 /// The largest normalised cross-correlation of an image with a sky over shifts of up to 10 µas, both with a beam of 10 µas.
-fn correlation(image: &[f64], side: usize, field: f64, sky: fn(f64, f64) -> f64) -> f64 {
+pub fn correlation(image: &[f64], side: usize, field: f64, sky: fn(f64, f64) -> f64) -> f64 {
     let centred = |image: Vec<f64>| {
         let mean = image.iter().sum::<f64>() / image.len() as f64;
         image.into_iter().map(|x| x - mean).collect::<Vec<f64>>()

@@ -29,7 +29,7 @@ pub struct Gains {
 /// Own name of a station of the present file; none of stations of other files.
 pub type OwnName<'a> = dyn Fn(&str) -> Option<String> + 'a;
 
-/// Writes a table of stations for each file of data: `NAME.csv`, `NAME_2.csv`, …
+/// Writes a table of stations for each file of data: `name`, such as `gains.csv`, then `gains_2.csv`, …
 pub fn write_by_file(
     name: &str,
     measured: &FitData,
@@ -45,8 +45,10 @@ pub fn write_by_file(
             let (own, of) = station_of_file(station);
             (of == file).then(|| own.to_owned())
         });
-        let name =
-            if file == 0 { format!("{name}.csv") } else { format!("{name}_{}.csv", file + 1) };
+        let name = match file {
+            0 => name.to_owned(),
+            _ => name.replace(".csv", &format!("_{}.csv", file + 1)),
+        };
         folder.file(&name)?.write(text.as_bytes())?;
     }
     Ok(())
@@ -109,9 +111,9 @@ impl Gains {
     }
 
     fn written(table: GainTable, measured: &FitData, folder: &Folder) -> anyhow::Result<Self> {
-        write_by_file("gains", measured, folder, |is_own| {
+        write_by_file(TABLE, measured, folder, |own_name| {
             let gains = table.gains.iter().filter_map(|gain| {
-                Some(StationGain { station: is_own(&gain.station)?, ..gain.clone() })
+                Some(StationGain { station: own_name(&gain.station)?, ..gain.clone() })
             });
             files::gains_to_csv(&GainTable { gains: gains.collect() })
         })?;

@@ -36,9 +36,9 @@ impl Leakage {
         measured: &FitData,
         folder: &Folder,
     ) -> anyhow::Result<Self> {
-        write_by_file("leakage", measured, folder, |is_own| {
+        write_by_file(TABLE, measured, folder, |own_name| {
             let stations = table.stations.iter().filter_map(|leakage| {
-                Some(StationLeakage { station: is_own(&leakage.station)?, ..leakage.clone() })
+                Some(StationLeakage { station: own_name(&leakage.station)?, ..leakage.clone() })
             });
             files::leakage_to_csv(&LeakageTable { stations: stations.collect() })
         })?;

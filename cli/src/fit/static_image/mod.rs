@@ -170,7 +170,8 @@ fn searched(
     let all = file.image.starts.len()
         + Shape::ALL.len()
         + values(&file.strength)
-        + 3 * draws / 2
+        + draws
+        + draws.div_ceil(2)
         + of_polarized;
     let keeper = SignalGuard::brief(STOPPED);
     let bar = progress::held_out(all as u64);

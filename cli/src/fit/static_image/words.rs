@@ -7,7 +7,7 @@ use crate::fit::closures;
 use crate::fit::results::medium;
 use crate::report::Part;
 use kerrlight_imaging::settings::StartImage;
-use kerrlight_imaging::{ShapeFit, Survey};
+use kerrlight_imaging::{ShapeFit, Survey, best_shape};
 use kerrlight_tomo::fit::settings::LossKind;
 
 impl Found<'_> {
@@ -41,8 +41,9 @@ fn ring(survey: &Survey, shapes: &[ShapeFit]) -> String {
 /// States that the image has no ring, and whether a simple shape with one fits the data better than those without.
 fn no_ring(shapes: &[ShapeFit]) -> String {
     let none = "The image has no ring between the radii that were asked for";
-    let best = shapes.iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion));
-    let Some(best) = best.filter(|best| best.shape.is_ring()) else { return format!("{none}.") };
+    let Some(best) = best_shape(shapes.iter()).filter(|best| best.shape.is_ring()) else {
+        return format!("{none}.");
+    };
     let sizes = best.sizes.iter().map(|(name, value, unit)| format!("{name} {value:.0} {unit}"));
     format!(
         "{none}, but of the simple shapes a {} fits best ({}): the data allow a ring and do not require it.",
@@ -58,10 +59,8 @@ pub fn doubt(survey: &Survey, shapes: &[ShapeFit]) -> Option<String> {
     if (with as f64) < LEAST_AGREEMENT * all as f64 {
         return Some(format!("{with} of {all} images that the data allow have one"));
     }
-    let least = |is_ring: bool| {
-        let kind = shapes.iter().filter(|fit| fit.shape.is_ring() == is_ring);
-        kind.min_by(|a, b| a.criterion.total_cmp(&b.criterion))
-    };
+    let least =
+        |is_ring: bool| best_shape(shapes.iter().filter(|fit| fit.shape.is_ring() == is_ring));
     let (ring, other) = (least(true)?, least(false)?);
     (other.criterion < ring.criterion).then(|| {
         format!(
