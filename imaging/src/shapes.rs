@@ -95,9 +95,11 @@ impl Shape {
             Self::Crescent => turns(4)
                 .flat_map(|(s, c)| around.iter().map(move |f| vec![l + f.ln(), l - 1.0, s, c]))
                 .collect(),
-            Self::Double => {
-                turns(12).map(|(s, c)| vec![l - 0.7, l - 0.7, 0.4 * s, 0.4 * c, 0.2]).collect()
-            }
+            Self::Double => turns(12)
+                .flat_map(|(s, c)| {
+                    [0.4, 0.9].map(|apart| vec![l - 0.7, l - 0.7, apart * s, apart * c, 0.2])
+                })
+                .collect(),
         }
     }
 
