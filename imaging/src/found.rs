@@ -55,16 +55,20 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// Mean of a number of the images; none if fewer than two have it.
-    fn mean(&self, number: impl Fn(&Candidate) -> Option<f64>) -> Option<f64> {
-        let all: Vec<f64> = self.images.iter().filter_map(number).collect();
-        (all.len() >= 2).then(|| all.iter().sum::<f64>() / all.len() as f64)
+    /// Mean of a number of the images that have it and came to a minimum, with its standard error; none if fewer than two do.
+    fn mean(&self, number: impl Fn(&Candidate) -> Option<f64>) -> Option<(f64, f64)> {
+        let at_minimum = self.images.iter().filter(|image| image.solution.has_converged);
+        let all: Vec<f64> = at_minimum.filter_map(number).collect();
+        let count = all.len() as f64;
+        let mean = all.iter().sum::<f64>() / count;
+        let square: f64 = all.iter().map(|one| (one - mean).powi(2)).sum();
+        (all.len() >= 2).then(|| (mean, (square / (count * (count - 1.0))).sqrt()))
     }
 
-    /// Diameter that the method adds to a ring, µas.
-    fn added_diameter(&self) -> Option<f64> {
-        let found = self.mean(|image| image.ring.map(|ring| ring.diameter_uas))?;
-        Some(found - self.ring?.diameter_uas)
+    /// Diameter that the method adds to a ring, µas, with its standard error.
+    fn added_diameter(&self) -> Option<(f64, f64)> {
+        let (found, error) = self.mean(|image| image.ring.map(|ring| ring.diameter_uas))?;
+        Some((found - self.ring?.diameter_uas, error))
     }
 }
 
@@ -103,20 +107,27 @@ impl Survey {
     }
 
     /// Diameter of the ring in µas, less what the method adds to that of the best simple shape, and its error where that is known:
-    /// the envelope draws light inward, and a blurred ring is smaller.
+    /// the envelope draws light inward, and a blurred ring is smaller. An image that is not at a minimum is taken as it is.
     pub fn ring_diameter(&self) -> Option<(f64, Option<f64>)> {
         let here = self.found().ring?.diameter_uas;
         let error = self.ring_error(|ring| ring.diameter_uas);
-        let added = self.calibration.as_ref().and_then(Calibration::added_diameter).unwrap_or(0.0);
+        let added = self.calibration().and_then(Calibration::added_diameter);
+        let (added, of_added) = added.unwrap_or((0.0, 0.0));
         // To another ring it may add anything from half to one and a half times that.
-        Some((here - added, error.map(|error| error.hypot(added / 12f64.sqrt()))))
+        let of_added = of_added.hypot(added / 12f64.sqrt());
+        Some((here - added, error.map(|error| error.hypot(of_added))))
+    }
+
+    /// Images of a known sky, if they say what the method has done to the image: it came to a minimum.
+    fn calibration(&self) -> Option<&Calibration> {
+        self.calibration.as_ref().filter(|_| self.found().solution.has_converged)
     }
 
     /// Error of the flux, Jy: as [`error`](Self::error), and what the method adds to the flux of the best simple shape.
     pub fn flux_error(&self) -> Option<f64> {
         let flux = |image: &Candidate| Some(image.solution.image.iter().sum::<f64>());
-        let of_shape = self.calibration.as_ref();
-        let added = of_shape.and_then(|of_shape| Some(of_shape.mean(flux)? - of_shape.flux_jy));
+        let of_shape = self.calibration();
+        let added = of_shape.and_then(|of_shape| Some(of_shape.mean(flux)?.0 - of_shape.flux_jy));
         Some(self.error(flux)?.hypot(added.unwrap_or(0.0)))
     }
 

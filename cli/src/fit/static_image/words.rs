@@ -31,10 +31,15 @@ fn ring(survey: &Survey, shapes: &[ShapeFit]) -> String {
         false => format!(" {with} of {all} images that the data allow have one."),
     };
     format!(
-        "The image has a ring of {} µas, {} µas wide, brightest at {}° east of north.{others}",
+        "The image has a ring of {} µas, {} µas wide, brightest at {}° east of north.{others}{}",
         with_error(diameter.0, diameter.1, 1),
         with_error(width.0, width.1, 1),
-        with_error(angle.0, angle.1, 0)
+        with_error(angle.0, angle.1, 0),
+        match survey.found().solution.has_converged {
+            true => "",
+            false =>
+                " The optimiser did not come to a minimum (image.iterations): errors may be larger.",
+        }
     )
 }
 
@@ -189,7 +194,8 @@ impl Found<'_> {
         text.extend(self.survey.calibration.as_ref().map(|known| {
             format!(
                 "{} images of measurements of the best simple shape tell what the method makes of a known sky: what it adds to \
-                 the diameter of the ring is taken off, and what it adds to the flux is part of the flux's error.",
+                 the diameter of the ring is taken off, with its own error, and what it adds to the flux is part of the flux's \
+                 error. Where an image did not come to a minimum, neither is done with it.",
                 known.images.len()
             )
         }));
