@@ -1,4 +1,4 @@
-//! Bars with the time left on a terminal; of pictures and films, a line a minute in a pipe.
+//! Bars with the time left on a terminal; in a pipe, a line a minute.
 
 use crate::session;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -8,22 +8,31 @@ use std::time::Duration;
 
 /// A bar that shows how much of the work is done.
 pub fn bar(length: u64) -> ProgressBar {
-    let bar = styled(length, "{bar:40} {percent:>3} %  {elapsed} gone, {eta} left");
-    if !std::io::stderr().is_terminal() {
-        tell(&bar, Duration::from_secs(60), |line| eprintln!("{line}"));
-    }
-    bar
+    styled(Some(length), "{bar:40} {percent:>3} %  {elapsed} gone, {eta} left", "")
 }
 
-/// Tells every so often how much of the work is done, until the bar is finished or gone.
-fn tell(bar: &ProgressBar, every: Duration, say: impl Fn(&str) + Send + 'static) {
+/// Tells every so often how much of the work is done, until the bar is finished or gone. What is counted has this name; parts of
+/// a hundred have none.
+fn tell(
+    bar: &ProgressBar,
+    every: Duration,
+    name: &'static str,
+    say: impl Fn(&str) + Send + 'static,
+) {
     let bar = bar.downgrade();
     let lines = move || {
         loop {
             thread::sleep(every);
             let Some(bar) = bar.upgrade().filter(|bar| !bar.is_finished()) else { return };
-            let percent = 100 * bar.position() / bar.length().unwrap_or(1).max(1);
-            say(&format!("{percent} %  {} gone", HumanDuration(bar.elapsed())));
+            let (done, length) = (bar.position(), bar.length());
+            let of = match length {
+                None => name.to_owned(),
+                Some(length) if name.is_empty() => format!("{} %", 100 * done / length.max(1)),
+                Some(length) => format!("{name} {done} of {length}"),
+            };
+            let parts = [of, bar.message(), format!("{} gone", HumanDuration(bar.elapsed()))];
+            let parts = parts.into_iter().filter(|part| !part.is_empty());
+            say(&parts.collect::<Vec<_>>().join("  "));
         }
     };
     // Without a thread for it there are no lines.
@@ -35,56 +44,65 @@ pub fn line(bar: &ProgressBar, line: &str) {
     if bar.is_hidden() { eprintln!("{line}") } else { bar.println(line) }
 }
 
+fn styled(length: Option<u64>, style: &str, name: &'static str) -> ProgressBar {
+    let style = ProgressStyle::with_template(style).unwrap_or(ProgressStyle::default_bar());
+    let target = match session::is_here() {
+        true => ProgressDrawTarget::hidden(),
+        false => ProgressDrawTarget::stderr(),
+    };
+    let bar = ProgressBar::with_draw_target(length, target).with_style(style);
+    if !session::is_here() && !std::io::stderr().is_terminal() {
+        tell(&bar, Duration::from_secs(60), name, |line| eprintln!("{line}"));
+    }
+    bar
+}
+
+/// A bar that counts things of this name, with a message.
+fn counting(length: u64, name: &'static str) -> ProgressBar {
+    let style =
+        format!("{{bar:30}} {name} {{pos}} of {{len}}  {{msg}}  {{elapsed}} gone, {{eta}} left");
+    styled(Some(length), &style, name)
+}
+
 /// A bar that counts frames.
 pub fn frames(count: u64) -> ProgressBar {
-    styled(count, "{bar:40} frame {pos} of {len}  {elapsed} gone, {eta} left")
+    counting(count, "frame")
 }
 
-fn styled(length: u64, style: &str) -> ProgressBar {
-    let style = ProgressStyle::with_template(style).unwrap_or(ProgressStyle::default_bar());
-    let bar = match session::is_here() {
-        true => ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::hidden()),
-        false => ProgressBar::new(length),
-    };
-    bar.with_style(style)
-}
-
-/// A bar that counts steps, with a message.
+/// A bar that counts steps.
 pub fn steps(count: u64) -> ProgressBar {
-    styled(count, "{bar:30} step {pos} of {len}  {msg}  {elapsed} gone, {eta} left")
+    counting(count, "step")
 }
 
 /// A bar that counts cases, with the name of the one that runs.
 pub fn cases(count: u64) -> ProgressBar {
-    styled(count, "{bar:30} {pos} of {len} done  {elapsed} gone, {eta} left  {msg}")
+    counting(count, "case")
 }
 
 /// A bar that counts trials, and says which search goes on.
 pub fn geometries(count: u64) -> ProgressBar {
-    styled(count, "{bar:30} trial {pos} of at most {len}  {msg}  {elapsed} gone, {eta} left")
+    counting(count, "trial")
 }
 
 /// A bar that counts draws from a posterior, and says what the present one does.
 pub fn samples(count: u64) -> ProgressBar {
-    styled(count, "{bar:30} draw {pos} of {len}  {msg}  {elapsed} gone, {eta} left")
+    counting(count, "draw")
 }
 
 /// A bar that counts solutions without a part of the frames.
 pub fn held_out(count: u64) -> ProgressBar {
-    styled(count, "{bar:30} solution {pos} of {len}  {msg}  {elapsed} gone, {eta} left")
+    counting(count, "solution")
 }
 
 /// A bar that counts axes.
 pub fn axes(count: u64) -> ProgressBar {
-    styled(count, "{bar:30} axis {pos} of {len}  {elapsed} gone, {eta} left")
+    counting(count, "axis")
 }
 
 /// A line for work of unknown length.
-pub fn waiting(what: &str) -> ProgressBar {
-    let style = ProgressStyle::with_template("{prefix}: {msg}  {elapsed} gone");
-    let style = style.unwrap_or(ProgressStyle::default_spinner());
-    let bar = if session::is_here() { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
-    bar.with_style(style).with_prefix(what.to_owned())
+pub fn waiting(what: &'static str) -> ProgressBar {
+    let style = "{prefix}: {msg}  {elapsed} gone";
+    styled(None, style, what).with_prefix(what)
 }
 
 #[cfg(test)]
@@ -98,11 +116,12 @@ mod tests {
         let (bar, (send, lines)) = (ProgressBar::hidden(), mpsc::channel());
         bar.set_length(8);
         bar.inc(2);
-        tell(&bar, Duration::from_millis(2), move |line| {
+        bar.set_message("search 1");
+        tell(&bar, Duration::from_millis(2), "trial", move |line| {
             let _ = send.send(line.to_owned());
         });
         let line = lines.recv().unwrap();
-        assert!(line.starts_with("25 %  ") && line.ends_with(" gone"), "{line}");
+        assert!(line.starts_with("trial 2 of 8  search 1  ") && line.ends_with(" gone"), "{line}");
         bar.finish_and_clear();
         // The sender goes with the thread.
         while lines.recv().is_ok() {}

@@ -208,3 +208,23 @@ fn exact_searches_find_the_geometries_of_another_forward_model() {
         assert!(trials.iter().all(|trial| trial["converged"] == true), "{geometry}");
     }
 }
+
+#[test]
+#[ignore = "dev"]
+fn dev_write_films() {
+    let folder = std::path::PathBuf::from(std::env::var("KEEP").unwrap());
+    for (name, (sky, arcs)) in [("spots", spots_and_arc()), ("filaments", filaments())] {
+        let times: Vec<f64> = (0..FRAMES).map(|k| LAST * k as f64 / (FRAMES - 1) as f64).collect();
+        let screen = Screen { width: 26.0, pixels: 104, rays: 2 };
+        let mut movie = sky.movie(screen, &times, shining(&arcs)).expect("a sky");
+        let total: f64 = movie[0].iter().sum();
+        movie.iter_mut().flatten().for_each(|x| *x /= total);
+        let values = movie.iter().flatten().map(|x| *x as f32).collect();
+        let shape = [FRAMES, 104, 104];
+        std::fs::write(
+            folder.join(format!("{name}.npz")),
+            movie_archive(shape, &[("movie", values)], &[]),
+        )
+        .expect("written");
+    }
+}
