@@ -32,6 +32,8 @@ pub struct Refined {
     kind: Refinement,
     /// Step of the geometry, in units of scales.
     step: DVector<f64>,
+    /// Part of its square that is more than chance.
+    certain: f64,
     /// Decrease of χ²/2.
     gain: f64,
 }
@@ -94,11 +96,15 @@ impl Standing {
     ) -> Result<Option<Refined>, Error> {
         let there = finer.solve(self.best.geometry)?;
         let bowl = finer.bowl(&there, Polish::default().following)?;
-        let covariance = covariance(finer.free, &self.best.geometry, &bowl.bends, 1.0);
-        let Some(covariance) = covariance else { return Ok(None) };
+        let left_by =
+            |bends| covariance(finer.free, &self.best.geometry, bends, 1.0).filter(is_finite);
+        let both = left_by(&bowl.bends).zip(left_by(&self.bowl.bends));
+        let Some((finer, own)) = both else { return Ok(None) };
         // Slopes of the model itself are ripples beside the middle of its bowl.
-        let step = -covariance * (bowl.slopes - &self.bowl.slopes);
-        Ok(Some(Refined { kind, step, gain: self.best.value - there.value }))
+        let slopes = bowl.slopes - &self.bowl.slopes;
+        let certain = beyond_chance(&slopes, &finer, &own);
+        let step = -finer * slopes;
+        Ok(Some(Refined { kind, step, certain, gain: self.best.value - there.value }))
     }
 
     /// Errors that refinements make likely, each as much as the data do not contradict, and what the excess that they leave
@@ -112,8 +118,8 @@ impl Standing {
             source,
             covariance: in_own_units(free, covariance),
         };
-        let of_refined = |Refined { kind, step, gain }: &Refined| {
-            let step = step * (kind.onwards * (0.5 * gain.min(0.0)).exp());
+        let of_refined = |Refined { kind, step, certain, gain }: &Refined| {
+            let step = step * (kind.onwards * (0.5 * gain.min(0.0)).exp() * certain.sqrt());
             own(kind.source, &(&step * step.transpose()))
         };
         // Several may explain the same.
@@ -124,6 +130,22 @@ impl Standing {
             .map(|covariance| own(ModelError::UNEXPLAINED, &covariance));
         refined.iter().map(of_refined).chain(unexplained).collect()
     }
+}
+
+fn is_finite(matrix: &DMatrix<f64>) -> bool {
+    matrix.iter().all(|x| x.is_finite())
+}
+
+/// Part of the square of the step between two models that is more than noise makes of it, if slopes differ by so much and the data
+/// leave these covariances with the finer model and with the other one.
+///
+/// A finer model leaves more open, and the noise of the same data moves the two minima apart with a covariance that is the
+/// difference of theirs (Hausman 1978, Econometrica 46, 1251).
+fn beyond_chance(slopes: &DVector<f64>, finer: &DMatrix<f64>, other: &DMatrix<f64>) -> f64 {
+    let Some(inverse) = finer.clone().try_inverse() else { return 1.0 };
+    let square = slopes.dot(&(finer * slopes));
+    let by_chance = (slopes.len() as f64 - (inverse * other).trace()).max(0.0);
+    if square > by_chance { 1.0 - by_chance / square } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -146,7 +168,7 @@ mod tests {
         let free = [Free { parameter: Parameter::Spin, prior }];
         let kind = Refinement { source: "voxels", onwards: 1.5 };
         let step = DVector::from_element(1, 0.01 / Parameter::Spin.scale());
-        let errors = standing(excess).errors(&free, &[Refined { kind, step, gain }]);
+        let errors = standing(excess).errors(&free, &[Refined { kind, step, certain: 1.0, gain }]);
         errors.iter().map(|error| error.covariance[0].sqrt()).collect()
     }
 
@@ -169,6 +191,40 @@ mod tests {
         // More than its prior is not an error.
         let wide = errors(1e9, 0.0)[1];
         assert!(wide < 1.8 / 12f64.sqrt() && wide > 0.99 * 1.8 / 12f64.sqrt(), "{wide}");
+    }
+
+    /// Noise alone moves the minimum of a finer model away from that of a coarser one: a third of such a step counts in the mean,
+    /// at most. Of a discrepancy far above the noise nearly all does.
+    #[test]
+    fn exact_noise_makes_no_model_error() {
+        use rand::{RngExt, SeedableRng};
+        use rand_distr::StandardNormal;
+        const N: usize = 60;
+        let mut random = rand_pcg::Pcg64::seed_from_u64(9);
+        let mut normal = || random.sample::<f64, _>(StandardNormal);
+        let tangents = DMatrix::from_fn(N, 2, |_, _| normal());
+        let volume = DMatrix::from_fn(N, 50, |_, _| normal());
+        // What no voxel explains, of few voxels and of all.
+        let off = |count: usize| {
+            let q = volume.columns(0, count).into_owned().qr().q();
+            DMatrix::identity(N, N) - &q * q.transpose()
+        };
+        let [few, many] = [off(10), off(50)];
+        let left =
+            |off: &DMatrix<f64>| (tangents.transpose() * off * &tangents).try_inverse().unwrap();
+        let [other, finer] = [left(&few), left(&many)];
+        let mut certain = |bias: f64| {
+            let noise = DVector::from_fn(N, |_, _| normal()) + volume.column(20) * bias;
+            // The coarse model stands at its minimum.
+            let at = &other * tangents.transpose() * &few * &noise;
+            let rest = noise - &tangents * at;
+            let slopes = |off: &DMatrix<f64>| -(tangents.transpose() * off * &rest);
+            beyond_chance(&(slopes(&many) - slopes(&few)), &finer, &other)
+        };
+        let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
+        let by_chance = mean((0..400).map(|_| certain(0.0)).collect());
+        let biased = mean((0..400).map(|_| certain(30.0)).collect());
+        assert!(by_chance < 0.35 && biased > 0.8, "{by_chance} {biased}");
     }
 
     /// A model of images that lacks something: whatever that is, it moves no parameter by more than the errors say that
