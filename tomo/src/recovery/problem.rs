@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::fit::settings::{AxisSearch, FitError, FitFile};
-use crate::fit::setup::{self, FitData, Instrument};
+use crate::fit::setup::{self, FitData, Instrument, RaySampling};
 use crate::fit::{Motion, Objective};
 use crate::representation::Registry;
 use kerrlight_vlbi::array::Array;
@@ -102,7 +102,7 @@ impl Problem {
         setup::representation(settings, registry, setup::emission_times(instrument, motion))?;
         if settings.unknown_geometry()?.is_some() {
             let geometry = setup::known_geometry(settings);
-            setup::in_geometry(settings, instrument, measured, &geometry, (1, 0))?;
+            setup::in_geometry(settings, instrument, measured, &geometry, RaySampling::default())?;
         }
         let seen = self.objective(instrument, motion, measured)?.observed().len();
         if let Some(held_out) = &settings.held_out {

@@ -6,7 +6,7 @@ use super::{Problem, Stopped};
 use crate::Error;
 use crate::fit::geometry::Geometry;
 use crate::fit::settings::{FitFile, Kind, UnknownGeometry};
-use crate::fit::setup::{self, BandScan, FitData, FoundGeometry, Instrument};
+use crate::fit::setup::{self, BandScan, FitData, FoundGeometry, Instrument, RaySampling};
 use crate::fit::{Motion, Objective};
 use kerrlight_render::dynamics::Axis;
 use std::sync::{Mutex, PoisonError};
@@ -24,7 +24,7 @@ pub struct ResolvedFit {
 }
 
 impl ResolvedFit {
-    /// Puts the problem in a geometry; rays are those of this number near the critical curve.
+    /// Puts the problem in a geometry, seen through these rays.
     ///
     /// # Errors
     /// If the geometry is out of range.
@@ -32,7 +32,7 @@ impl ResolvedFit {
         problem: &Problem,
         file: &FitFile,
         geometry: &Geometry,
-        rays: (usize, u64),
+        rays: RaySampling,
     ) -> Result<Self, Error> {
         let Problem { instrument, measured, .. } = problem;
         let (instrument, motion) = setup::in_geometry(file, instrument, measured, geometry, rays)?;
@@ -43,7 +43,7 @@ impl ResolvedFit {
         let Problem { settings, measured, .. } = problem;
         let placed = match choice {
             Choice::Geometry { geometry, rays } => {
-                Self::in_geometry(problem, settings, geometry, (*rays, 0))?
+                Self::in_geometry(problem, settings, geometry, *rays)?
             }
             Choice::Band { inclination_deg, position_angle_deg, rotation_factor, background } => {
                 let mut file = setup::in_band_geometry(settings, *inclination_deg);

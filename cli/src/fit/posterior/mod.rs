@@ -20,7 +20,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use kerrlight_render::volume::{Volume, VolumeFile};
 use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, UnknownGeometry};
-use kerrlight_tomo::fit::setup::GeometryPosterior;
+use kerrlight_tomo::fit::setup::{GeometryPosterior, RaySampling};
 use kerrlight_tomo::recovery::results::{GeometryResults, PerParameter};
 use kerrlight_tomo::recovery::{Problem, ResolvedFit};
 use kerrlight_tomo::representation::Registry;
@@ -250,8 +250,7 @@ struct Drawing<'a> {
     file: FitFile,
     unknown: Option<&'a UnknownGeometry>,
     geometries: Option<GeometryPosterior<'a>>,
-    /// Rays along each side of a pixel.
-    rays: usize,
+    rays: RaySampling,
     /// Noise of a draw over the errors of the data.
     factor: f64,
 }
@@ -277,7 +276,7 @@ impl<'a> Drawing<'a> {
             None => noise_of(folder)?,
         };
         let file = held_out::settled(&prepared.settings, folder)?;
-        let rays = geometry.as_ref().map_or(1, |geometry| geometry.rays());
+        let rays = geometry.as_ref().map(|geometry| geometry.rays()).unwrap_or_default();
         Ok(Self { prepared, file, unknown, geometries, rays, factor })
     }
 
@@ -321,8 +320,9 @@ impl<'a> Drawing<'a> {
         told("the geometry");
         let data = geometries.data(noise)?;
         let geometry = geometries.draw(number);
+        let rays = RaySampling { lattice: number, ..self.rays };
         let ResolvedFit { file, instrument, motion, .. } =
-            ResolvedFit::in_geometry(self.prepared, &file, &geometry, (self.rays, number))?;
+            ResolvedFit::in_geometry(self.prepared, &file, &geometry, rays)?;
         let through =
             Through { file: &file, instrument: &instrument, motion: &motion, registry, measured };
         let drawn = sample::draw(&through, &data, keeper, told)?;

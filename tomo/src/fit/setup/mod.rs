@@ -44,8 +44,8 @@ pub use curve::Curve;
 pub use drawn::{Drawn, OtherModel};
 pub use fit_data::FitData;
 pub use geometry::{
-    FoundGeometry, GeometryPosterior, Resolution, SearchWatch, Trial, find_geometry, in_geometry,
-    known_geometry, true_geometry,
+    FoundGeometry, GeometryPosterior, RaySampling, Resolution, SearchWatch, Trial, find_geometry,
+    in_geometry, known_geometry, true_geometry,
 };
 pub use held_out::{Held, HeldWatch, best as best_held, check_folds, hold_out};
 pub use imported::Reduction;

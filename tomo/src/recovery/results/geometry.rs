@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::fit::geometry::{Free, Geometry, ModelError, ModelErrors, Parameter, Span, Spread};
 use crate::fit::settings::{FitFile, Region, UnknownGeometry};
-use crate::fit::setup::{self, FitData, FoundGeometry, Resolution, Trial};
+use crate::fit::setup::{self, FitData, FoundGeometry, RaySampling, Resolution, Trial};
 use crate::null::or_nan;
 use crate::recovery::{Problem, settled};
 use serde::{Deserialize, Serialize};
@@ -147,9 +147,10 @@ impl GeometryResults {
         })
     }
 
-    /// Counts the rays along each side of a pixel that the best geometry was looked at through.
-    pub fn rays(&self) -> usize {
-        self.resolution.rays_per_pixel.isqrt()
+    /// Returns the rays that the best geometry was looked at through.
+    pub fn rays(&self) -> RaySampling {
+        let ResolutionResults { rays_per_pixel, panels, .. } = self.resolution;
+        RaySampling { per_side: rays_per_pixel.isqrt(), panels, lattice: 0 }
     }
 
     /// Returns the best geometry, with what is known of the settings; none if it lacks a free parameter.

@@ -18,6 +18,30 @@ pub struct Resolution {
     pub panels: u32,
 }
 
+/// Rays through which a fit sees a geometry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RaySampling {
+    /// Rays along each side of a pixel, which is their mean.
+    pub per_side: usize,
+    /// Panels of a ray for each of the settings.
+    pub panels: u32,
+    /// Number of the lattice of rays near the critical curve, 0 for the usual one.
+    pub lattice: u64,
+}
+
+impl Default for RaySampling {
+    fn default() -> Self {
+        Self { per_side: 1, panels: 1, lattice: 0 }
+    }
+}
+
+impl Resolution {
+    /// Its rays.
+    pub fn sampling(self) -> RaySampling {
+        RaySampling { per_side: self.rays, panels: self.panels, lattice: 0 }
+    }
+}
+
 /// End of one search, in [`Geometry`]'s units.
 #[derive(Clone, Debug)]
 pub struct Trial {

@@ -9,7 +9,7 @@ mod search_data;
 mod steps;
 mod tangent;
 
-pub use detail::{Resolution, Trial};
+pub use detail::{RaySampling, Resolution, Trial};
 pub use posterior::GeometryPosterior;
 pub use search::{FoundGeometry, SearchWatch, find_geometry};
 
@@ -39,8 +39,7 @@ pub fn true_geometry(file: &FitFile) -> Result<Geometry> {
     Ok(known_geometry(&file.simulated()?))
 }
 
-/// Returns the instrument of a fit in a geometry, and the motion of matter there. A pixel is the mean over so many rays
-/// along each side of it; those near the critical curve are of a number, 0 for the usual ones.
+/// Returns the instrument of a fit in a geometry, seen through these rays, and the motion of matter there.
 ///
 /// # Errors
 /// If a setting is missing or out of range.
@@ -49,12 +48,13 @@ pub fn in_geometry(
     instrument: &Instrument,
     measured: &FitData,
     geometry: &Geometry,
-    (rays, number): (usize, u64),
+    rays: RaySampling,
 ) -> Result<(Instrument, Motion)> {
     let plain = motion(file, measured.times.clone())?;
-    let mut model = model(file, instrument, &plain)?.seen_along(number);
-    if rays > 1 {
-        model.parts = Some((spacing(&file.screen)?, rays));
+    let mut model = model(file, instrument, &plain)?.seen_along(rays.lattice);
+    model.split *= rays.panels;
+    if rays.per_side > 1 {
+        model.parts = Some((spacing(&file.screen)?, rays.per_side));
     }
     let hole = Kerr::new(geometry.get(Parameter::Spin))?;
     let found = Instrument {
