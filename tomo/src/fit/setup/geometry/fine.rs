@@ -29,7 +29,9 @@ impl Detail<'_> {
         let at = Resolution { nodes, pixels, rays: 1, panels: 1 };
         let place = self.place(at, errors)?;
         let [is_stepped, is_convex] = self.through(&place, |problem| {
-            Ok([is_stepped(&place.seen, problem), problem.is_convex()])
+            let is_stepped = is_stepped(&place.seen, problem)
+                || place.seen.is_sampled() && !problem.change.is_any();
+            Ok([is_stepped, problem.is_convex()])
         })?;
         if is_stepped && is_convex {
             return self.steps(place, trials, watch);

@@ -5,7 +5,7 @@ use crate::fit::geometry::{Effort, Geometry, GeometryProblem};
 use crate::fit::journal::{Memory, key};
 use crate::fit::linear::{Change, GaussianField, Prior as Penalty, StopRule, Voxels, Weighted};
 use crate::fit::settings::{
-    FieldKind, FitFile, LossKind, PriorOfVoxels, SearchView, UnknownGeometry, Within,
+    FieldKind, FitFile, LossKind, PriorOfVoxels, Screen, SearchView, UnknownGeometry, Within,
 };
 use crate::fit::setup::linear_problem::terms;
 use crate::fit::setup::{
@@ -33,9 +33,10 @@ const RESAMPLED: [f64; 3] = [1.15, 0.87, 1.25];
 const SETTLING: usize = 6;
 
 impl SearchData {
-    /// Prepares a search all over: volumes are told apart by a few iterations.
+    /// Prepares a search all over: volumes are told apart by a few iterations, through single rays.
     pub fn coarsely(file: &FitFile, measured: &FitData, view: &SearchView) -> Result<Self> {
-        Self::new(file, measured, view, 0)
+        let screen = Screen { ring_rays: None, ..file.screen.clone() };
+        Self::new(&FitFile { screen, ..file.clone() }, measured, view, 0)
     }
 
     /// Prepares a search among geometries that are much alike, whose volumes are solved for nearly to the end; and the same
@@ -166,7 +167,17 @@ impl SearchData {
 
     /// Returns whether images are all that is compared.
     pub fn is_images(&self) -> bool {
-        self.view.file.loss.iter().all(|loss| loss.data == LossKind::Image)
+        self.compares(LossKind::Image)
+    }
+
+    /// Returns whether visibilities of a smooth image are all that is compared: of its pixels there can be as many as are
+    /// needed.
+    pub fn is_sampled(&self) -> bool {
+        self.compares(LossKind::Visibilities) && self.view.measured.pulse == Pulse::Delta
+    }
+
+    fn compares(&self, kind: LossKind) -> bool {
+        self.view.file.loss.iter().all(|loss| loss.data == kind)
     }
 }
 

@@ -26,6 +26,15 @@ pub(super) struct Place {
     pub errors: f64,
 }
 
+/// Parts of a model that become finer.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Parts {
+    /// Sums over rays: along them and over pixels.
+    Sums,
+    /// Voxels, too.
+    All,
+}
+
 /// End of steps from a geometry.
 #[derive(Clone)]
 struct Stepped {
@@ -62,7 +71,7 @@ impl Detail<'_> {
     ///
     /// Coarse voxels displace ends, so that the best of them need not lead to the best geometry. Pixels of images are samples
     /// or means: steps are taken with both. Some pixels are left out, at first those near the critical curve of each end:
-    /// values are compared once they are the same for all.
+    /// values are compared once they are the same for all, and as fine as the data ask for.
     pub fn steps(
         &self,
         first: Place,
@@ -70,6 +79,9 @@ impl Detail<'_> {
         watch: &mut TrialWatch<'_>,
     ) -> Result<Option<Detailed>> {
         let ends: Vec<Geometry> = trials.iter().map(|trial| trial.end).collect();
+        let coarse = trials.iter().min_by(|a, b| a.value.total_cmp(&b.value));
+        let Some(coarse) = coarse.map(|trial| trial.end) else { return Ok(None) };
+        let first = self.summed(first, coarse)?;
         let Some(near) = self.each(&first, None, &ends, watch)? else { return Ok(None) };
         let mut best = (first, near);
         if self.may_be_means(&best.0)? {
@@ -81,9 +93,10 @@ impl Detail<'_> {
             }
         }
         let (place, near) = best;
+        let Some(best) = lowest(&near).cloned() else { return Ok(None) };
+        let (place, about) = self.refined(place, best)?;
         let ends: Vec<Geometry> = near.iter().map(Stepped::geometry).collect();
-        let about = lowest(&near).map(Stepped::geometry);
-        let Some(all) = self.each(&place, about, &ends, watch)? else { return Ok(None) };
+        let Some(all) = self.each(&place, Some(about), &ends, watch)? else { return Ok(None) };
         for (trial, stepped) in trials.iter_mut().zip(&all) {
             let Stepped { polished, reduced, .. } = stepped;
             trial.end = stepped.geometry();
@@ -91,11 +104,10 @@ impl Detail<'_> {
             trial.reduced_chi2 = reduced / place.errors;
             trial.further = polished.further;
         }
-        let Some(best) = lowest(&all).cloned() else { return Ok(None) };
-        let (place, best) = self.refined(place, best)?;
+        let Some(best) = lowest(&all) else { return Ok(None) };
         let errors = (self.scale)(best.reduced / place.errors);
         let place = Place { errors, ..place };
-        let sure = self.sure(&place, &best)?;
+        let sure = self.sure(&place, best)?;
         Ok(Some(Detailed { sure, errors, resolution: place.at }))
     }
 
@@ -139,41 +151,55 @@ impl Detail<'_> {
         })
     }
 
-    /// Steps at higher resolutions, as long as these explain more than chance does: what lowers χ²/2 at the best geometry by
-    /// more than its standard deviation. More voxels explain more in any case, and count where χ² asks for them.
-    fn refined(&self, mut place: Place, mut best: Stepped) -> Result<(Place, Stepped)> {
-        if !self.is_foreign()? {
-            return Ok((place, best));
+    /// Sums over rays that are as fine as visibilities ask for in a geometry: those that are too coarse ripple, and steps end in
+    /// the ripples.
+    fn summed(&self, mut place: Place, geometry: Geometry) -> Result<Place> {
+        if place.seen.is_images() || !self.is_foreign()? {
+            return Ok(place);
         }
-        loop {
-            let geometry = best.geometry();
-            let (value, chance, finer) = self.smoothly(&place, geometry, |problem| {
-                let chance = (0.5 * problem.data()).sqrt();
-                let asks = problem.excess(best.reduced) > 0.0;
-                Ok((problem.solve(geometry)?.value, chance, self.finer(&place, problem, asks)?))
-            })?;
-            let mut next: Option<(f64, Place)> = None;
-            for at in finer {
-                let there = self.place(at, place.errors)?;
-                let gain =
-                    value - self.smoothly(&there, geometry, |p| Ok(p.solve(geometry)?.value))?;
-                if gain > next.as_ref().map_or(chance, |(most, _)| *most) {
-                    next = Some((gain, there));
-                }
-            }
-            let Some((_, there)) = next else { return Ok((place, best)) };
-            best = self.stepped(&there, geometry, geometry)?;
-            place = there;
+        while let Some(finer) = self.finer(&place, geometry, Parts::Sums)? {
+            place = finer;
         }
+        Ok(place)
     }
 
-    /// Resolutions that are higher in one of their parts: voxels, where they are asked for, down to half a pixel.
-    fn finer(
-        &self,
-        place: &Place,
-        problem: &GeometryProblem<'_, f32>,
-        asks_for_voxels: bool,
-    ) -> Result<Vec<Resolution>> {
+    /// Returns the resolution that the data ask for, and the geometry that steps lead to with it: these follow whenever it has
+    /// become higher.
+    fn refined(&self, mut place: Place, best: Stepped) -> Result<(Place, Geometry)> {
+        let mut geometry = best.geometry();
+        if !self.is_foreign()? {
+            return Ok((place, geometry));
+        }
+        while let Some(finer) = self.finer(&place, geometry, Parts::All)? {
+            geometry = self.stepped(&finer, geometry, geometry)?.geometry();
+            place = finer;
+        }
+        Ok((place, geometry))
+    }
+
+    /// The resolution, higher in one of its parts, that explains most, if that is more than chance does: what lowers χ²/2 by more
+    /// than its standard deviation. More voxels explain more in any case, and count where χ² asks for them.
+    fn finer(&self, place: &Place, geometry: Geometry, parts: Parts) -> Result<Option<Place>> {
+        let (value, chance, voxels) = self.smoothly(place, geometry, |problem| {
+            let here = problem.solve(geometry)?;
+            let chance = (0.5 * problem.data()).sqrt();
+            let asks = problem.excess(problem.scale * problem.reduced(here.chi2)) > 0.0;
+            let voxels = self.more_voxels(place, problem)?;
+            Ok((here.value, chance, voxels.filter(|_| asks && parts == Parts::All)))
+        })?;
+        let mut most: Option<(f64, Place)> = None;
+        for at in self.finer_sums(place).into_iter().chain(voxels) {
+            let there = self.place(at, place.errors)?;
+            let gain = value - self.smoothly(&there, geometry, |p| Ok(p.solve(geometry)?.value))?;
+            if gain > most.as_ref().map_or(chance, |(most, _)| *most) {
+                most = Some((gain, there));
+            }
+        }
+        Ok(most.map(|(_, there)| there))
+    }
+
+    /// Resolutions with finer sums over rays, along them and over pixels.
+    fn finer_sums(&self, place: &Place) -> Vec<Resolution> {
         let Place { at, seen, .. } = place;
         let mut all = Vec::new();
         // Whether pixels are means at all was decided where steps began: either model has minima of its own.
@@ -188,13 +214,20 @@ impl Detail<'_> {
         if (at.panels as usize) < MOST {
             all.push(Resolution { panels: 2 * at.panels, ..*at });
         }
-        let nodes = finer(at.nodes);
+        all
+    }
+
+    /// The resolution with more voxels, down to half a pixel; none where a prior says what is between them.
+    fn more_voxels(
+        &self,
+        place: &Place,
+        problem: &GeometryProblem<'_, f32>,
+    ) -> Result<Option<Resolution>> {
+        let nodes = finer(place.at.nodes);
         let voxels = Voxels::cube(nodes, self.file.region.r_max, problem.effort.degree);
-        let is_wide = voxels.shape().spacing[0] >= 0.5 * spacing(&seen.view.file.screen)?;
-        if asks_for_voxels && problem.gaussian.is_none() && is_wide {
-            all.push(Resolution { nodes, ..*at });
-        }
-        Ok(all)
+        let is_wide = voxels.shape().spacing[0] >= 0.5 * spacing(&place.seen.view.file.screen)?;
+        let is_free = problem.gaussian.is_none();
+        Ok((is_free && is_wide).then_some(Resolution { nodes, ..place.at }))
     }
 
     /// Returns the errors of the best geometry, with those that the model has of itself.
