@@ -28,12 +28,13 @@ impl Detail<'_> {
         let SearchView { nodes, pixels, .. } = self.unknown.search.fine;
         let at = Resolution { nodes, pixels, rays: 1, panels: 1 };
         let place = self.place(at, errors)?;
-        let [is_stepped, is_convex] = self.through(&place, |problem| {
-            let is_stepped = is_stepped(&place.seen, problem)
+        let [has_steps, is_convex] = self.through(&place, |problem| {
+            // Sums over samples of a smooth image become as fine as steps need them.
+            let has_steps = is_stepped(&place.seen, problem)
                 || place.seen.is_sampled() && !problem.change.is_any();
-            Ok([is_stepped, problem.is_convex()])
+            Ok([has_steps, problem.is_convex()])
         })?;
-        if is_stepped && is_convex {
+        if has_steps && is_convex {
             return self.steps(place, trials, watch);
         }
         let found = self.through(&place, |problem| match is_convex {

@@ -157,8 +157,8 @@ impl Detail<'_> {
         if place.seen.is_images() || !self.is_foreign()? {
             return Ok(place);
         }
-        while let Some(finer) = self.finer(&place, geometry, Parts::Sums)? {
-            place = finer;
+        while let Some(there) = self.higher(&place, geometry, Parts::Sums)? {
+            place = there;
         }
         Ok(place)
     }
@@ -170,16 +170,16 @@ impl Detail<'_> {
         if !self.is_foreign()? {
             return Ok((place, geometry));
         }
-        while let Some(finer) = self.finer(&place, geometry, Parts::All)? {
-            geometry = self.stepped(&finer, geometry, geometry)?.geometry();
-            place = finer;
+        while let Some(there) = self.higher(&place, geometry, Parts::All)? {
+            geometry = self.stepped(&there, geometry, geometry)?.geometry();
+            place = there;
         }
         Ok((place, geometry))
     }
 
     /// The resolution, higher in one of its parts, that explains most, if that is more than chance does: what lowers χ²/2 by more
     /// than its standard deviation. More voxels explain more in any case, and count where χ² asks for them.
-    fn finer(&self, place: &Place, geometry: Geometry, parts: Parts) -> Result<Option<Place>> {
+    fn higher(&self, place: &Place, geometry: Geometry, parts: Parts) -> Result<Option<Place>> {
         let (value, chance, voxels) = self.smoothly(place, geometry, |problem| {
             let here = problem.solve(geometry)?;
             let chance = (0.5 * problem.data()).sqrt();
