@@ -2,6 +2,7 @@
 
 use crate::ring::Ring;
 use crate::solve::Solution;
+use crate::start::Envelope;
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_tomo::fit::setup::Held;
 use kerrlight_vlbi::operator::ImageGrid;
@@ -24,8 +25,8 @@ pub struct Candidate {
 /// The image that was found, with others that tell its errors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
-    /// Full width at half maximum of the envelope, µas, if there is one.
-    pub envelope_uas: Option<f64>,
+    /// The envelope, if there is one.
+    pub envelope: Option<Envelope>,
     /// Strengths with the loss of frames that were held out, of fits that came to a minimum.
     pub held: Vec<Held>,
     /// The strength: the largest that predicts held-out frames as well as the best within a standard error.

@@ -91,4 +91,5 @@ pub use problem::{FluxPrior, ImageProblem};
 pub use ring::Ring;
 pub use shapes::{Shape, ShapeFit, best_shape, fit_shapes};
 pub use solve::Solution;
+pub use start::{Envelope, Profile};
 pub use survey::{Stage, SurveyWatch, image, survey};

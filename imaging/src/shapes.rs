@@ -4,6 +4,7 @@ use crate::Error;
 use crate::problem::{FluxPrior, ImageProblem};
 use crate::settings::StaticImageFile;
 use crate::solve::minimum;
+use crate::start::{Envelope, Profile};
 use core::f64::consts::{LN_2, TAU};
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_tomo::fit::settings::LossKind;
@@ -45,8 +46,17 @@ pub struct ShapeFit {
 }
 
 impl ShapeFit {
+    /// Light of about this extent: flat where the shape is even to an edge, a Gaussian where it has wings.
+    pub fn envelope(&self, grid: ImageGrid) -> Envelope {
+        let profile = match self.shape {
+            Shape::Gaussian | Shape::Double => Profile::Gaussian,
+            Shape::Disc | Shape::Ring | Shape::Crescent => Profile::Flat,
+        };
+        Envelope { profile, fwhm_uas: self.width_uas(grid) }
+    }
+
     /// Full width at half maximum of the round Gaussian with the same second moment about the centroid, µas.
-    pub fn width_uas(&self, grid: ImageGrid) -> f64 {
+    fn width_uas(&self, grid: ImageGrid) -> f64 {
         let places = (0..grid.pixels()).map(|k| {
             [grid.east(k % grid.width), grid.north(k / grid.width)].map(|x| x / MICROARCSECOND)
         });

@@ -9,7 +9,7 @@ use crate::ring::Ring;
 use crate::settings::{EnvelopeSettings, StaticImageFile, StrengthSettings};
 use crate::shapes::{ShapeFit, best_shape, fit_shapes};
 use crate::solve::solve;
-use crate::start;
+use crate::start::{self, Envelope, Profile};
 use kerrlight_tomo::fit::linear::Prior;
 use kerrlight_tomo::fit::setup::{FitData, Held, best_held};
 use kerrlight_tomo::fit::{FrameTerm, Weighted};
@@ -50,18 +50,19 @@ pub fn survey(
 ) -> Result<Option<Survey>, Error> {
     let grid = file.image.grid()?;
     let terms = measured.visibility_terms(&file.loss, grid.pixels())?;
-    let best = best_shape(shapes.iter());
-    let width = |envelope: EnvelopeSettings| {
-        let width = envelope.fwhm_uas.or_else(|| Some(best?.width_uas(grid)));
-        width.ok_or_else(|| Error::Failed("envelope.fwhm_uas is needed without shapes".to_owned()))
+    let of_best = best_shape(shapes.iter()).map(|best| best.envelope(grid));
+    let envelope = |EnvelopeSettings { fwhm_uas, weight }: EnvelopeSettings| {
+        let given = fwhm_uas.map(|fwhm_uas| Envelope { profile: Profile::Gaussian, fwhm_uas });
+        let envelope = given.or(of_best).map(|envelope| (envelope, weight));
+        envelope
+            .ok_or_else(|| Error::Failed("envelope.fwhm_uas is needed without shapes".to_owned()))
     };
-    let envelope_uas = file.envelope.map(width).transpose()?;
-    let weight = file.envelope.map_or(0.0, |envelope| envelope.weight);
-    let envelope = envelope_uas.map(|width| (start::envelope(width, grid), weight));
+    let expected = file.envelope.map(envelope).transpose()?;
+    let envelope = expected.map(|(envelope, weight)| (envelope.shares(grid), weight));
     let of_shapes = shapes.iter().map(|fit| start::shape(&fit.shares));
     let begin = file.image.starts.iter().map(|start| start::image(*start, grid)).chain(of_shapes);
     let (priors, begin) = (file.priors()?, begin.collect());
-    let search = Search { file, grid, priors, envelope, envelope_uas, begin, terms: &terms, watch };
+    let search = Search { file, grid, priors, envelope, expected, begin, terms: &terms, watch };
     let frames: Vec<usize> = (0..measured.times.len()).collect();
     let middle = file.strength.as_ref().map_or(1.0, |s| s.values[s.values.len() / 2]);
     let Some(starts) = search.starts(middle, &frames) else { return Ok(None) };
@@ -98,7 +99,8 @@ pub fn survey(
         }
         None => None,
     };
-    Ok(Some(Survey { envelope_uas, held, strength, starts, best, strengths, draws, calibration }))
+    let envelope = expected.map(|(envelope, _)| envelope);
+    Ok(Some(Survey { envelope, held, strength, starts, best, strengths, draws, calibration }))
 }
 
 /// The image of visibilities of a source that does not change, as `kerrlight fit` finds it: from the starts of the settings and
@@ -192,7 +194,7 @@ struct Search<'a> {
     grid: ImageGrid,
     priors: Vec<Prior>,
     envelope: Option<(Vec<f64>, f64)>,
-    envelope_uas: Option<f64>,
+    expected: Option<(Envelope, f64)>,
     /// Shares of the flux in the pixels, for each start.
     begin: Vec<Vec<f64>>,
     terms: &'a [Weighted<dyn FrameTerm<f64>>],
@@ -287,10 +289,9 @@ impl Search<'_> {
             let FluxPrior { jy, sigma_jy } = self.flux();
             // A flux below 0 is none: far from it for any prior that says something.
             let flux = FluxPrior { jy: (jy + of_flux * sigma_jy).max(0.01 * jy), sigma_jy };
-            let envelope = self.envelope_uas.zip(self.envelope.as_ref());
-            let envelope = envelope.map(|(width, (_, weight))| {
-                let width = width * (ENVELOPE_SPREAD * of_width).exp();
-                (start::envelope(width, self.grid), *weight)
+            let envelope = self.expected.map(|(expected, weight)| {
+                let fwhm_uas = expected.fwhm_uas * (ENVELOPE_SPREAD * of_width).exp();
+                (Envelope { fwhm_uas, ..expected }.shares(self.grid), weight)
             });
             let envelope = envelope.as_ref().map(|(shares, weight)| (&shares[..], *weight));
             let strength = others.strengths[k % others.strengths.len()];

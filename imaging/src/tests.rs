@@ -189,7 +189,7 @@ fn exact_gradients_of_the_loss() {
     let grid = file.image.grid().unwrap();
     let terms = measured.visibility_terms::<f64>(&file.loss, grid.pixels()).unwrap();
     let priors = file.priors().unwrap();
-    let envelope = start::envelope(60.0, grid);
+    let envelope = Envelope { profile: Profile::Gaussian, fwhm_uas: 60.0 }.shares(grid);
     let problem = ImageProblem {
         terms: &terms,
         frames: (0..measured.times.len()).collect(),
@@ -256,7 +256,7 @@ fn exact_the_gradient_says_whether_a_fit_has_converged() {
     let measured = measured(&file, 2);
     let grid = file.image.grid().unwrap();
     let terms = measured.visibility_terms::<f64>(&file.loss, grid.pixels()).unwrap();
-    let envelope = start::envelope(45.0, grid);
+    let envelope = Envelope { profile: Profile::Gaussian, fwhm_uas: 45.0 }.shares(grid);
     let problem = ImageProblem {
         terms: &terms,
         frames: (0..measured.times.len()).collect(),

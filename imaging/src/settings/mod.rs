@@ -45,7 +45,7 @@ pub struct StaticImageFile {
     /// Penalties on the brightness over its mean; lengths are parts of the field.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub regulariser: Vec<PenaltySettings>,
-    /// A Gaussian in the middle of the field that light is expected in.
+    /// Light that is expected in the middle of the field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub envelope: Option<EnvelopeSettings>,
     /// A factor on all penalties, chosen by cross-validation; 1 without it.
@@ -108,11 +108,12 @@ pub enum StartImage {
     },
 }
 
-/// A round Gaussian in the middle of the field that light is expected in: the entropy relative to it is a penalty.
+/// Round light that is expected in the middle of the field: the entropy relative to it is a penalty.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EnvelopeSettings {
-    /// Full width at half maximum, µas; without it that of a Gaussian with the second moment of the best simple shape.
+    /// Full width at half maximum of a Gaussian, µas; without it, light with the second moment of the best simple shape, flat with soft edges if
+    /// that is a disc, a ring or a crescent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
     pub fwhm_uas: Option<f64>,

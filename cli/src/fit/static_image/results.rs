@@ -175,7 +175,7 @@ impl Found<'_> {
             flux_jy: found.solution.image.iter().sum(),
             flux_error_jy: self.survey.flux_error(),
             strength: self.survey.strength,
-            envelope_fwhm_uas: self.survey.envelope_uas,
+            envelope_fwhm_uas: self.survey.envelope.map(|envelope| envelope.fwhm_uas),
             starts: all(&self.survey.starts),
             strengths: all(&self.survey.strengths),
             draws: all(&self.survey.draws),

@@ -7,7 +7,7 @@ use crate::fit::closures;
 use crate::fit::results::medium;
 use crate::report::Part;
 use kerrlight_imaging::settings::StartImage;
-use kerrlight_imaging::{ShapeFit, Survey, best_shape};
+use kerrlight_imaging::{Envelope, Profile, ShapeFit, Survey, best_shape};
 use kerrlight_tomo::fit::settings::LossKind;
 
 impl Found<'_> {
@@ -146,16 +146,18 @@ impl Found<'_> {
             ),
             format!("Starts: {}; then the simple shapes that fit the data.", starts.join("; ")),
         ];
-        let envelope = self.file.envelope.zip(self.survey.envelope_uas);
-        let envelope = envelope.map(|(envelope, width)| {
-            let of_shape = match envelope.fwhm_uas {
+        let envelope = self.file.envelope.zip(self.survey.envelope);
+        let envelope = envelope.map(|(settings, Envelope { profile, fwhm_uas })| {
+            let of_shape = match settings.fwhm_uas {
                 Some(_) => "",
                 None => " with the second moment of the best simple shape",
             };
-            format!(
-                "entropy relative to a Gaussian of {width:.1} µas{of_shape} (weight {})",
-                envelope.weight
-            )
+            let what = match profile {
+                Profile::Gaussian => "a Gaussian of",
+                Profile::Flat => "a flat disc with soft edges, as wide as a Gaussian of",
+            };
+            let weight = settings.weight;
+            format!("entropy relative to {what} {fwhm_uas:.1} µas{of_shape} (weight {weight})")
         });
         let penalties: Vec<String> = envelope.into_iter().chain(penalties).collect();
         if !penalties.is_empty() {
