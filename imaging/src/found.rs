@@ -1,8 +1,8 @@
 //! The image that a survey has found, with its errors.
 
+use crate::envelope::Envelope;
 use crate::ring::Ring;
 use crate::solve::Solution;
-use crate::start::Envelope;
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_tomo::fit::setup::Held;
 use kerrlight_vlbi::operator::ImageGrid;
@@ -108,7 +108,7 @@ impl Survey {
     }
 
     /// Diameter of the ring in µas, less what the method adds to that of the best simple shape, and its error where that is known:
-    /// the envelope draws light inward, and a blurred ring is smaller. An image that is not at a minimum is taken as it is.
+    /// a blurred ring is smaller. An image that is not at a minimum is taken as it is.
     pub fn ring_diameter(&self) -> Option<(f64, Option<f64>)> {
         let here = self.found().ring?.diameter_uas;
         let error = self.ring_error(|ring| ring.diameter_uas);

@@ -62,6 +62,7 @@ pub mod data;
 
 mod beam;
 
+mod envelope;
 mod start;
 
 mod problem;
@@ -82,6 +83,7 @@ mod polarized;
 mod tests;
 
 pub use beam::blurred;
+pub use envelope::{Envelope, Profile};
 pub use found::{Calibration, Candidate, Survey};
 pub use kerrlight_tomo::Error;
 pub use polarized::{
@@ -91,5 +93,4 @@ pub use problem::{FluxPrior, ImageProblem};
 pub use ring::Ring;
 pub use shapes::{Shape, ShapeFit, best_shape, fit_shapes};
 pub use solve::Solution;
-pub use start::{Envelope, Profile};
 pub use survey::{Stage, SurveyWatch, image, survey};

@@ -1,10 +1,10 @@
 //! Simple shapes that are fitted to the data of an image, with the same gains: what the image has to do better than.
 
 use crate::Error;
+use crate::envelope::{Envelope, Profile};
 use crate::problem::{FluxPrior, ImageProblem};
 use crate::settings::StaticImageFile;
 use crate::solve::minimum;
-use crate::start::{Envelope, Profile};
 use core::f64::consts::{LN_2, TAU};
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_tomo::fit::settings::LossKind;

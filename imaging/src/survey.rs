@@ -3,13 +3,14 @@
 
 use crate::Error;
 use crate::data;
+use crate::envelope::{Envelope, Profile};
 use crate::found::{Calibration, Candidate, Survey};
 use crate::problem::{FluxPrior, ImageProblem};
 use crate::ring::Ring;
 use crate::settings::{EnvelopeSettings, StaticImageFile, StrengthSettings};
 use crate::shapes::{ShapeFit, best_shape, fit_shapes};
 use crate::solve::solve;
-use crate::start::{self, Envelope, Profile};
+use crate::start;
 use kerrlight_tomo::fit::linear::Prior;
 use kerrlight_tomo::fit::setup::{FitData, Held, best_held};
 use kerrlight_tomo::fit::{FrameTerm, Weighted};
@@ -51,13 +52,7 @@ pub fn survey(
     let grid = file.image.grid()?;
     let terms = measured.visibility_terms(&file.loss, grid.pixels())?;
     let of_best = best_shape(shapes.iter()).map(|best| best.envelope(grid));
-    let envelope = |EnvelopeSettings { fwhm_uas, weight }: EnvelopeSettings| {
-        let given = fwhm_uas.map(|fwhm_uas| Envelope { profile: Profile::Gaussian, fwhm_uas });
-        let envelope = given.or(of_best).map(|envelope| (envelope, weight));
-        envelope
-            .ok_or_else(|| Error::Failed("envelope.fwhm_uas is needed without shapes".to_owned()))
-    };
-    let expected = file.envelope.map(envelope).transpose()?;
+    let expected = file.envelope.map(|settings| expected(settings, of_best)).transpose()?;
     let envelope = expected.map(|(envelope, weight)| (envelope.shares(grid), weight));
     let of_shapes = shapes.iter().map(|fit| start::shape(&fit.shares));
     let begin = file.image.starts.iter().map(|start| start::image(*start, grid)).chain(of_shapes);
@@ -114,6 +109,17 @@ pub fn image(file: &StaticImageFile, observation: Observation) -> Result<Survey,
     let shapes = fit_shapes(file, &measured, &|| true)?.unwrap_or_default();
     let found = survey(file, &measured, &shapes, &|_, _| true)?;
     found.ok_or_else(|| Error::Failed("the search for an image was told to stop".to_owned()))
+}
+
+/// The envelope of given settings, or else of the best shape, with the factor on the entropy relative to it.
+fn expected(
+    EnvelopeSettings { fwhm_uas, weight }: EnvelopeSettings,
+    of_best: Option<Envelope>,
+) -> Result<(Envelope, f64), Error> {
+    let given = fwhm_uas.map(|fwhm_uas| Envelope { profile: Profile::Gaussian, fwhm_uas });
+    let envelope = given.or(of_best);
+    let missing = || Error::Failed("envelope.fwhm_uas is needed without shapes".to_owned());
+    Ok((envelope.ok_or_else(missing)?, weight))
 }
 
 /// The start with the least loss.
@@ -193,8 +199,9 @@ struct Search<'a> {
     file: &'a StaticImageFile,
     grid: ImageGrid,
     priors: Vec<Prior>,
-    envelope: Option<(Vec<f64>, f64)>,
+    /// Light that is expected, with the factor on the entropy relative to it, and its shares in the pixels.
     expected: Option<(Envelope, f64)>,
+    envelope: Option<(Vec<f64>, f64)>,
     /// Shares of the flux in the pixels, for each start.
     begin: Vec<Vec<f64>>,
     terms: &'a [Weighted<dyn FrameTerm<f64>>],
