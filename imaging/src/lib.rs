@@ -62,8 +62,9 @@ pub mod data;
 
 mod beam;
 
-mod envelope;
 mod start;
+
+mod envelope;
 
 mod problem;
 
