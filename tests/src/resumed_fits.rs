@@ -58,12 +58,14 @@ fn killed(at: &Path, words: &[&str], run: &str) {
     child.wait().unwrap();
 }
 
-/// Returns the message of a `fit --resume run` that must be refused and must change nothing.
+/// Returns the message of a `fit --resume run` that must be refused and must change nothing. What the kill has cut short
+/// in the middle of writing is no file of the run, and may go.
 fn refused(at: &Path) -> String {
     let all = || {
         let entries = std::fs::read_dir(at.join("run")).unwrap().flatten();
+        let whole = entries.filter(|e| !e.file_name().to_string_lossy().starts_with(".kerrlight-"));
         let mut files: Vec<_> =
-            entries.map(|entry| (entry.path(), std::fs::read(entry.path()).unwrap())).collect();
+            whole.map(|entry| (entry.path(), std::fs::read(entry.path()).unwrap())).collect();
         files.sort();
         files
     };
