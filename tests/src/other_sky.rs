@@ -238,6 +238,46 @@ fn code_drawn_geometries_look_alike_through_both_forward_models() {
     }
 }
 
+/// Pixels of another program are means or samples: a fit in a known geometry tells which, and explains its data.
+#[test]
+fn exact_images_of_another_program_tell_their_rays() {
+    let (sky, arcs) = spots_and_arc();
+    let chi2 = |rays: usize, also: &[&str]| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let folder = folder.path();
+        let screen = Screen { pixels: 24, rays, ..SCREEN };
+        let sigma = film(&folder.join("film.npz"), screen, &(sky, arcs.clone()), 0.01);
+        succeed(folder, &["fit", "--init", "film.npz", "-o", "fit.toml"]);
+        let sets = [
+            format!("hole.spin={}", sky.spin),
+            format!("observer.inclination_deg={}", sky.inclination_deg),
+            format!("observer.position_angle_deg={}", sky.position_angle_deg),
+            format!("screen.width={}", SCREEN.width),
+            "region.r_min=2.0".to_owned(),
+            "region.r_max=13.0".to_owned(),
+            "motion.velocity={keplerian={}}".to_owned(),
+            "motion.axis=[0.0,0.0,1.0]".to_owned(),
+            "data.movie.from=0.0".to_owned(),
+            format!("data.movie.to={LAST}"),
+            format!("loss.0.sigma={sigma}"),
+            "representation=linear-grid".to_owned(),
+            "output.nodes=24".to_owned(),
+        ];
+        let mut words = vec!["fit", "fit.toml", "-o", "run"];
+        sets.iter().for_each(|set| words.extend(["--set", set]));
+        also.iter().for_each(|set| words.extend(["--set", set]));
+        succeed(folder, &words);
+        let results = crate::fit::results(&folder.join("run"));
+        (results["rays_per_pixel"].as_u64(), results["chi2_per_datum"]["image"].as_f64().unwrap())
+    };
+    let (samples, of_samples) = chi2(1, &[]);
+    let (means, of_means) = chi2(4, &[]);
+    let (single, of_single) = chi2(4, &["screen.samples_per_pixel=1"]);
+    println!("{of_samples} {of_means} {of_single}");
+    assert_eq!([samples, means, single], [Some(1), Some(4), Some(1)]);
+    assert!(of_samples < 1.1 && of_means < 1.1 && of_single > of_means + 0.1);
+}
+
 /// Voxels and pixels that the search begins with are too coarse for the filaments, and a start of so few evaluations ends
 /// at a spin of 0.8: steps lead on from there, at the resolution that the data ask for.
 #[test]

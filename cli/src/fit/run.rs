@@ -31,7 +31,7 @@ pub fn problem(file: FitFile, base_dir: &Path, registry: &Registry) -> anyhow::R
 
 /// Refuses a device that does not do this fit.
 pub fn check_device(problem: &Problem, check: CheckSteps) -> anyhow::Result<()> {
-    let Problem { settings, registry, instrument, measured, motion } = problem;
+    let Problem { settings, registry, instrument, measured, motion, .. } = problem;
     if settings.representation.kind == Kind::LinearGrid {
         bail!("representation.kind: a linear-grid is solved on the processor");
     }

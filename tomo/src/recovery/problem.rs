@@ -22,6 +22,8 @@ pub struct Problem {
     pub measured: FitData,
     /// Motion.
     pub motion: Motion,
+    /// Rays that were chosen because the data ask for them.
+    pub rays: Option<RaySampling>,
 }
 
 impl Problem {
@@ -87,14 +89,26 @@ impl Problem {
         FitData::check_origin(&settings)?;
         let measured = measure(&settings, &instrument)?;
         let motion = setup::motion(&settings, measured.times.clone())?;
-        let problem = Self { settings, registry, instrument, measured, motion };
+        let mut problem = Self { settings, registry, instrument, measured, motion, rays: None };
         problem.check()?;
+        problem.resolve()?;
         Ok(problem)
+    }
+
+    /// Takes as many rays as data of another program ask for.
+    fn resolve(&mut self) -> Result<(), Error> {
+        let rays = setup::rays_of_data(&self.settings, &self.measured)?;
+        self.rays = rays.filter(|rays| *rays != RaySampling::default());
+        if let Some(rays) = self.rays {
+            self.settings = setup::through(self.settings.clone(), rays);
+            self.instrument = Instrument::new(&self.settings)?;
+        }
+        Ok(())
     }
 
     /// Refuses what settings and data do not allow together.
     fn check(&self) -> Result<(), Error> {
-        let Self { settings, registry, instrument, measured, motion } = self;
+        let Self { settings, registry, instrument, measured, motion, .. } = self;
         if let Some(band) = &settings.band {
             setup::check_band(settings, measured, band)?;
         }

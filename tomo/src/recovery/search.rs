@@ -36,7 +36,8 @@ impl ResolvedFit {
     ) -> Result<Self, Error> {
         let Problem { instrument, measured, .. } = problem;
         let (instrument, motion) = setup::in_geometry(file, instrument, measured, geometry, rays)?;
-        Ok(Self { file: settled(file, geometry), instrument, motion, measured: None })
+        let file = setup::through(settled(file, geometry), rays);
+        Ok(Self { file, instrument, motion, measured: None })
     }
 
     fn of(problem: &Problem, choice: &Choice) -> Result<Option<Self>, Error> {

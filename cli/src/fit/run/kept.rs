@@ -14,7 +14,7 @@ use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
-use kerrlight_tomo::fit::setup;
+use kerrlight_tomo::fit::setup::{self, RaySampling};
 use kerrlight_tomo::fit::{DeviceRunner, Outcome, State, Trainer, checkpoint, journal};
 use kerrlight_tomo::recovery::results::{BandResults, GeometryResults, HeldOutResults};
 use kerrlight_tomo::recovery::{At, Choice, Event, Found, Now, Problem, Progress, Resumed, Stage};
@@ -291,6 +291,13 @@ impl Progress for Kept<'_> {
         eprintln!("{}", Self::describe(&now));
         for used in closures::sentences(now.measured, &now.settings.loss) {
             eprintln!("{used}");
+        }
+        if let Some(rays) = self.problem.rays {
+            let RaySampling { per_side, panels, .. } = rays;
+            eprintln!(
+                "note: the data ask for {} rays per pixel and {panels} times the panels of region.nodes",
+                per_side * per_side
+            );
         }
         let caution = setup::caution(now.settings).map(str::to_owned);
         for note in caution.into_iter().chain(now.settings.unknowns()) {

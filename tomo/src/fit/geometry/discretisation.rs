@@ -7,6 +7,7 @@ use super::problem::{Estimate, GeometryProblem};
 use super::quadratic_form::in_own_units;
 use super::{Free, Geometry};
 use crate::Error;
+use crate::fit::linear::Weighted;
 use kerrlight_common::simd::Float;
 use nalgebra::{DMatrix, DVector};
 
@@ -65,6 +66,30 @@ pub struct ModelErrors {
 const BY_CHANCE: f64 = 2.0;
 
 impl<T: Float + Default> GeometryProblem<'_, T> {
+    /// Returns what χ²/2 becomes lower by, at least, if images change as those of the same volume do through another model: the
+    /// residuals r and that change d, in units of errors, leave (r·d)²/(2 d·d) less.
+    ///
+    /// # Errors
+    /// If a number is out of its range.
+    pub fn gain(&self, at: &Estimate, other: &Self) -> Result<f64, Error> {
+        let images = |problem: &Self| problem.images(at.geometry, (&self.voxels(), &at.x));
+        let (here, there) = (images(self)?, images(other)?);
+        let pixels = here.len() / self.frames.len().max(1);
+        let (mut along, mut square) = (0.0, 0.0);
+        for Weighted { term, .. } in self.terms {
+            let both = here.chunks_exact(pixels).zip(there.chunks_exact(pixels));
+            for (frame, (here, there)) in self.frames.iter().zip(both) {
+                let [here, there] = [here, there].map(|image| term.residuals(*frame, image));
+                for (r, other) in here.iter().zip(&there) {
+                    let d = other.value - r.value;
+                    along -= r.value * d;
+                    square += d * d;
+                }
+            }
+        }
+        Ok(if along > 0.0 { 0.5 * self.scale * along * along / square } else { 0.0 })
+    }
+
     /// The best volume of a geometry.
     ///
     /// # Errors

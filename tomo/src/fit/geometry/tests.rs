@@ -164,6 +164,39 @@ fn of_hot_spot<'a>(
     }
 }
 
+/// Images of a volume through pixels that are means leave residuals through single rays that point all the way to the means.
+#[test]
+fn exact_residuals_point_to_the_model_that_made_the_data() {
+    let (model, side) = (screen(20, 12), 20);
+    let means = GeometryModel { parts: Some((1.0, 2)), ..model.clone() };
+    let geometry = Geometry::new(0.6, 1.05);
+    let effort = Effort { nodes: 12, degree: Degree::Linear, patience: StopRule::looking(30) };
+    let volume: Vec<f64> = (0..12usize.pow(3)).map(|k| (0.37 * k as f64).sin().powi(2)).collect();
+    let none: [Weighted<'_, f32>; 0] = [];
+    let maker = GeometryProblem { effort, ..of_hot_spot(&means, &[], &none) };
+    let data = maker.images(geometry, (&maker.voxels(), &volume)).unwrap();
+    let sigma = 1e-2 * f64::from(data.iter().fold(0.0f32, |most, x| most.max(*x)));
+    let term = ImageTerm::new(data, side * side, sigma).unwrap();
+    let terms = [Weighted { weight: 4800.0, term: &term as &dyn FrameTerm<f32> }];
+    let single = GeometryProblem { effort, ..of_hot_spot(&model, &[], &terms) };
+    let right = GeometryProblem { effort, ..of_hot_spot(&means, &[], &terms) };
+    let chi2 = |problem: &GeometryProblem<'_, f32>| {
+        let images = problem.images(geometry, (&problem.voxels(), &volume)).unwrap();
+        let of = |(frame, image): (usize, &[f32])| {
+            let residuals = term.residuals(frame, image);
+            residuals.iter().map(|r| r.value.powi(2)).sum::<f64>()
+        };
+        images.chunks_exact(side * side).enumerate().map(of).sum::<f64>()
+    };
+    let at = Estimate { geometry, x: volume.clone(), chi2: chi2(&single), value: 0.0 };
+    assert!(chi2(&right) < 1e-6 * at.chi2);
+    let gain = single.gain(&at, &right).unwrap();
+    assert!((gain / (0.5 * at.chi2) - 1.0).abs() < 1e-4, "{gain} {}", at.chi2);
+    // Nothing points away from the right model.
+    assert!(right.gain(&at, &single).unwrap() < 1e-4 * gain);
+    assert_eq!(single.gain(&at, &single).unwrap(), 0.0);
+}
+
 /// Steps lead from nearby to the best geometry, with images of other rays and noise of 1 %: the errors hold what is left.
 #[test]
 fn exact_steps_lead_to_the_best_geometry() {

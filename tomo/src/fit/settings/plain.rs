@@ -68,6 +68,7 @@ impl FitFile {
                 field_uas: None,
                 jy_per_pixel: 1.0,
                 ring_rays: None,
+                samples_per_pixel: None,
                 pulse: None,
             },
             region: Region { r_min, r_max, z_width: None, nodes },

@@ -78,6 +78,12 @@ pub struct Screen {
     #[schemars(example = 8)]
     #[schemars(range(min = 1, max = 1024), extend("unit" = "rays"))]
     pub ring_rays: Option<usize>,
+    /// Rays of each pixel on a regular grid, a square number, whose mean is its light; without it one, or as many as images
+    /// of another program ask for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 4)]
+    #[schemars(range(min = 1, max = 64), extend("unit" = "rays"))]
+    pub samples_per_pixel: Option<usize>,
     /// Pixel shape seen by visibilities; triangle for simulated data and delta for measured data without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(example = PixelShape::Delta)]

@@ -97,6 +97,10 @@ impl Instrument {
             None => PixelRays::single(&alpha, &beta),
             Some(ring) => PixelRays::new(ring, (&hole, &observer), [&alpha, &beta], &turned),
         };
+        let rays = match samples(file)? {
+            1 => rays,
+            side => rays.divided((spacing(&file.screen)?, side)),
+        };
         let mut lines = Sightlines::of_pixels((&hole, &observer), &rays, &turned, &request)
             .within("region and screen")?;
         if lines.rays() == 0 {
@@ -222,6 +226,26 @@ pub(super) fn ring(file: &FitFile) -> Result<Option<RingRays>> {
         refuse!("screen.ring_rays and polarization exclude each other");
     }
     Ok((count > 1).then_some(RingRays { count, spacing: spacing(&file.screen)?, shift: [0.0; 2] }))
+}
+
+/// Rays along each side of a pixel, whose mean is its light.
+///
+/// # Errors
+/// If their number is no square, or rays have no mean.
+pub(super) fn samples(file: &FitFile) -> Result<usize> {
+    let count = file.screen.samples_per_pixel.unwrap_or(1);
+    let side = count.isqrt();
+    if side * side != count {
+        let allowed = "a square number, 1 to 64";
+        return Err(FitError::range("screen.samples_per_pixel", count, allowed).into());
+    }
+    if count > 1 && file.effects.absorption.is_some() {
+        refuse!("screen.samples_per_pixel and effects.absorption exclude each other");
+    }
+    if count > 1 && file.polarization.is_some() {
+        refuse!("screen.samples_per_pixel and polarization exclude each other");
+    }
+    Ok(side)
 }
 
 /// κ(x) of the medium.

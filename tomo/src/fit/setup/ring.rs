@@ -94,6 +94,7 @@ mod tests {
             width_of,
             field_uas: None,
             ring_rays: None,
+            samples_per_pixel: None,
             jy_per_pixel: 1.0,
             pulse: Default::default(),
         }

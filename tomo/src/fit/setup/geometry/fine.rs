@@ -12,6 +12,7 @@ use crate::fit::geometry::{
 use crate::fit::linear::{StopRule, refined};
 use crate::fit::settings::SearchView;
 use crate::fit::setup::drawn::is_drawn_elsewhere;
+use crate::fit::setup::instrument::samples;
 use crate::fit::setup::{Result, spacing};
 
 impl Detail<'_> {
@@ -25,9 +26,7 @@ impl Detail<'_> {
         watch: &mut TrialWatch<'_>,
     ) -> Result<Option<Detailed>> {
         let errors = (self.scale)(reduced_chi2);
-        let SearchView { nodes, pixels, .. } = self.unknown.search.fine;
-        let at = Resolution { nodes, pixels, rays: 1, panels: 1 };
-        let place = self.place(at, errors)?;
+        let place = self.first(errors)?;
         let [has_steps, is_convex] = self.through(&place, |problem| {
             // Sums over samples of a smooth image become as fine as steps need them.
             let has_steps = is_stepped(&place.seen, problem)
@@ -43,7 +42,13 @@ impl Detail<'_> {
         })?;
         let Some(found) = found else { return Ok(None) };
         let sure = self.beside_its_own(&place, found)?;
-        Ok(Some(Detailed { sure, errors, resolution: at }))
+        Ok(Some(Detailed { sure, errors, resolution: place.at }))
+    }
+
+    /// Data at the resolution that refinements begin with.
+    pub fn first(&self, errors: f64) -> Result<Place> {
+        let SearchView { nodes, pixels, .. } = self.unknown.search.fine;
+        self.place(Resolution { nodes, pixels, rays: samples(self.file)?, panels: 1 }, errors)
     }
 
     /// Data at a resolution.

@@ -4,6 +4,7 @@ mod detail;
 mod discretisation;
 mod fine;
 mod posterior;
+mod rays_of_data;
 mod search;
 mod search_data;
 mod steps;
@@ -11,6 +12,7 @@ mod tangent;
 
 pub use detail::{RaySampling, Resolution, Trial};
 pub use posterior::GeometryPosterior;
+pub use rays_of_data::{rays_of_data, through};
 pub use search::{FoundGeometry, SearchWatch, find_geometry};
 
 use super::instrument::ring;

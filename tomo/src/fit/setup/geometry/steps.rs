@@ -1,10 +1,10 @@
 //! Steps from the ends of all searches to the best geometry, through voxels, pixels and sums along rays as fine as the data ask
 //! for.
 
-use super::detail::{Detail, Detailed, Resolution, Sure, Trial};
+use super::detail::{Detail, Detailed, RaySampling, Resolution, Sure, Trial};
 use super::posterior::{Resampled, polished, surely};
 use super::search_data::SearchData;
-use crate::fit::geometry::{Free, Geometry, GeometryProblem, Polished, TrialWatch};
+use crate::fit::geometry::{Estimate, Free, Geometry, GeometryProblem, Polished, TrialWatch};
 use crate::fit::linear::Voxels;
 use crate::fit::settings::SearchView;
 use crate::fit::setup::{Result, spacing};
@@ -14,6 +14,8 @@ use kerrlight_vlbi::operator::Pulse;
 const FINER: f64 = 1.5;
 /// Rays along each side of a pixel, and panels, at most.
 const MOST: usize = 4;
+/// Rays along each side of a pixel, at most, in a geometry that is known: each of them makes every step of a fit longer.
+const MEANS: usize = 2;
 /// Ends nearer than this part of each parameter's scale are the same place.
 const ALIKE: f64 = 0.1;
 
@@ -31,7 +33,7 @@ pub(super) struct Place {
 enum Parts {
     /// Sums over rays: along them and over pixels.
     Sums,
-    /// Voxels, too.
+    /// Sums over rays, and voxels.
     All,
 }
 
@@ -114,7 +116,52 @@ impl Detail<'_> {
     /// Returns whether pixels may be means over several rays: those of images that another model has made.
     fn may_be_means(&self, place: &Place) -> Result<bool> {
         let is_plain = self.file.polarization.is_none();
-        Ok(place.seen.is_images() && is_plain && self.is_foreign()?)
+        Ok(place.seen.is_images() && is_plain && !self.are_rays_known() && self.is_foreign()?)
+    }
+
+    /// Returns whether settings say how many rays a pixel has.
+    fn are_rays_known(&self) -> bool {
+        self.file.screen.samples_per_pixel.is_some()
+    }
+
+    /// Returns the rays that data of another program ask for in a geometry that is known, through the pixels of the settings. Data
+    /// have to be convex: volumes are compared.
+    pub fn rays_of_data(&self, geometry: Geometry) -> Result<RaySampling> {
+        let place = self.first(1.0)?;
+        if !self.through(&place, |problem| Ok(problem.is_convex()))? {
+            return Ok(RaySampling::default());
+        }
+        let mut here = (self.solved(&place, geometry)?, place);
+        while let Some(there) = self.asked_for(&here)? {
+            here = there;
+        }
+        Ok(here.1.at.sampling())
+    }
+
+    fn solved(&self, place: &Place, geometry: Geometry) -> Result<Estimate> {
+        self.through(place, |problem| problem.solve(geometry))
+    }
+
+    /// The sums over rays, finer in one respect, that explain most, with their volume; none if that is not more than chance does.
+    /// Only those towards whose images residuals point are tried.
+    fn asked_for(&self, (here, place): &(Estimate, Place)) -> Result<Option<(Estimate, Place)>> {
+        let chance = self.through(place, |problem| Ok((0.5 * problem.data()).sqrt()))?;
+        let mut best: Option<(Estimate, Place)> = None;
+        let finer = self.finer_sums(place, place.at.rays < MEANS).into_iter();
+        for at in finer.filter(|at| at.pixels == place.at.pixels) {
+            let there = self.place(at, place.errors)?;
+            let towards = self.through(place, |problem| {
+                self.through(&there, |finer| problem.gain(here, finer))
+            })?;
+            if towards < chance {
+                continue;
+            }
+            let estimate = self.solved(&there, here.geometry)?;
+            if estimate.value < best.as_ref().map_or(here.value - chance, |(best, _)| best.value) {
+                best = Some((estimate, there));
+            }
+        }
+        Ok(best)
     }
 
     /// Steps from each geometry, from those that are alike once, without the pixels near the critical curve of a geometry or of
@@ -188,9 +235,11 @@ impl Detail<'_> {
             Ok((here.value, chance, voxels.filter(|_| asks && parts == Parts::All)))
         })?;
         let mut most: Option<(f64, Place)> = None;
-        for at in self.finer_sums(place).into_iter().chain(voxels) {
+        // Whether pixels are means at all was decided where steps began: either model has minima of its own.
+        for at in self.finer_sums(place, place.at.rays > 1).into_iter().chain(voxels) {
             let there = self.place(at, place.errors)?;
             let gain = value - self.smoothly(&there, geometry, |p| Ok(p.solve(geometry)?.value))?;
+            eprintln!("{:?} gain {gain}", there.at);
             if gain > most.as_ref().map_or(chance, |(most, _)| *most) {
                 most = Some((gain, there));
             }
@@ -199,11 +248,10 @@ impl Detail<'_> {
     }
 
     /// Resolutions with finer sums over rays, along them and over pixels.
-    fn finer_sums(&self, place: &Place) -> Vec<Resolution> {
+    fn finer_sums(&self, place: &Place, may_be_means: bool) -> Vec<Resolution> {
         let Place { at, seen, .. } = place;
         let mut all = Vec::new();
-        // Whether pixels are means at all was decided where steps began: either model has minima of its own.
-        if seen.is_images() && at.rays > 1 && at.rays < MOST {
+        if seen.is_images() && !self.are_rays_known() && may_be_means && at.rays < MOST {
             all.push(Resolution { rays: 2 * at.rays, ..*at });
         }
         if !seen.is_images() && self.measured.pulse == Pulse::Delta {
