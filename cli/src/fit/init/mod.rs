@@ -415,7 +415,7 @@ fn of_movie(images: &Images, path: &str) -> anyhow::Result<String> {
         ("pixels", grid.width.to_string()),
         ("frames", frames.to_string()),
         ("jy", digits(jy)),
-        ("upper", digits((peak / jy).max(3.0))),
+        ("upper", digits(10.0 * (peak / jy).max(1.0))),
         ("flux", digits(flux)),
         ("peak", digits(peak)),
         ("span", span),

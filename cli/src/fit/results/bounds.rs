@@ -3,6 +3,7 @@
 use super::{Estimate, Quiescent};
 use kerrlight_render::volume::Volume;
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
+use kerrlight_tomo::recovery::short;
 use kerrlight_tomo::representation::Activation;
 use serde::Serialize;
 
@@ -22,6 +23,10 @@ const THICK: f64 = 0.2;
 const BRIGHT: f64 = 0.5;
 /// Part of the light that is found there.
 const CUT: f64 = 0.02;
+
+/// Factors by which a ceiling and a region that were reached become larger in what is advised.
+const TENFOLD: f64 = 10.0;
+const WIDER: f64 = 1.5;
 
 /// A bound that was reached.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -124,11 +129,15 @@ impl Reached {
             "representation.activation" => {
                 "the largest that a sigmoid allows: take activation = \"softplus\", or a larger screen.jy_per_pixel"
             }
-            "linear.upper" | "quiescent.upper" => "the largest that is allowed: raise it",
+            "linear.upper" | "quiescent.upper" => {
+                &format!("the largest that is allowed: raise it to {}", short(TENFOLD * value))
+            }
             _ => {
+                let further = if *key == "region.r_min" { value / WIDER } else { value * WIDER };
                 return format!(
                     "{percent:.0} % of the light lies at the edge of the region, {key} = {value}, and is as bright there as \
-                     elsewhere: emission beyond it is missing from the model."
+                     elsewhere: emission beyond it is missing from the model. Take {}.",
+                    short(further)
                 );
             }
         };

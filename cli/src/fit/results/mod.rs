@@ -1,5 +1,6 @@
 //! Results of a run: the volume, the movie, numbers, pictures and the report.
 
+mod advice;
 mod bounds;
 pub mod gains;
 pub mod leakage;

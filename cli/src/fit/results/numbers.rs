@@ -4,7 +4,7 @@ use super::bounds::Reached;
 use super::gains::Gains;
 use super::leakage::Leakage;
 use super::quiescent::Quiescent;
-use super::{Estimate, Found, quadrature, verdict};
+use super::{Estimate, Found, verdict};
 use crate::checksum::Sealed;
 use crate::fit::inputs::InputFile;
 use crate::fit::{band_search, closures, geometry_search, held_out, linear};
@@ -73,6 +73,10 @@ pub struct Results {
     quiescent: Option<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     mask_error: Option<f64>,
+    rays_per_pixel: usize,
+    /// Settings to raise, in sentences.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub advice: Vec<String>,
     /// Error of sums along rays, over the errors of the data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadrature_error: Option<f64>,
@@ -161,6 +165,7 @@ impl Estimate<'_> {
         let now = &found.state.now;
         let geometry = geometry_search::found(self.folder)?;
         let band = band_search::found(self.folder)?;
+        let log = self.folder.lines()?;
         // Samples that were not fitted have one χ²: with the errors that a flare's past leaves of them.
         let is_told = band.as_ref().is_some_and(|of| of.validation_chi2_per_datum.is_some());
         let validation = if is_told { None } else { self.validation(&found.seen)? };
@@ -184,8 +189,10 @@ impl Estimate<'_> {
             leakage: found.leakage.as_ref().map(Leakage::json),
             quiescent: found.quiescent.as_ref().map(Quiescent::json),
             mask_error: found.mask,
+            rays_per_pixel: self.file.screen.samples_per_pixel.unwrap_or(1),
             quadrature_error: found.quadrature,
-            linear: linear::outcome(self.file, &self.folder.lines()?),
+            advice: self.advice(found, &log),
+            linear: linear::outcome(self.file, &log),
             held_out: held_out::found(self.folder)?,
             closures: closures::json(self.measured, &self.file.loss),
             of_searches: errors.chain(numbers).collect(),
@@ -222,10 +229,9 @@ impl Estimate<'_> {
     }
 }
 
-/// The verdict, what is wrong with sums along rays, bounds that were reached and, beside a truth, PSNR with that of an empty volume.
+/// The verdict, settings to raise, bounds that were reached and, beside a truth, PSNR with that of an empty volume.
 pub fn last_line(headline: &str, results: &Results) -> String {
-    let said = results.quadrature_error.and_then(quadrature::sentence);
-    let said = said.into_iter().chain(results.bounds.iter().map(Reached::sentence));
+    let said = results.advice.iter().cloned().chain(results.bounds.iter().map(Reached::sentence));
     let headline = std::iter::once(headline.to_owned()).chain(said).collect::<Vec<_>>().join(" ");
     match results.closeness {
         Some(Closeness { psnr_db: Some(psnr), nrmse: Some(nrmse), .. }) => {

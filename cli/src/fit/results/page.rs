@@ -8,7 +8,7 @@ use super::numbers::{Results, outcomes};
 use super::over_time::Changes;
 use super::quiescent::Quiescent;
 use super::verdict;
-use super::{Estimate, Found, quadrature};
+use super::{Estimate, Found};
 use crate::fit::SETTINGS;
 use crate::fit::curves::{loss_plot, psnr_plot};
 use crate::fit::folder::Folder;
@@ -194,7 +194,7 @@ impl Estimate<'_> {
         lines.extend(results.geometry.iter().flat_map(|of| of.sentences()));
         lines.extend(results.band.iter().flat_map(|of| of.sentences()));
         lines.extend(results.held_out.as_ref().and_then(|of| of.sentence()));
-        lines.extend(results.quadrature_error.and_then(quadrature::sentence));
+        lines.extend(results.advice.iter().cloned());
         lines.extend(results.bounds.iter().map(Reached::sentence));
         lines.extend(
             results

@@ -2,7 +2,7 @@
 
 use super::Estimate;
 use kerrlight_tomo::fit::setup::Imaged;
-use kerrlight_tomo::fit::{State, Trainer};
+use kerrlight_tomo::fit::{Sampling, State, Trainer};
 
 /// Frames that are looked at.
 const FRAMES: usize = 4;
@@ -32,11 +32,14 @@ impl Estimate<'_> {
     }
 }
 
-/// A sentence where they count.
-pub fn sentence(off: f64) -> Option<String> {
+/// A sentence where they count: sums over rays that are cut into so many panels.
+pub fn sentence(off: f64, nodes: Sampling) -> Option<String> {
+    let Sampling::Gauss { order, split } = nodes else { return None };
     (off > LIMIT).then(|| {
         format!(
-            "Sums along rays are off by {off:.1} of the errors of the data: region.nodes needs a higher order or split."
+            "Sums along rays are off by {off:.1} of the errors of the data: take region.nodes = {{ gauss = {{ order = {order}, \
+             split = {} }} }}.",
+            2 * split
         )
     })
 }
@@ -47,8 +50,9 @@ mod tests {
 
     #[test]
     fn exact_only_what_counts_is_said() {
-        assert_eq!(sentence(0.29), None);
-        let said = sentence(1.44).unwrap();
-        assert!(said.contains("1.4 of the errors") && said.contains("region.nodes"), "{said}");
+        let nodes = Sampling::Gauss { order: 12, split: 2 };
+        assert_eq!(sentence(0.29, nodes), None);
+        let said = sentence(1.44, nodes).unwrap();
+        assert!(said.contains("1.4 of the errors") && said.contains("split = 4"), "{said}");
     }
 }

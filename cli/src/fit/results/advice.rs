@@ -1,0 +1,106 @@
+//! Settings to raise where a fit does not explain its data, or where its sums are too coarse for them, and by how much.
+
+use super::{Estimate, Found, quadrature};
+use kerrlight_tomo::fit::settings::{FitFile, Kind};
+use kerrlight_tomo::fit::setup::spacing;
+use kerrlight_tomo::fit::verdict::Outcome;
+use serde_json::Value;
+
+/// Decrease of the mean loss from a third of the steps to the next one from which on more steps would help.
+const FALLING: f64 = 0.03;
+/// Standard deviations of the difference of two means that count as chance.
+const BY_CHANCE: f64 = 2.0;
+/// Lines of the log in a third, at least.
+const LINES: usize = 3;
+
+impl Estimate<'_> {
+    /// Returns what to raise, in sentences.
+    pub(super) fn advice(&self, found: &Found<'_>, log: &[Value]) -> Vec<String> {
+        let nodes = self.file.region.nodes;
+        let sums = found.quadrature.and_then(|off| quadrature::sentence(off, nodes));
+        if found.judged.verdict.outcome != Outcome::Unexplained {
+            return sums.into_iter().collect();
+        }
+        let losses: Vec<f64> = log.iter().filter_map(|line| line["loss"].as_f64()).collect();
+        sums.into_iter().chain(voxels(self.file)).chain(steps(self.file, &losses)).collect()
+    }
+}
+
+/// Voxels that are wider than half a pixel.
+fn voxels(file: &FitFile) -> Option<String> {
+    let representation = &file.representation;
+    let (key, nodes) = match representation.kind {
+        Kind::LinearGrid => ("linear-grid", representation.linear_grid.nodes),
+        Kind::Grid => ("grid", representation.grid.nodes),
+        _ => return None,
+    };
+    let (pixel, width) = (spacing(&file.screen).ok()?, 2.0 * file.region.r_max);
+    let enough = (width / (0.5 * pixel)).ceil() as usize + 1;
+    (nodes < enough).then(|| {
+        let wide = width / (nodes - 1) as f64 / pixel;
+        format!(
+            "Voxels are {wide:.2} pixels wide: representation.{key}.nodes = {enough} makes them half a pixel."
+        )
+    })
+}
+
+/// A loss that still falls, by more than it scatters from batch to batch.
+fn steps(file: &FitFile, losses: &[f64]) -> Option<String> {
+    let third = losses.len() / 3;
+    if third < LINES {
+        return None;
+    }
+    let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
+    let variance = |all: &[f64]| {
+        let about = mean(all);
+        all.iter().map(|x| (x - about).powi(2)).sum::<f64>() / ((third - 1) * third) as f64
+    };
+    let (before, last) = losses[losses.len() - 2 * third..].split_at(third);
+    let chance = BY_CHANCE * (variance(before) + variance(last)).sqrt();
+    let fall = 1.0 - mean(last) / mean(before);
+    (fall > FALLING && mean(before) - mean(last) > chance).then(|| {
+        format!(
+            "The loss fell by {:.0} % over the last third of the steps: training.steps = {} takes it further.",
+            100.0 * fall,
+            2 * file.training.steps
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::{BUILT_IN, assigned};
+
+    fn file(changes: &[&str]) -> FitFile {
+        let change = |text: String, change: &&str| assigned(&text, change).unwrap();
+        FitFile::parse(&changes.iter().fold(BUILT_IN.to_owned(), change)).unwrap()
+    }
+
+    #[test]
+    fn exact_wide_voxels_are_named_with_their_number() {
+        let of = |nodes: &str| {
+            voxels(&file(&[
+                "representation=linear-grid",
+                nodes,
+                "screen.pixels=32",
+                "screen.width=26",
+                "region.r_max=13",
+            ]))
+        };
+        let said = of("representation.linear-grid.nodes=33").unwrap();
+        assert!(said.contains("1.00 pixels wide") && said.contains("nodes = 65 "), "{said}");
+        assert_eq!(of("representation.linear-grid.nodes=65"), None);
+    }
+
+    #[test]
+    fn exact_a_loss_that_falls_is_named() {
+        let file = file(&["training.steps=400"]);
+        let falling: Vec<f64> = (0..12).map(|k| 2.0 - 0.05 * f64::from(k)).collect();
+        let said = steps(&file, &falling).unwrap();
+        // From the mean of 1.725 to that of 1.525.
+        assert!(said.contains("by 12 %") && said.contains("training.steps = 800"), "{said}");
+        assert_eq!(steps(&file, &[1.0, 1.1, 0.9].repeat(4)), None);
+        assert_eq!(steps(&file, &falling[..8]), None);
+    }
+}
