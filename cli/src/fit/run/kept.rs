@@ -37,6 +37,13 @@ fn kept(error: anyhow::Error) -> Error {
     Error::Kept(error.into())
 }
 
+/// Says what there is more of than one.
+fn asked_for(RaySampling { per_side, panels, .. }: RaySampling) -> String {
+    let rays = (per_side > 1).then(|| format!("{} rays per pixel", per_side * per_side));
+    let panels = (panels > 1).then(|| format!("{panels} times the panels of region.nodes"));
+    rays.into_iter().chain(panels).collect::<Vec<_>>().join(" and ")
+}
+
 /// Names what goes on.
 fn name(at: At<'_>) -> &'static str {
     match at {
@@ -293,11 +300,7 @@ impl Progress for Kept<'_> {
             eprintln!("{used}");
         }
         if let Some(rays) = self.problem.rays {
-            let RaySampling { per_side, panels, .. } = rays;
-            eprintln!(
-                "note: the data ask for {} rays per pixel and {panels} times the panels of region.nodes",
-                per_side * per_side
-            );
+            eprintln!("note: the data ask for {}", asked_for(rays));
         }
         let caution = setup::caution(now.settings).map(str::to_owned);
         for note in caution.into_iter().chain(now.settings.unknowns()) {
