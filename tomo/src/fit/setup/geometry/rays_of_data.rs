@@ -2,7 +2,9 @@
 
 use super::detail::{Detail, RaySampling};
 use super::known_geometry;
+use super::steps::Place;
 use crate::fit::Sampling;
+use crate::fit::geometry::{Estimate, Geometry};
 use crate::fit::journal::{Forgetful, Memory};
 use crate::fit::settings::{
     AxisSearch, DataFiles, FitFile, GeometrySearch, LossKind, SearchView, UnknownGeometry,
@@ -14,6 +16,8 @@ const NODES: usize = 24;
 const ITERATIONS: usize = 30;
 /// Pixels of all frames that are compared, about.
 const PIXELS: usize = 20_000;
+/// Rays along each side of a pixel, at most, in a geometry that is known: each of them makes every step of a fit longer.
+const MEANS: usize = 2;
 
 /// Returns the rays of a pixel and the panels of a ray that images of another program ask for, or the panels that visibilities
 /// do: more than one where they explain the data better by more than chance. None where settings say how many rays a pixel has,
@@ -37,7 +41,7 @@ pub fn rays_of_data(file: &FitFile, measured: &FitData) -> Result<Option<RaySamp
         memory: Memory::new(&Forgetful),
         scale: &|_| 1.0,
     };
-    detail.rays_of_data(known_geometry(file)).map(Some)
+    detail.rays_asked_for(known_geometry(file)).map(Some)
 }
 
 /// Returns whether images or visibilities are all that is compared, and nobody has said how many rays a pixel has.
@@ -57,6 +61,48 @@ fn is_open(file: &FitFile) -> Result<bool> {
     };
     let is_linear = file.linear.is_some() && matches!(file.region.nodes, Sampling::Gauss { .. });
     Ok(file.screen.samples_per_pixel.is_none() && is_plain && is_known && is_measured && is_linear)
+}
+
+impl Detail<'_> {
+    /// Returns the rays that data of another program ask for in a geometry that is known, through the pixels of the settings. Data
+    /// have to be convex: volumes are compared.
+    fn rays_asked_for(&self, geometry: Geometry) -> Result<RaySampling> {
+        let place = self.first(1.0)?;
+        if !self.through(&place, |problem| Ok(problem.is_convex()))? {
+            return Ok(RaySampling::default());
+        }
+        let mut here = (self.solved(&place, geometry)?, place);
+        while let Some(there) = self.asked_for(&here)? {
+            here = there;
+        }
+        Ok(here.1.at.sampling())
+    }
+
+    fn solved(&self, place: &Place, geometry: Geometry) -> Result<Estimate> {
+        self.through(place, |problem| problem.solve(geometry))
+    }
+
+    /// The sums over rays, finer in one respect, that explain most, with their volume; none if that is not more than chance does.
+    /// Only those towards whose images residuals point are tried.
+    fn asked_for(&self, (here, place): &(Estimate, Place)) -> Result<Option<(Estimate, Place)>> {
+        let chance = self.through(place, |problem| Ok((0.5 * problem.data()).sqrt()))?;
+        let mut best: Option<(Estimate, Place)> = None;
+        let finer = self.finer_sums(place, place.at.rays < MEANS).into_iter();
+        for at in finer.filter(|at| at.pixels == place.at.pixels) {
+            let there = self.place(at, place.errors)?;
+            let towards = self.through(place, |problem| {
+                self.through(&there, |finer| problem.gain(here, finer))
+            })?;
+            if towards < chance {
+                continue;
+            }
+            let estimate = self.solved(&there, here.geometry)?;
+            if estimate.value < best.as_ref().map_or(here.value - chance, |(best, _)| best.value) {
+                best = Some((estimate, there));
+            }
+        }
+        Ok(best)
+    }
 }
 
 /// The settings with these rays.

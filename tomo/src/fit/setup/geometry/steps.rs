@@ -1,10 +1,10 @@
 //! Steps from the ends of all searches to the best geometry, through voxels, pixels and sums along rays as fine as the data ask
 //! for.
 
-use super::detail::{Detail, Detailed, RaySampling, Resolution, Sure, Trial};
+use super::detail::{Detail, Detailed, Resolution, Sure, Trial};
 use super::posterior::{Resampled, polished, surely};
 use super::search_data::SearchData;
-use crate::fit::geometry::{Estimate, Free, Geometry, GeometryProblem, Polished, TrialWatch};
+use crate::fit::geometry::{Free, Geometry, GeometryProblem, Polished, TrialWatch};
 use crate::fit::linear::Voxels;
 use crate::fit::settings::SearchView;
 use crate::fit::setup::{Result, spacing};
@@ -14,8 +14,6 @@ use kerrlight_vlbi::operator::Pulse;
 const FINER: f64 = 1.5;
 /// Rays along each side of a pixel, and panels, at most.
 const MOST: usize = 4;
-/// Rays along each side of a pixel, at most, in a geometry that is known: each of them makes every step of a fit longer.
-const MEANS: usize = 2;
 /// Ends nearer than this part of each parameter's scale are the same place.
 const ALIKE: f64 = 0.1;
 
@@ -124,46 +122,6 @@ impl Detail<'_> {
         self.file.screen.samples_per_pixel.is_some()
     }
 
-    /// Returns the rays that data of another program ask for in a geometry that is known, through the pixels of the settings. Data
-    /// have to be convex: volumes are compared.
-    pub fn rays_of_data(&self, geometry: Geometry) -> Result<RaySampling> {
-        let place = self.first(1.0)?;
-        if !self.through(&place, |problem| Ok(problem.is_convex()))? {
-            return Ok(RaySampling::default());
-        }
-        let mut here = (self.solved(&place, geometry)?, place);
-        while let Some(there) = self.asked_for(&here)? {
-            here = there;
-        }
-        Ok(here.1.at.sampling())
-    }
-
-    fn solved(&self, place: &Place, geometry: Geometry) -> Result<Estimate> {
-        self.through(place, |problem| problem.solve(geometry))
-    }
-
-    /// The sums over rays, finer in one respect, that explain most, with their volume; none if that is not more than chance does.
-    /// Only those towards whose images residuals point are tried.
-    fn asked_for(&self, (here, place): &(Estimate, Place)) -> Result<Option<(Estimate, Place)>> {
-        let chance = self.through(place, |problem| Ok((0.5 * problem.data()).sqrt()))?;
-        let mut best: Option<(Estimate, Place)> = None;
-        let finer = self.finer_sums(place, place.at.rays < MEANS).into_iter();
-        for at in finer.filter(|at| at.pixels == place.at.pixels) {
-            let there = self.place(at, place.errors)?;
-            let towards = self.through(place, |problem| {
-                self.through(&there, |finer| problem.gain(here, finer))
-            })?;
-            if towards < chance {
-                continue;
-            }
-            let estimate = self.solved(&there, here.geometry)?;
-            if estimate.value < best.as_ref().map_or(here.value - chance, |(best, _)| best.value) {
-                best = Some((estimate, there));
-            }
-        }
-        Ok(best)
-    }
-
     /// Steps from each geometry, from those that are alike once, without the pixels near the critical curve of a geometry or of
     /// each; none if it was cancelled.
     fn each(
@@ -248,7 +206,7 @@ impl Detail<'_> {
     }
 
     /// Resolutions with finer sums over rays, along them and over pixels.
-    fn finer_sums(&self, place: &Place, may_be_means: bool) -> Vec<Resolution> {
+    pub fn finer_sums(&self, place: &Place, may_be_means: bool) -> Vec<Resolution> {
         let Place { at, seen, .. } = place;
         let mut all = Vec::new();
         if seen.is_images() && !self.are_rays_known() && may_be_means && at.rays < MOST {
