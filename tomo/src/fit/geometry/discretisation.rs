@@ -72,22 +72,27 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     /// # Errors
     /// If a number is out of its range.
     pub fn gain(&self, at: &Estimate, other: &Self) -> Result<f64, Error> {
-        let images = |problem: &Self| problem.images(at.geometry, (&self.voxels(), &at.x));
-        let (here, there) = (images(self)?, images(other)?);
-        let pixels = here.len() / self.frames.len().max(1);
+        let residuals = |problem: &Self| -> Result<Vec<f64>, Error> {
+            let images = problem.images(at.geometry, (&self.voxels(), &at.x))?;
+            Ok(problem.residuals(&images))
+        };
         let (mut along, mut square) = (0.0, 0.0);
-        for Weighted { term, .. } in self.terms {
-            let both = here.chunks_exact(pixels).zip(there.chunks_exact(pixels));
-            for (frame, (here, there)) in self.frames.iter().zip(both) {
-                let [here, there] = [here, there].map(|image| term.residuals(*frame, image));
-                for (r, other) in here.iter().zip(&there) {
-                    let d = other.value - r.value;
-                    along -= r.value * d;
-                    square += d * d;
-                }
-            }
+        for (r, other) in residuals(self)?.into_iter().zip(residuals(other)?) {
+            let d = other - r;
+            along -= r * d;
+            square += d * d;
         }
         Ok(if along > 0.0 { 0.5 * self.scale * along * along / square } else { 0.0 })
+    }
+
+    /// Residuals of images, frame after frame, in units of errors.
+    fn residuals(&self, images: &[T]) -> Vec<f64> {
+        let pixels = images.len() / self.frames.len().max(1);
+        let frames = || self.frames.iter().zip(images.chunks_exact(pixels));
+        let of = |Weighted { term, .. }: &Weighted<'_, T>| {
+            frames().flat_map(|(frame, image)| term.residuals(*frame, image)).collect::<Vec<_>>()
+        };
+        self.terms.iter().flat_map(of).map(|residual| residual.value).collect()
     }
 
     /// The best volume of a geometry.
@@ -119,6 +124,7 @@ impl Standing {
         kind: Refinement,
         finer: &GeometryProblem<'_, T>,
     ) -> Result<Option<Refined>, Error> {
+        // As far from the end as the other volume: slopes that are left over from there cancel.
         let there = finer.solve(self.best.geometry)?;
         let bowl = finer.bowl(&there, Polish::default().following)?;
         let left_by =

@@ -5,13 +5,13 @@ use super::gauss_newton::Polished;
 use super::problem::GeometryProblem;
 use super::quadratic_form::{Envelope, Evaluations, diagonals, ends, fitted};
 use crate::Error;
+use crate::fit::linear::{Voxels, refined};
 use kerrlight_common::simd::Float;
 
 /// Neighbours of a geometry.
 pub struct Surroundings<'a> {
     polished: &'a Polished,
-    /// Voxels of the volume, along each axis.
-    nodes: usize,
+    voxels: Voxels,
     reach: Reach,
     seen: Vec<Evaluations>,
 }
@@ -25,14 +25,15 @@ impl Surroundings<'_> {
         &mut self,
         other: &GeometryProblem<'_, T>,
     ) -> Result<(), Error> {
-        let n = self.reach.columns.ncols();
-        // The volume's response is that of the same voxels.
-        let same = other.effort.nodes == self.nodes;
-        let responses = if same { self.polished.responses.as_slice() } else { &[] };
-        let start = other.solve(self.polished.best.geometry)?;
-        let mut there = Evaluations::default();
+        let Self { polished, reach, voxels, .. } = self;
+        let to = other.voxels();
+        let on_others = |response: &Vec<f64>| refined(voxels, response, &to);
+        let responses: Result<Vec<_>, Error> = polished.responses.iter().map(on_others).collect();
+        let start = other.solve(polished.best.geometry)?;
+        let n = reach.columns.ncols();
         let places = [ends(n), diagonals(n)].concat();
-        other.look_at(&start, responses, (&self.reach.columns, places), &mut there)?;
+        let mut there = Evaluations::default();
+        other.look_at(&start, &responses?, (&reach.columns, places), &mut there)?;
         self.seen.push(there);
         Ok(())
     }
@@ -65,6 +66,6 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         let mut seen = reach.seen();
         let places = (&reach.columns, diagonals(self.free.len()));
         self.look_at(&polished.best, &polished.responses, places, &mut seen)?;
-        Ok(Some(Surroundings { polished, nodes: self.effort.nodes, reach, seen: vec![seen] }))
+        Ok(Some(Surroundings { polished, voxels: self.voxels(), reach, seen: vec![seen] }))
     }
 }

@@ -10,6 +10,9 @@ use kerrlight_render::points::Coordinates;
 /// # Errors
 /// If a grid has no nodes.
 pub fn refined(from: &Voxels, x: &[f64], to: &Voxels) -> Result<Vec<f64>, Error> {
+    if from == to {
+        return Ok(x.to_vec());
+    }
     let nodes: Vec<[f64; 3]> = (0..to.count()).map(|k| to.position(k)).collect();
     let column = |c: usize| {
         // Nodes of the edge lie beyond the field.

@@ -1,8 +1,9 @@
 //! Parts that searches hand on to one another.
 
+use super::search_data::SearchData;
 use crate::fit::geometry::{Geometry, Spread};
 use crate::fit::journal::Memory;
-use crate::fit::settings::{FitFile, UnknownGeometry};
+use crate::fit::settings::{FitFile, SearchView, UnknownGeometry};
 use crate::fit::setup::FitData;
 
 /// Resolution at which geometries are compared.
@@ -40,6 +41,15 @@ impl Resolution {
     pub fn sampling(self) -> RaySampling {
         RaySampling { per_side: self.rays, panels: self.panels, lattice: 0 }
     }
+}
+
+/// Data at a resolution.
+pub(super) struct Place {
+    pub seen: SearchData,
+    pub at: Resolution,
+    pub view: SearchView,
+    /// Factor of χ².
+    pub errors: f64,
 }
 
 /// End of one search, in [`Geometry`]'s units.

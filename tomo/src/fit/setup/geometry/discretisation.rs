@@ -1,7 +1,8 @@
 //! Errors of a geometry that the model of the fit makes: its voxels, its pixels, and its sums along rays.
 
+use super::detail::Place;
+use super::finer::finer;
 use super::search_data::SearchData;
-use super::steps::{Place, finer};
 use crate::fit::geometry::{
     Effort, GeometryModel, GeometryProblem, ModelErrors, Refined, Refinement, Spread, Standing,
 };

@@ -1,10 +1,9 @@
 //! Detailed search, from the ends of the coarse searches to the best geometry and its errors.
 
-use super::detail::{Detail, Detailed, Resolution, Sure, Trial};
+use super::detail::{Detail, Detailed, Place, Resolution, Sure, Trial};
 use super::discretisation;
 use super::posterior::{polished, surely};
 use super::search_data::SearchData;
-use super::steps::Place;
 use super::tangent::Anchor;
 use crate::fit::geometry::{
     Effort, Exploration, Explored, Geometry, GeometryModel, GeometryProblem, Spread, TrialWatch,

@@ -3,6 +3,7 @@
 mod detail;
 mod discretisation;
 mod fine;
+mod finer;
 mod posterior;
 mod rays_of_data;
 mod search;

@@ -2,9 +2,8 @@
 
 use super::detail::{Detail, RaySampling};
 use super::known_geometry;
-use super::steps::Place;
 use crate::fit::Sampling;
-use crate::fit::geometry::{Estimate, Geometry};
+use crate::fit::geometry::Geometry;
 use crate::fit::journal::{Forgetful, Memory};
 use crate::fit::settings::{
     AxisSearch, DataFiles, FitFile, GeometrySearch, LossKind, SearchView, UnknownGeometry,
@@ -71,37 +70,19 @@ impl Detail<'_> {
         if !self.through(&place, |problem| Ok(problem.is_convex()))? {
             return Ok(RaySampling::default());
         }
-        let mut here = (self.solved(&place, geometry)?, place);
-        while let Some(there) = self.asked_for(&here)? {
+        let mut here = self.solved(place, geometry)?;
+        loop {
+            let at = here.place.at;
+            let sums = self.finer_sums(&here.place, at.rays < MEANS).into_iter();
+            let mut among = Vec::new();
+            for finer in sums.filter(|finer| finer.pixels == at.pixels) {
+                if self.is_pointed_to(&here, finer)? {
+                    among.push(finer);
+                }
+            }
+            let Some(there) = self.asked_for(&here, among)? else { return Ok(at.sampling()) };
             here = there;
         }
-        Ok(here.1.at.sampling())
-    }
-
-    fn solved(&self, place: &Place, geometry: Geometry) -> Result<Estimate> {
-        self.through(place, |problem| problem.solve(geometry))
-    }
-
-    /// The sums over rays, finer in one respect, that explain most, with their volume; none if that is not more than chance does.
-    /// Only those towards whose images residuals point are tried.
-    fn asked_for(&self, (here, place): &(Estimate, Place)) -> Result<Option<(Estimate, Place)>> {
-        let chance = self.through(place, |problem| Ok((0.5 * problem.data()).sqrt()))?;
-        let mut best: Option<(Estimate, Place)> = None;
-        let finer = self.finer_sums(place, place.at.rays < MEANS).into_iter();
-        for at in finer.filter(|at| at.pixels == place.at.pixels) {
-            let there = self.place(at, place.errors)?;
-            let towards = self.through(place, |problem| {
-                self.through(&there, |finer| problem.gain(here, finer))
-            })?;
-            if towards < chance {
-                continue;
-            }
-            let estimate = self.solved(&there, here.geometry)?;
-            if estimate.value < best.as_ref().map_or(here.value - chance, |(best, _)| best.value) {
-                best = Some((estimate, there));
-            }
-        }
-        Ok(best)
     }
 }
 

@@ -141,7 +141,8 @@ impl SearchData {
 impl SearchData {
     /// Does something with data that change smoothly with the geometry. Single rays meet the narrow images near the critical
     /// curve or miss them: images of such rays are compared without the pixels that are nearer than `limit`, M, to the
-    /// critical curve of a geometry near by. Other data, and emission that changes, are compared as they are.
+    /// critical curve of a geometry near by. Other data, emission that changes, and a geometry that is known are compared as they
+    /// are.
     pub fn smoothly<R>(
         &self,
         problem: &GeometryProblem<'_, f32>,
@@ -149,7 +150,9 @@ impl SearchData {
         work: impl FnOnce(&GeometryProblem<'_, f32>) -> Result<R>,
     ) -> Result<R> {
         let CoarseView { file, measured, .. } = &self.view;
-        if problem.model.ring.is_some() || problem.change.is_any() || !self.is_images() {
+        let is_known = problem.free.is_empty();
+        if is_known || problem.model.ring.is_some() || problem.change.is_any() || !self.is_images()
+        {
             return work(problem);
         }
         let mut data = measured.terms(&file.loss, problem.model.x.len())?;
