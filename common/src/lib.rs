@@ -2,6 +2,9 @@
 //! arrays of NumPy ([`numpy`]), TOML that names lines ([`toml_file`]), elementary functions on SIMD lanes ([`simd`]),
 //! Stokes parameters ([`stokes`]) and [`units`].
 
+// A library tells its caller, not the terminal.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 // In the order of the flow of data: a module imports from those above it.
 pub mod memory;
 

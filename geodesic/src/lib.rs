@@ -145,6 +145,9 @@
 //! `rayon` (default): all cores. `affine`: an independent tracer in the affine parameter. `capi`:
 //! the functions of `include/kerrlight.h` for C. `wgpu`: `gpu`, which runs the shaders of [`wgsl`].
 
+// A library tells its caller, not the terminal.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 /// The examples of the README compile and run.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -55,6 +55,9 @@
 //! → [`survey()`] (all that is asked) → [`survey_polarized`] (Q and U beside it). Data terms, gains and penalties are those
 //! of [`kerrlight_tomo`], and so are errors.
 
+// A library tells its caller, not the terminal.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 // In the order of the flow of data: a module imports from those above it.
 pub mod settings;
 

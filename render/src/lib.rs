@@ -4,6 +4,9 @@
 //! [`picture`] → [`image`]. Volumes of emission are in [`volume`]. Nothing here knows a path or a terminal: codecs work on
 //! bytes.
 
+// A library tells its caller, not the terminal.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 // In the order of the flow of data: a module imports from those above it.
 pub mod image;
 

@@ -28,6 +28,9 @@
 //! visibilities ([`kerrlight_vlbi`]) → loss → gradient → [`optimise`]; [`mod@fit`] has the parts, [`recovery`] puts them
 //! together. Nothing here knows a path or a terminal: codecs work on bytes.
 
+// A library tells its caller, not the terminal.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 // In the order of the flow of data: a module imports from those above it.
 mod null;
 

@@ -7,6 +7,9 @@
 //! Units are those of the field: metres, Jy, hours of UTC, wavelengths, degrees where a name says
 //! so.
 
+// A library tells its caller, not the terminal.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 // In the order of the flow of data: a module imports from those above it.
 pub mod array;
 
