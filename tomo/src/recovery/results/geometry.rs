@@ -229,12 +229,13 @@ fn true_geometry(file: &FitFile, measured: &FitData) -> Result<Option<Geometry>,
     measured.truth.as_ref().map(|_| setup::true_geometry(file)).transpose()
 }
 
-/// Returns the errors of each free parameter by the model itself, part by part, in its unit.
+/// Returns the errors of each free parameter by the model itself, part by part, in its unit: at most what is known of it before
+/// the data.
 fn own(free: &[Free], spread: &Spread) -> BTreeMap<String, PerParameter<Option<f64>>> {
     let part = |error: &ModelError| {
         let moved = each(free, |k, parameter| {
             let variance = error.covariance.get(k * (free.len() + 1))?;
-            Some(variance.sqrt() / parameter.unit())
+            Some(variance.sqrt().min(free[k].prior.deviation()) / parameter.unit())
         });
         (error.source.to_owned(), moved)
     };
