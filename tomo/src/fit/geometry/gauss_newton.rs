@@ -8,7 +8,7 @@ use super::Geometry;
 use super::covariance::covariance;
 use super::problem::{Estimate, GeometryProblem};
 use crate::Error;
-use crate::fit::linear::{Profile, Voxels, refined};
+use crate::fit::linear::{Profile, Voxels};
 use crate::fit::{Batch, Field, ForwardModel};
 use crate::representation::Workspace;
 use kerrlight_common::simd::Float;
@@ -93,18 +93,6 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         let forward: ForwardModel<T> = self.model.forward(&geometry)?;
         let least = self.linear(&forward).settled(Some(x), self.effort.patience)?;
         Ok(self.estimate(geometry, least))
-    }
-
-    /// The best volume of a geometry, from that of a problem with other voxels.
-    ///
-    /// # Errors
-    /// As [`solve`](Self::solve).
-    pub fn solve_again(
-        &self,
-        geometry: Geometry,
-        (voxels, x): (&Voxels, &[f64]),
-    ) -> Result<Estimate, Error> {
-        self.solve_from(geometry, &refined(voxels, x, &self.voxels())?)
     }
 
     /// The first part of a Newton step that lowers the value; none if none does.

@@ -1,7 +1,7 @@
 //! Errors of a geometry that the model of the fit makes: its voxels, its pixels, and its sums along rays.
 
 use super::detail::Place;
-use super::finer::finer;
+use super::refinement::finer;
 use super::search_data::SearchData;
 use crate::fit::geometry::{
     Effort, GeometryModel, GeometryProblem, ModelErrors, Refined, Refinement, Spread, Standing,

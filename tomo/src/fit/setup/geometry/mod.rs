@@ -3,9 +3,9 @@
 mod detail;
 mod discretisation;
 mod fine;
-mod finer;
 mod posterior;
 mod rays_of_data;
+mod refinement;
 mod search;
 mod search_data;
 mod steps;

@@ -2,8 +2,8 @@
 //! for.
 
 use super::detail::{Detail, Detailed, Place, Resolution, Sure, Trial};
-use super::finer::Solved;
 use super::posterior::{Resampled, polished, surely};
+use super::refinement::Solved;
 use crate::fit::geometry::{Estimate, Free, Geometry, Polished, TrialWatch};
 use crate::fit::setup::Result;
 

@@ -2,7 +2,7 @@
 
 use super::detail::{Detail, Place, Resolution};
 use crate::fit::geometry::{Estimate, Geometry, GeometryProblem};
-use crate::fit::linear::Voxels;
+use crate::fit::linear::{Voxels, refined};
 use crate::fit::setup::{Result, spacing};
 use kerrlight_vlbi::operator::Pulse;
 
@@ -11,6 +11,7 @@ const FINER: f64 = 1.5;
 /// Rays along each side of a pixel, and panels, at most.
 const MOST: usize = 4;
 
+/// Returns the number along each side of a finer model.
 pub(super) fn finer(count: usize) -> usize {
     (FINER * count as f64).round() as usize
 }
@@ -21,7 +22,7 @@ pub(super) struct Solved {
     pub place: Place,
 }
 
-/// What χ²/2 becomes lower by through chance: its standard deviation.
+/// Standard deviation of χ²/2 by chance.
 fn by_chance(problem: &GeometryProblem<'_, f32>) -> f64 {
     (0.5 * problem.data()).sqrt()
 }
@@ -39,13 +40,15 @@ impl Detail<'_> {
     /// The resolution that explains most among some, if that is more than chance does.
     pub fn asked_for(&self, here: &Solved, among: Vec<Resolution>) -> Result<Option<Solved>> {
         let (geometry, errors) = (here.best.geometry, here.place.errors);
-        let (chance, voxels) =
-            self.through(&here.place, |problem| Ok((by_chance(problem), problem.voxels())))?;
+        let (chance, voxels) = self.smoothly(&here.place, geometry, |problem| {
+            Ok((by_chance(problem), problem.voxels()))
+        })?;
         let mut most: Option<Solved> = None;
         for at in among {
             let place = self.place(at, errors)?;
             let best = self.smoothly(&place, geometry, |problem| {
-                problem.solve_again(geometry, (&voxels, &here.best.x))
+                let x = refined(&voxels, &here.best.x, &problem.voxels())?;
+                problem.solve_from(geometry, &x)
             })?;
             if best.value < most.as_ref().map_or(here.best.value - chance, |most| most.best.value) {
                 most = Some(Solved { best, place });
@@ -88,7 +91,8 @@ impl Detail<'_> {
     pub fn more_voxels(&self, here: &Solved) -> Result<Option<Resolution>> {
         let Place { at, seen, .. } = &here.place;
         let nodes = finer(at.nodes);
-        let (asks, degree) = self.through(&here.place, |problem| {
+        // Of the data that were compared: pixels near the critical curve are not among them.
+        let (asks, degree) = self.smoothly(&here.place, here.best.geometry, |problem| {
             let excess = problem.excess(problem.scale * problem.reduced(here.best.chi2));
             Ok((excess > 0.0 && problem.gaussian.is_none(), problem.effort.degree))
         })?;
