@@ -198,7 +198,7 @@ fn exact_impossible_priors_are_refused_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fit.toml"), settings(50)).unwrap();
     for (change, expected) in [
-        ("observer.inclination_deg={uniform=[50.0,20.0]}", "high"),
+        ("observer.inclination_deg={uniform=[50.0,20.0]}", "high = 20 is not allowed: above low"),
         ("hole.spin={uniform=[0.0,1.5]}", "hole.spin.uniform.1 = 1.5 is not allowed: -1 to 1"),
         ("hole.spin={uniform=[0.0,1.0]}", "hole.spin = 1 is not allowed: -0.999 to 0.999"),
         (

@@ -21,7 +21,9 @@ const DRAWN: u64 = 0x77a1_d5ee_d000_0001;
 fn free(
     (parameter, key, settings): (Parameter, &'static str, PriorSettings),
 ) -> Result<Free, Error> {
-    let prior = settings.prior(parameter.unit()).checked().within(key)?;
+    // Numbers that are refused are told as they stand in the settings.
+    settings.prior(1.0).checked().within(key)?;
+    let prior = settings.prior(parameter.unit());
     if matches!(prior, Prior::Isotropic { .. }) && parameter != Parameter::Inclination {
         let why = format!("{key}: isotropic is a prior of inclinations; take uniform or normal");
         return Err(FitError::Conflict(why).into());
