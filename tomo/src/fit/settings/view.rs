@@ -73,7 +73,8 @@ pub struct Screen {
     /// Jy in the pixel of a sight line with 1 M of emission 1: the unit of emission.
     #[schemars(range(min = 1e-15, max = 1e15), extend("unit" = "Jy per M of emission 1"))]
     pub jy_per_pixel: f64,
-    /// Rays of each pixel near the critical curve, whose mean is its light; one without it.
+    /// Rays of each pixel near the critical curve, whose mean is its light; without it one, or 16 where images of another
+    /// program ask for means.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = 8)]
     #[schemars(range(min = 1, max = 1024), extend("unit" = "rays"))]

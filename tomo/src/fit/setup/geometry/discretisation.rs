@@ -1,23 +1,23 @@
 //! Errors of a geometry that the model of the fit makes: its voxels, its pixels, and its sums along rays.
 
+use super::averaged;
 use super::detail::Place;
 use super::refinement::finer;
 use super::search_data::SearchData;
 use crate::fit::geometry::{
     Effort, GeometryModel, GeometryProblem, ModelErrors, Refined, Refinement, Spread, Standing,
 };
-use crate::fit::settings::UnknownGeometry;
+use crate::fit::settings::{FitFile, UnknownGeometry};
 use crate::fit::setup::Result;
 use kerrlight_vlbi::operator::Pulse;
 
 /// Voxels along each axis, at most.
 const MOST: usize = 128;
 
-/// Errors that the model has of itself in a geometry that a search has found with χ²/N of `reduced`, through pixels of this
-/// width, M.
+/// Errors that the model has of itself in a geometry that a search has found with χ²/N of `reduced`.
 pub(super) fn errors(
+    of: (&FitFile, &UnknownGeometry),
     place: &Place,
-    (unknown, width): (&UnknownGeometry, f64),
     problem: &GeometryProblem<'_, f32>,
     (spread, reduced): (&Spread, f64),
 ) -> Result<ModelErrors> {
@@ -30,7 +30,7 @@ pub(super) fn errors(
         let standing = problem.standing(geometry)?;
         let voxels = voxels(&standing, problem)?;
         let sums = sums(&standing, problem)?;
-        let pixels = pixels(place, (unknown, width), &standing, problem)?;
+        let pixels = pixels(of, place, &standing, problem)?;
         let refined: Vec<Refined> = [voxels, sums, pixels].into_iter().flatten().collect();
         Ok(ModelErrors { known: standing.errors(problem.free, &refined), left_out: None })
     })
@@ -70,8 +70,8 @@ fn sums(standing: &Standing, problem: &GeometryProblem<'_, f32>) -> Result<Optio
 /// Images may be samples or means over pixels. Visibilities are those of a smooth image, whose sums converge faster than any
 /// power of the pixel, unless the data are known to have pixels. Polarised light is seen along single rays.
 fn pixels(
-    Place { seen, view, errors, .. }: &Place,
-    (unknown, width): (&UnknownGeometry, f64),
+    (file, unknown): (&FitFile, &UnknownGeometry),
+    Place { seen, at, view, errors }: &Place,
     standing: &Standing,
     problem: &GeometryProblem<'_, f32>,
 ) -> Result<Option<Refined>> {
@@ -81,8 +81,7 @@ fn pixels(
     }
     if seen.is_images() {
         let kind = Refinement { onwards: onwards(2.0, 2.0), ..kind };
-        let rays = problem.model.parts.map_or(1, |(_, rays)| rays);
-        let model = GeometryModel { parts: Some((width, 2 * rays)), ..problem.model.clone() };
+        let model = averaged(file, problem.model.clone(), 2 * at.rays)?;
         return standing.refined(kind, &GeometryProblem { model: &model, ..*problem });
     }
     if seen.view.measured.pulse != Pulse::Delta {

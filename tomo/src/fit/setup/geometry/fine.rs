@@ -1,18 +1,18 @@
 //! Detailed search, from the ends of the coarse searches to the best geometry and its errors.
 
 use super::detail::{Detail, Detailed, Place, Resolution, Sure, Trial};
-use super::discretisation;
 use super::posterior::{polished, surely};
 use super::search_data::SearchData;
 use super::tangent::Anchor;
+use super::{averaged, discretisation};
 use crate::fit::geometry::{
     Effort, Exploration, Explored, Geometry, GeometryModel, GeometryProblem, Spread, TrialWatch,
 };
 use crate::fit::linear::{StopRule, refined};
 use crate::fit::settings::SearchView;
+use crate::fit::setup::Result;
 use crate::fit::setup::drawn::is_drawn_elsewhere;
 use crate::fit::setup::instrument::samples;
-use crate::fit::setup::{Result, spacing};
 
 impl Detail<'_> {
     /// Searches from the ends of the coarse searches, the best of which leaves so much of each datum, for the best geometry;
@@ -69,9 +69,9 @@ impl Detail<'_> {
         if !self.is_foreign()? {
             return Ok(sure);
         }
-        let about = (self.unknown, spacing(&self.file.screen)?);
+        let of = (self.file, self.unknown);
         let own = self.through(place, |problem| {
-            discretisation::errors(place, about, problem, (spread, sure.reduced_chi2))
+            discretisation::errors(of, place, problem, (spread, sure.reduced_chi2))
         })?;
         let spread = sure.spread.map(|spread| spread.beside(&self.unknown.free, own));
         Ok(Sure { spread, ..sure })
@@ -84,13 +84,10 @@ impl Detail<'_> {
         work: impl FnOnce(&GeometryProblem<'_, f32>) -> Result<R>,
     ) -> Result<R> {
         let Place { seen, at, view, errors } = place;
-        let width = spacing(&self.file.screen)?;
         seen.with(self.unknown, view, (*errors, self.memory), |problem| {
-            let model = GeometryModel {
-                parts: (at.rays > 1).then_some((width, at.rays)),
-                split: at.panels * problem.model.split,
-                ..problem.model.clone()
-            };
+            let split = at.panels * problem.model.split;
+            let model = GeometryModel { split, ..problem.model.clone() };
+            let model = averaged(self.file, model, at.rays)?;
             work(&GeometryProblem { model: &model, ..*problem })
         })
     }

@@ -20,7 +20,7 @@ use super::instrument::ring;
 use super::{FitData, Instrument, Result, axis, motion, spacing};
 use crate::fit::geometry::{Geometry, GeometryModel, Law, Parameter};
 use crate::fit::settings::{AxisSearch, FitError, FitFile};
-use crate::fit::{Motion, Sampling};
+use crate::fit::{Motion, RingRays, Sampling};
 use kerrlight_geodesic::Kerr;
 use kerrlight_render::dynamics::Velocity;
 
@@ -54,11 +54,9 @@ pub fn in_geometry(
     rays: RaySampling,
 ) -> Result<(Instrument, Motion)> {
     let plain = motion(file, measured.times.clone())?;
-    let mut model = model(file, instrument, &plain)?.seen_along(rays.lattice);
-    model.split *= rays.panels;
-    if rays.per_side > 1 {
-        model.parts = Some((spacing(&file.screen)?, rays.per_side));
-    }
+    let model = averaged(file, model(file, instrument, &plain)?, rays.per_side)?;
+    let split = model.split * rays.panels;
+    let model = GeometryModel { split, ..model.seen_along(rays.lattice) };
     let hole = Kerr::new(geometry.get(Parameter::Spin))?;
     let found = Instrument {
         pixels: instrument.pixels.clone(),
@@ -70,6 +68,21 @@ pub fn in_geometry(
         quiescent: instrument.quiescent.clone(),
     };
     Ok((found, model.motion_of(geometry)?))
+}
+
+/// Rays of a pixel near the critical curve, where data tell that pixels are means: a few miss the narrow images there.
+const RING_RAYS: usize = 16;
+
+/// The model whose pixels are means over so many rays along each side, and over more of them near the critical curve if no
+/// setting says how many rays a pixel has.
+fn averaged(file: &FitFile, model: GeometryModel, rays: usize) -> Result<GeometryModel> {
+    if rays == 1 {
+        return Ok(model);
+    }
+    let spacing = spacing(&file.screen)?;
+    let is_open = file.screen.samples_per_pixel.is_none();
+    let ring = is_open.then_some(RingRays { count: RING_RAYS, spacing, shift: [0.0; 2] });
+    Ok(GeometryModel { parts: Some((spacing, rays)), ring: model.ring.or(ring), ..model })
 }
 
 /// Returns the properties that all geometries share.

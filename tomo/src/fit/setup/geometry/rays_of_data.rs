@@ -1,7 +1,8 @@
 //! Sums over rays that data of another program ask for, where the geometry is known.
 
 use super::detail::{Detail, RaySampling};
-use super::known_geometry;
+use super::refinement::MEANS;
+use super::{RING_RAYS, known_geometry};
 use crate::fit::Sampling;
 use crate::fit::geometry::Geometry;
 use crate::fit::journal::{Forgetful, Memory};
@@ -15,8 +16,6 @@ const NODES: usize = 24;
 const ITERATIONS: usize = 30;
 /// Pixels of all frames that are compared, about.
 const PIXELS: usize = 20_000;
-/// Rays along each side of a pixel, at most, in a geometry that is known: each of them makes every step of a fit longer.
-const MEANS: usize = 2;
 
 /// Returns the rays of a pixel and the panels of a ray that images of another program ask for, or the panels that visibilities
 /// do: more than one where they explain the data better by more than chance. None where settings say how many rays a pixel has,
@@ -73,7 +72,7 @@ impl Detail<'_> {
         let mut here = self.solved(place, geometry)?;
         loop {
             let at = here.place.at;
-            let sums = self.finer_sums(&here.place, at.rays < MEANS).into_iter();
+            let sums = self.finer_sums(&here.place, MEANS).into_iter();
             let mut among = Vec::new();
             for finer in sums.filter(|finer| finer.pixels == at.pixels) {
                 if self.is_pointed_to(&here, finer)? {
@@ -91,6 +90,9 @@ impl Detail<'_> {
 pub fn through(mut file: FitFile, rays: RaySampling) -> FitFile {
     if let Sampling::Gauss { split, .. } = &mut file.region.nodes {
         *split *= rays.panels;
+    }
+    if rays.per_side > 1 {
+        file.screen.ring_rays.get_or_insert(RING_RAYS);
     }
     file.screen.samples_per_pixel = Some(rays.per_side * rays.per_side);
     file

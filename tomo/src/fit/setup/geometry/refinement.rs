@@ -8,8 +8,9 @@ use kerrlight_vlbi::operator::Pulse;
 
 /// Voxels, and pixels of visibilities, of a finer model over those of a coarser one, along each side.
 const FINER: f64 = 1.5;
-/// Rays along each side of a pixel, and panels, at most.
-const MOST: usize = 4;
+/// Rays along each side of a pixel that is a mean: the fewest, and with panels the most.
+pub(super) const MEANS: usize = 2;
+pub(super) const MOST: usize = 4;
 
 /// Returns the number along each side of a finer model.
 pub(super) fn finer(count: usize) -> usize {
@@ -30,23 +31,23 @@ fn by_chance(problem: &GeometryProblem<'_, f32>) -> f64 {
 impl Detail<'_> {
     /// The best volume of a geometry.
     pub fn solved(&self, place: Place, geometry: Geometry) -> Result<Solved> {
-        let best = self.smoothly(&place, geometry, |problem| {
+        let best = self.through(&place, |problem| {
             let first = problem.solve(geometry)?;
             problem.solve_from(geometry, &first.x)
         })?;
         Ok(Solved { best, place })
     }
 
-    /// The resolution that explains most among some, if that is more than chance does.
+    /// The resolution that explains most among some, if that is more than chance does. Pixels near the critical curve, which
+    /// ask for many rays, are compared as well: the geometry stays.
     pub fn asked_for(&self, here: &Solved, among: Vec<Resolution>) -> Result<Option<Solved>> {
         let (geometry, errors) = (here.best.geometry, here.place.errors);
-        let (chance, voxels) = self.smoothly(&here.place, geometry, |problem| {
-            Ok((by_chance(problem), problem.voxels()))
-        })?;
+        let (chance, voxels) =
+            self.through(&here.place, |problem| Ok((by_chance(problem), problem.voxels())))?;
         let mut most: Option<Solved> = None;
         for at in among {
             let place = self.place(at, errors)?;
-            let best = self.smoothly(&place, geometry, |problem| {
+            let best = self.through(&place, |problem| {
                 let x = refined(&voxels, &here.best.x, &problem.voxels())?;
                 problem.solve_from(geometry, &x)
             })?;
@@ -60,19 +61,19 @@ impl Detail<'_> {
     /// Returns whether residuals point to what other sums over rays change, where little but these can explain them: a volume
     /// need not be solved for to tell.
     pub fn is_pointed_to(&self, here: &Solved, at: Resolution) -> Result<bool> {
-        let (there, geometry) = (self.place(at, here.place.errors)?, here.best.geometry);
-        self.smoothly(&here.place, geometry, |problem| {
-            self.smoothly(&there, geometry, |other| {
-                Ok(problem.gain(&here.best, other)? > by_chance(problem))
-            })
+        let there = self.place(at, here.place.errors)?;
+        self.through(&here.place, |problem| {
+            self.through(&there, |other| Ok(problem.gain(&here.best, other)? > by_chance(problem)))
         })
     }
 
-    /// Resolutions with finer sums over rays, along them and over pixels.
-    pub fn finer_sums(&self, place: &Place, may_be_means: bool) -> Vec<Resolution> {
+    /// Resolutions with finer sums over rays, along them and over pixels: images through at most so many along each side of a
+    /// pixel.
+    pub fn finer_sums(&self, place: &Place, most: usize) -> Vec<Resolution> {
         let Place { at, seen, .. } = place;
         let mut all = Vec::new();
-        if seen.is_images() && !self.are_rays_known() && may_be_means && at.rays < MOST {
+        let are_open = self.file.screen.samples_per_pixel.is_none();
+        if seen.is_images() && are_open && self.file.polarization.is_none() && at.rays < most {
             all.push(Resolution { rays: 2 * at.rays, ..*at });
         }
         if !seen.is_images() && self.measured.pulse == Pulse::Delta {
@@ -91,18 +92,12 @@ impl Detail<'_> {
     pub fn more_voxels(&self, here: &Solved) -> Result<Option<Resolution>> {
         let Place { at, seen, .. } = &here.place;
         let nodes = finer(at.nodes);
-        // Of the data that were compared: pixels near the critical curve are not among them.
-        let (asks, degree) = self.smoothly(&here.place, here.best.geometry, |problem| {
+        let (asks, degree) = self.through(&here.place, |problem| {
             let excess = problem.excess(problem.scale * problem.reduced(here.best.chi2));
             Ok((excess > 0.0 && problem.gaussian.is_none(), problem.effort.degree))
         })?;
         let voxels = Voxels::cube(nodes, self.file.region.r_max, degree);
         let is_wide = voxels.shape().spacing[0] >= 0.5 * spacing(&seen.view.file.screen)?;
         Ok((asks && is_wide).then_some(Resolution { nodes, ..*at }))
-    }
-
-    /// Returns whether settings say how many rays a pixel has.
-    pub fn are_rays_known(&self) -> bool {
-        self.file.screen.samples_per_pixel.is_some()
     }
 }

@@ -1,9 +1,9 @@
 //! Steps from the ends of all searches to the best geometry, through voxels, pixels and sums along rays as fine as the data ask
 //! for.
 
-use super::detail::{Detail, Detailed, Place, Resolution, Sure, Trial};
+use super::detail::{Detail, Detailed, Place, Sure, Trial};
 use super::posterior::{Resampled, polished, surely};
-use super::refinement::Solved;
+use super::refinement::{MEANS, MOST, Solved};
 use crate::fit::geometry::{Estimate, Free, Geometry, Polished, TrialWatch};
 use crate::fit::setup::Result;
 
@@ -40,9 +40,9 @@ fn is_alike(free: &[Free], a: &Geometry, b: &Geometry) -> bool {
 impl Detail<'_> {
     /// Steps from the ends of all searches, which move to where steps lead, to the best geometry; none if it was cancelled.
     ///
-    /// Coarse voxels displace ends, so that the best of them need not lead to the best geometry. Pixels of images are samples
-    /// or means: steps are taken with both. Some pixels are left out, at first those near the critical curve of each end:
-    /// values are compared once they are the same for all, and as fine as the data ask for.
+    /// Coarse voxels displace ends, so that the best of them need not lead to the best geometry. Through single rays some pixels
+    /// are left out, at first those near the critical curve of each end: values are compared once they are the same for all,
+    /// and as fine as the data ask for.
     pub fn steps(
         &self,
         first: Place,
@@ -52,18 +52,8 @@ impl Detail<'_> {
         let ends: Vec<Geometry> = trials.iter().map(|trial| trial.end).collect();
         let coarse = trials.iter().min_by(|a, b| a.value.total_cmp(&b.value));
         let Some(coarse) = coarse.map(|trial| trial.end) else { return Ok(None) };
-        let first = self.summed(first, coarse)?;
-        let Some(near) = self.each(&first, None, &ends, watch)? else { return Ok(None) };
-        let mut best = (first, near);
-        if self.may_be_means(&best.0)? {
-            let place = self.place(Resolution { rays: 2, ..best.0.at }, best.0.errors)?;
-            let Some(near) = self.each(&place, None, &ends, watch)? else { return Ok(None) };
-            let least = |all: &[Stepped]| lowest(all).map_or(f64::INFINITY, |end| end.per_datum);
-            if least(&near) < least(&best.1) {
-                best = (place, near);
-            }
-        }
-        let (place, near) = best;
+        let place = self.summed(first, coarse)?;
+        let Some(near) = self.each(&place, None, &ends, watch)? else { return Ok(None) };
         let Some(best) = lowest(&near).cloned() else { return Ok(None) };
         let from = best.geometry();
         let (place, refined) = self.refined(place, best)?;
@@ -83,12 +73,6 @@ impl Detail<'_> {
         let place = Place { errors, ..place };
         let sure = self.sure(&place, best)?;
         Ok(Some(Detailed { sure, errors, resolution: place.at }))
-    }
-
-    /// Returns whether pixels may be means over several rays: those of images that another model has made.
-    fn may_be_means(&self, place: &Place) -> Result<bool> {
-        let is_plain = self.file.polarization.is_none();
-        Ok(place.seen.is_images() && is_plain && !self.are_rays_known() && self.is_foreign()?)
     }
 
     /// Steps from each geometry, from those that are alike once, without the pixels near the critical curve of the best end or of
@@ -133,14 +117,18 @@ impl Detail<'_> {
         })
     }
 
-    /// Sums over rays that are as fine as visibilities ask for in a geometry: those that are too coarse ripple, and steps end in
-    /// the ripples.
+    /// Sums over rays that are as fine as the data ask for near a geometry: those that are too coarse ripple, and steps end in
+    /// the ripples. Where steps through single rays end, the pixels near the critical curve tell samples from means.
     fn summed(&self, place: Place, geometry: Geometry) -> Result<Place> {
-        if place.seen.is_images() || !self.is_foreign()? {
+        if !self.is_foreign()? {
             return Ok(place);
         }
-        let mut here = self.solved(place, geometry)?;
-        while let Some(there) = self.asked_for(&here, self.finer_sums(&here.place, false))? {
+        let nearer = match place.seen.is_images() {
+            true => self.stepped_to(&place, geometry, geometry)?.geometry(),
+            false => geometry,
+        };
+        let mut here = self.solved(place, nearer)?;
+        while let Some(there) = self.asked_for(&here, self.finer_sums(&here.place, MEANS))? {
             here = there;
         }
         Ok(here.place)
@@ -153,10 +141,11 @@ impl Detail<'_> {
         }
         loop {
             let Estimate { geometry, x, .. } = &best.polished.best;
-            let again = self.smoothly(&place, *geometry, |p| p.solve_from(*geometry, x))?;
+            let again = self.through(&place, |problem| problem.solve_from(*geometry, x))?;
             let here = Solved { best: again, place };
             // Whether pixels are means at all was decided where steps began: either model has minima of its own.
-            let mut among = self.finer_sums(&here.place, here.place.at.rays > 1);
+            let rays = here.place.at.rays;
+            let mut among = self.finer_sums(&here.place, if rays > 1 { MOST } else { rays });
             among.extend(self.more_voxels(&here)?);
             let Some(there) = self.asked_for(&here, among)? else { return Ok((here.place, best)) };
             best = self.stepped(&there.place, *geometry, &there.best)?;
