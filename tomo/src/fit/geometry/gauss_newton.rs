@@ -4,9 +4,9 @@
 //! Images are differentiated by differences as wide as the ripples that rays next to the critical curve make: exact
 //! derivatives are those of single ripples.
 
-use super::Geometry;
 use super::covariance::covariance;
-use super::problem::{Estimate, GeometryProblem};
+use super::problem::{Estimate, Free, GeometryProblem, goes_over, kept};
+use super::{Geometry, Parameter};
 use crate::Error;
 use crate::fit::linear::{Profile, Voxels};
 use crate::fit::{Batch, Field, ForwardModel};
@@ -124,19 +124,22 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
 
     /// A geometry at a distance, in units of the parameters' scales; bounds hold it.
     pub(super) fn moved(&self, from: &Geometry, step: &[f64]) -> Geometry {
-        self.free.iter().zip(step).fold(*from, |geometry, (free, step)| {
+        let moved = self.free.iter().zip(step).fold(*from, |geometry, (free, step)| {
             let value = from.get(free.parameter) + step * free.parameter.scale();
-            geometry.with(free.parameter, free.inside(value))
-        })
+            geometry.with(free.parameter, value)
+        });
+        kept(self.free, moved, Free::inside)
     }
 
     /// The largest part of a step, at most all of it, that no bound has to hold.
     pub(super) fn part_within(&self, from: &Geometry, step: &[f64]) -> f64 {
-        let part = |(free, step): (&super::Free, &f64)| {
+        let part = |(free, step): (&Free, &f64)| {
             let ([low, high], here) = (free.bounds(), from.get(free.parameter));
             let step = step * free.parameter.scale();
-            let room = if step > 0.0 { high - here } else { here - low };
-            if free.is_circle() || step == 0.0 { 1.0 } else { room.max(0.0) / step.abs() }
+            let bound = if step > 0.0 { high } else { low };
+            let goes_on = free.is_circle()
+                || free.parameter == Parameter::Inclination && goes_over(self.free, bound);
+            if goes_on || step == 0.0 { 1.0 } else { ((bound - here) / step).max(0.0) }
         };
         self.free.iter().zip(step).map(part).fold(1.0, f64::min)
     }
@@ -173,7 +176,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
 
     /// Returns the change of images of a held volume per scale of each free parameter.
     fn image_differences(&self, at: &Estimate) -> Result<Vec<Vec<T>>, Error> {
-        let one = |free: &super::Free| -> Result<Vec<T>, Error> {
+        let one = |free: &Free| -> Result<Vec<T>, Error> {
             let ([low, high], here) = (free.bounds(), at.geometry.get(free.parameter));
             let width = WIDTH * free.parameter.scale();
             let ends = [(here - width).max(low), (here + width).min(high)];

@@ -8,7 +8,7 @@ use crate::fit::linear::{
     Change, GaussianField, Least, LinearProblem, Prior as Penalty, StopRule, Voxels, Weighted,
 };
 use crate::representation::Degree;
-use core::f64::consts::TAU;
+use core::f64::consts::{PI, TAU};
 use kerrlight_common::simd::Float;
 
 /// Part of its prior's deviation from which on the data say nothing about a parameter.
@@ -273,11 +273,33 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     /// a whole circle has none.
     pub(super) fn place(&self, about: &Geometry, u: &[f64]) -> Geometry {
         let one = |geometry: Geometry, (free, u): (&Free, &f64)| {
-            let value = about.get(free.parameter) + u * free.width();
-            geometry.with(free.parameter, free.mirrored(value))
+            geometry.with(free.parameter, about.get(free.parameter) + u * free.width())
         };
-        self.free.iter().zip(u).fold(*about, one)
+        kept(self.free, self.free.iter().zip(u).fold(*about, one), Free::mirrored)
     }
+}
+
+/// A geometry each parameter of which is brought inside its bounds. An inclination that goes on beyond the pole of the spin comes
+/// down on the other side, where the position angle is the opposite one.
+pub fn kept(free: &[Free], mut geometry: Geometry, inside: impl Fn(&Free, f64) -> f64) -> Geometry {
+    let inclination = geometry.get(Parameter::Inclination);
+    let pole = if inclination < 0.0 { 0.0 } else { PI };
+    if !(0.0..=PI).contains(&inclination) && goes_over(free, pole) {
+        let angle = geometry.get(Parameter::PositionAngle);
+        geometry = geometry
+            .with(Parameter::Inclination, 2.0 * pole - inclination)
+            .with(Parameter::PositionAngle, angle + PI);
+    }
+    free.iter().fold(geometry, |geometry, free| {
+        geometry.with(free.parameter, inside(free, geometry.get(free.parameter)))
+    })
+}
+
+/// Returns whether geometries go on beyond a pole of the spin: priors know neither the pole nor a position angle.
+pub(super) fn goes_over(free: &[Free], pole: f64) -> bool {
+    let has = |is: &dyn Fn(&Free) -> bool| free.iter().any(is);
+    has(&|free| free.parameter == Parameter::Inclination && free.bounds().contains(&pole))
+        && has(&Free::is_circle)
 }
 
 /// x between two mirrors.
@@ -321,6 +343,34 @@ mod tests {
         let whole = Prior::Uniform { low: 0.0, high: TAU };
         let whole = Free { parameter: Parameter::PositionAngle, prior: whole };
         assert!((whole.inside(-0.5) - (TAU - 0.5)).abs() < 1e-14);
+    }
+
+    /// One degree beyond the pole is one degree from it, on the other side; priors that end there or know the position angle keep
+    /// geometries on their own.
+    #[test]
+    fn exact_geometries_go_on_beyond_the_pole() {
+        let uniform = |parameter, low: f64, high: f64| Free {
+            parameter,
+            prior: Prior::Uniform { low: low.to_radians(), high: high.to_radians() },
+        };
+        let (angle, tilt) = (Parameter::PositionAngle, Parameter::Inclination);
+        let all = [uniform(tilt, 0.0, 180.0), uniform(angle, -180.0, 180.0)];
+        let known = [uniform(tilt, 0.0, 180.0), uniform(angle, 0.0, 90.0)];
+        let below = [uniform(tilt, 3.0, 90.0), all[1]];
+        for (free, from, expected) in [
+            (all, [-1.0f64, 30.0f64], [1.0, -150.0]),
+            (all, [182.0, -30.0], [178.0, 150.0]),
+            (all, [50.0, 200.0], [50.0, -160.0]),
+            (known, [-1.0, 30.0], [0.0, 30.0]),
+            (below, [-1.0, 30.0], [3.0, 30.0]),
+            (below, [91.0, 30.0], [90.0, 30.0]),
+        ] {
+            let raw = Geometry::new(0.5, from[0].to_radians()).with(angle, from[1].to_radians());
+            let found = kept(&free, raw, Free::inside);
+            let found = [tilt, angle].map(|parameter| found.get(parameter).to_degrees());
+            assert!((found[0] - expected[0]).abs() < 1e-9, "{from:?}: {found:?}");
+            assert!((found[1] - expected[1]).abs() < 1e-9, "{from:?}: {found:?}");
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::detail::Sure;
 use super::search_data::SearchData;
 use crate::fit::geometry::{
     Effort, Envelope, Estimate, Free, Geometry, GeometryModel, GeometryProblem, ModelErrors,
-    Polish, Polished, Spread,
+    Polish, Polished, Spread, kept,
 };
 use crate::fit::settings::{FitFile, SearchView, UnknownGeometry};
 use crate::fit::setup::{FitData, Result};
@@ -164,13 +164,14 @@ impl<'a> GeometryPosterior<'a> {
         let step = &self.root * normal;
         let shares: Vec<f64> = self.free.iter().map(|_| random.random()).collect();
         let each = self.free.iter().zip(&shares).enumerate();
-        each.fold(self.geometry, |geometry, (k, (free, share))| {
+        let drawn = each.fold(self.geometry, |geometry, (k, (free, share))| {
             let value = match self.open[k] {
                 true => free.prior.quantile(*share),
-                false => free.mirrored(geometry.get(free.parameter) + step[k]),
+                false => geometry.get(free.parameter) + step[k],
             };
             geometry.with(free.parameter, value)
-        })
+        });
+        kept(&self.free, drawn, Free::mirrored)
     }
 
     /// Data with noise once more.
