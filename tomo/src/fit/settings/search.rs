@@ -19,7 +19,7 @@ pub struct GeometrySearch {
 
 impl Default for GeometrySearch {
     fn default() -> Self {
-        let coarse = SearchView { trials: 400, nodes: 16, iterations: 30, pixels: 20, frames: 16 };
+        let coarse = SearchView { trials: 100, nodes: 16, iterations: 30, pixels: 20, frames: 16 };
         let fine = SearchView { trials: 60, nodes: 36, iterations: 80, pixels: 40, frames: 20 };
         Self { starts: 8, coarse, fine }
     }
