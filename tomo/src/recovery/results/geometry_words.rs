@@ -1,6 +1,6 @@
 //! Words on a geometry that was found: lines, sentences, and distances from a known one.
 
-use super::geometry::{ALIKE, GeometryResults, PerParameter};
+use super::geometry::{ALIKE, GeometryResults, PerParameter, TrialResults};
 use crate::fit::geometry::Parameter;
 use crate::fit::verdict::EXCESS;
 use std::collections::BTreeMap;
@@ -170,9 +170,12 @@ impl GeometryResults {
         ))
     }
 
-    /// Describes how many searches have ended before they had converged, most at the limit on their geometries.
+    /// Describes how many searches have ended before they had converged, most at the limit on their geometries. Those that ended
+    /// where the best one and others did are confirmed.
     fn unfinished(&self) -> Option<String> {
-        let open = self.trials.iter().filter(|trial| !trial.converged).count();
+        let is_confirmed = self.trials.iter().filter(|trial| trial.same).count() > 1;
+        let is_open = |trial: &&TrialResults| !(trial.converged || is_confirmed && trial.same);
+        let open = self.trials.iter().filter(is_open).count();
         (open > 0).then(|| {
             format!(
                 "{open} of {} searches ended before they had converged: with a larger search.coarse.trials more of them may \
@@ -365,10 +368,14 @@ mod tests {
         let note = |results: &GeometryResults, part: &str| {
             [results.lines(), results.sentences()].map(|all| all.iter().any(|s| s.contains(part)))
         };
-        results.trials = [false, true].map(|done| trial([0.91, 59.0], 0.0, [true, done])).into();
-        assert_eq!(note(&results, "1 of 2 searches ended before"), [true; 2]);
-        results.trials[0].converged = true;
+        results.trials = vec![trial([0.91, 59.0], 0.0, [true, false])];
+        assert_eq!(note(&results, "1 of 1 searches ended before"), [true; 2]);
+        // Two that end at the same place confirm each other; one elsewhere is open.
+        results.trials.push(trial([0.91, 59.0], 0.0, [true, false]));
         assert_eq!(note(&results, "ended before"), [false; 2]);
+        results.trials.push(trial([0.2, 30.0], 900.0, [false; 2]));
+        assert_eq!(note(&results, "1 of 3 searches ended before"), [true; 2]);
+        results.trials.pop();
         assert_eq!(note(&results, "edge of its prior"), [false; 2]);
         results.open.insert(Parameter::Spin, false);
         results.geometry.insert(Parameter::Spin, 0.94);
