@@ -5,7 +5,7 @@
 //! derivatives are those of single ripples.
 
 use super::covariance::covariance;
-use super::problem::{Estimate, Free, GeometryProblem, goes_over, kept};
+use super::problem::{Estimate, Free, GeometryProblem, bounded, crosses_pole};
 use super::{Geometry, Parameter};
 use crate::Error;
 use crate::fit::linear::{Profile, Voxels};
@@ -128,7 +128,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
             let value = from.get(free.parameter) + step * free.parameter.scale();
             geometry.with(free.parameter, value)
         });
-        kept(self.free, moved, Free::inside)
+        bounded(self.free, moved, Free::inside)
     }
 
     /// The largest part of a step, at most all of it, that no bound has to hold.
@@ -138,7 +138,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
             let step = step * free.parameter.scale();
             let bound = if step > 0.0 { high } else { low };
             let goes_on = free.is_circle()
-                || free.parameter == Parameter::Inclination && goes_over(self.free, bound);
+                || free.parameter == Parameter::Inclination && crosses_pole(self.free, bound);
             if goes_on || step == 0.0 { 1.0 } else { ((bound - here) / step).max(0.0) }
         };
         self.free.iter().zip(step).map(part).fold(1.0, f64::min)

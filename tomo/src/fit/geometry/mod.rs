@@ -24,7 +24,7 @@ pub use gauss_newton::{Polish, Polished};
 pub use model::{GeometryModel, Law};
 pub use neighbours::Surroundings;
 pub use prior::Prior;
-pub use problem::{Effort, Estimate, Free, GeometryProblem, Span, kept};
+pub use problem::{Effort, Estimate, Free, GeometryProblem, Span, bounded};
 pub use quadratic_form::Envelope;
 pub use uncertainty::Spread;
 

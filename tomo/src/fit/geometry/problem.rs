@@ -275,16 +275,20 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         let one = |geometry: Geometry, (free, u): (&Free, &f64)| {
             geometry.with(free.parameter, about.get(free.parameter) + u * free.width())
         };
-        kept(self.free, self.free.iter().zip(u).fold(*about, one), Free::mirrored)
+        bounded(self.free, self.free.iter().zip(u).fold(*about, one), Free::mirrored)
     }
 }
 
-/// A geometry each parameter of which is brought inside its bounds. An inclination that goes on beyond the pole of the spin comes
-/// down on the other side, where the position angle is the opposite one.
-pub fn kept(free: &[Free], mut geometry: Geometry, inside: impl Fn(&Free, f64) -> f64) -> Geometry {
+/// The geometry with each parameter brought inside its bounds by `inside`. An inclination beyond the pole of the spin comes down
+/// on the other side, where the position angle is the opposite one.
+pub fn bounded(
+    free: &[Free],
+    mut geometry: Geometry,
+    inside: impl Fn(&Free, f64) -> f64,
+) -> Geometry {
     let inclination = geometry.get(Parameter::Inclination);
     let pole = if inclination < 0.0 { 0.0 } else { PI };
-    if !(0.0..=PI).contains(&inclination) && goes_over(free, pole) {
+    if !(0.0..=PI).contains(&inclination) && crosses_pole(free, pole) {
         let angle = geometry.get(Parameter::PositionAngle);
         geometry = geometry
             .with(Parameter::Inclination, 2.0 * pole - inclination)
@@ -295,8 +299,9 @@ pub fn kept(free: &[Free], mut geometry: Geometry, inside: impl Fn(&Free, f64) -
     })
 }
 
-/// Returns whether geometries go on beyond a pole of the spin: priors know neither the pole nor a position angle.
-pub(super) fn goes_over(free: &[Free], pole: f64) -> bool {
+/// Returns whether geometries go on beyond a pole of the spin: the prior of the inclination reaches it, and that of the position
+/// angle is a whole circle.
+pub(super) fn crosses_pole(free: &[Free], pole: f64) -> bool {
     let has = |is: &dyn Fn(&Free) -> bool| free.iter().any(is);
     has(&|free| free.parameter == Parameter::Inclination && free.bounds().contains(&pole))
         && has(&Free::is_circle)
@@ -366,7 +371,7 @@ mod tests {
             (below, [91.0, 30.0], [90.0, 30.0]),
         ] {
             let raw = Geometry::new(0.5, from[0].to_radians()).with(angle, from[1].to_radians());
-            let found = kept(&free, raw, Free::inside);
+            let found = bounded(&free, raw, Free::inside);
             let found = [tilt, angle].map(|parameter| found.get(parameter).to_degrees());
             assert!((found[0] - expected[0]).abs() < 1e-9, "{from:?}: {found:?}");
             assert!((found[1] - expected[1]).abs() < 1e-9, "{from:?}: {found:?}");

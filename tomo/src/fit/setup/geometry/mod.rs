@@ -20,7 +20,7 @@ use super::instrument::ring;
 use super::{FitData, Instrument, Result, axis, motion, spacing};
 use crate::fit::geometry::{Geometry, GeometryModel, Law, Parameter};
 use crate::fit::settings::{AxisSearch, FitError, FitFile};
-use crate::fit::{Motion, RingRays, Sampling};
+use crate::fit::{Motion, Sampling};
 use kerrlight_geodesic::Kerr;
 use kerrlight_render::dynamics::Velocity;
 
@@ -70,19 +70,14 @@ pub fn in_geometry(
     Ok((found, model.motion_of(geometry)?))
 }
 
-/// Rays of a pixel near the critical curve, where data tell that pixels are means: a few miss the narrow images there.
-const RING_RAYS: usize = 16;
-
-/// The model whose pixels are means over so many rays along each side, and over more of them near the critical curve if no
-/// setting says how many rays a pixel has.
-fn averaged(file: &FitFile, model: GeometryModel, rays: usize) -> Result<GeometryModel> {
-    if rays == 1 {
+/// The model whose pixels are means over so many rays along each side, and over those of [`through`] near the critical curve.
+fn averaged(file: &FitFile, model: GeometryModel, per_side: usize) -> Result<GeometryModel> {
+    if per_side == 1 {
         return Ok(model);
     }
-    let spacing = spacing(&file.screen)?;
-    let is_open = file.screen.samples_per_pixel.is_none();
-    let ring = is_open.then_some(RingRays { count: RING_RAYS, spacing, shift: [0.0; 2] });
-    Ok(GeometryModel { parts: Some((spacing, rays)), ring: model.ring.or(ring), ..model })
+    let parts = Some((spacing(&file.screen)?, per_side));
+    let file = through(file.clone(), RaySampling { per_side, ..RaySampling::default() });
+    Ok(GeometryModel { parts, ring: ring(&file)?, ..model })
 }
 
 /// Returns the properties that all geometries share.
@@ -158,6 +153,29 @@ mod tests {
             all.extend_from_slice(&movie.image(frame).unwrap());
         }
         (true_geometry(&file).unwrap(), all)
+    }
+
+    /// Settings that say how many rays a pixel has are obeyed everywhere.
+    #[test]
+    fn exact_only_pixels_of_which_nothing_is_said_have_more_rays_near_the_critical_curve() {
+        for (samples, asked, per_side, expected) in [
+            (None, None, 1, None),
+            (None, None, 2, Some(16)),
+            (None, Some(1), 2, Some(1)),
+            (None, Some(40), 2, Some(40)),
+            (Some(4), None, 2, None),
+            (Some(4), Some(8), 2, Some(8)),
+        ] {
+            let mut file = settings(60.0.into(), 0.0.into());
+            (file.screen.samples_per_pixel, file.screen.ring_rays) = (samples, asked);
+            let instrument = Instrument::new(&file).unwrap();
+            let plain = motion(&file, vec![0.0]).unwrap();
+            let model = model(&file, &instrument, &plain).unwrap();
+            let rays = averaged(&file, model, per_side).unwrap().ring.map(|ring| ring.count);
+            assert_eq!(rays, expected.filter(|count| *count > 1), "{samples:?} {asked:?}");
+            let seen = through(file, RaySampling { per_side, ..RaySampling::default() });
+            assert_eq!(seen.screen.ring_rays, expected, "{samples:?} {asked:?}");
+        }
     }
 
     /// A position angle of 90 degrees turns images from north to east, anticlockwise.

@@ -4,7 +4,7 @@ use super::detail::Sure;
 use super::search_data::SearchData;
 use crate::fit::geometry::{
     Effort, Envelope, Estimate, Free, Geometry, GeometryModel, GeometryProblem, ModelErrors,
-    Polish, Polished, Spread, kept,
+    Polish, Polished, Spread, bounded,
 };
 use crate::fit::settings::{FitFile, SearchView, UnknownGeometry};
 use crate::fit::setup::{FitData, Result};
@@ -171,7 +171,7 @@ impl<'a> GeometryPosterior<'a> {
             };
             geometry.with(free.parameter, value)
         });
-        kept(&self.free, drawn, Free::mirrored)
+        bounded(&self.free, drawn, Free::mirrored)
     }
 
     /// Data with noise once more.

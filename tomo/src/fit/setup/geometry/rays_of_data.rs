@@ -1,8 +1,8 @@
 //! Sums over rays that data of another program ask for, where the geometry is known.
 
 use super::detail::{Detail, RaySampling};
+use super::known_geometry;
 use super::refinement::MEANS;
-use super::{RING_RAYS, known_geometry};
 use crate::fit::Sampling;
 use crate::fit::geometry::Geometry;
 use crate::fit::journal::{Forgetful, Memory};
@@ -16,6 +16,8 @@ const NODES: usize = 24;
 const ITERATIONS: usize = 30;
 /// Pixels of all frames that are compared, about.
 const PIXELS: usize = 20_000;
+/// Rays of a pixel near the critical curve, where data tell that pixels are means: a few miss the narrow images there.
+const RING_RAYS: usize = 16;
 
 /// Returns the rays of a pixel and the panels of a ray that images of another program ask for, or the panels that visibilities
 /// do: more than one where they explain the data better by more than chance. None where settings say how many rays a pixel has,
@@ -85,13 +87,14 @@ impl Detail<'_> {
     }
 }
 
-/// The settings with these rays.
+/// The settings with these rays. Where settings say nothing of the rays of a pixel, one that is a mean has more of them near the
+/// critical curve.
 #[must_use]
 pub fn through(mut file: FitFile, rays: RaySampling) -> FitFile {
     if let Sampling::Gauss { split, .. } = &mut file.region.nodes {
         *split *= rays.panels;
     }
-    if rays.per_side > 1 {
+    if rays.per_side > 1 && file.screen.samples_per_pixel.is_none() {
         file.screen.ring_rays.get_or_insert(RING_RAYS);
     }
     file.screen.samples_per_pixel = Some(rays.per_side * rays.per_side);

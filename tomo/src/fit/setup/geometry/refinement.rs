@@ -8,8 +8,9 @@ use kerrlight_vlbi::operator::Pulse;
 
 /// Voxels, and pixels of visibilities, of a finer model over those of a coarser one, along each side.
 const FINER: f64 = 1.5;
-/// Rays along each side of a pixel that is a mean: the fewest, and with panels the most.
+/// Rays along each side of a pixel that is a mean, at least.
 pub(super) const MEANS: usize = 2;
+/// Rays along each side of a pixel, and panels, at most.
 pub(super) const MOST: usize = 4;
 
 /// Returns the number along each side of a finer model.
@@ -67,8 +68,8 @@ impl Detail<'_> {
         })
     }
 
-    /// Resolutions with finer sums over rays, along them and over pixels: images through at most so many along each side of a
-    /// pixel.
+    /// Resolutions with finer sums over rays, along them and over pixels. Pixels of images have at most `most` rays along each
+    /// side.
     pub fn finer_sums(&self, place: &Place, most: usize) -> Vec<Resolution> {
         let Place { at, seen, .. } = place;
         let mut all = Vec::new();
