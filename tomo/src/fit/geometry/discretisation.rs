@@ -37,6 +37,8 @@ pub struct Refined {
     certain: f64,
     /// Decrease of χ²/2.
     gain: f64,
+    /// Excess of χ²/2 that the finer model leaves.
+    left: f64,
 }
 
 /// An error that the model has of itself.
@@ -126,6 +128,7 @@ impl Standing {
     ) -> Result<Option<Refined>, Error> {
         // As far from the end as the other volume: slopes that are left over from there cancel.
         let there = finer.solve(self.best.geometry)?;
+        let left = finer.excess(finer.scale * finer.left(&there)?);
         let bowl = finer.bowl(&there, Polish::default().following)?;
         let left_by =
             |bends| covariance(finer.free, &self.best.geometry, bends, 1.0).filter(is_finite);
@@ -135,7 +138,7 @@ impl Standing {
         let slopes = bowl.slopes - &self.bowl.slopes;
         let certain = beyond_chance(&slopes, &finer, &own);
         let step = -finer * slopes;
-        Ok(Some(Refined { kind, step, certain, gain: self.best.value - there.value }))
+        Ok(Some(Refined { kind, step, certain, gain: self.best.value - there.value, left }))
     }
 
     /// Errors that refinements make likely, each as much as the data do not contradict, and what the excess that they leave
@@ -149,8 +152,10 @@ impl Standing {
             source,
             covariance: in_own_units(free, covariance),
         };
-        let of_refined = |Refined { kind, step, certain, gain }: &Refined| {
-            let step = step * (kind.onwards * (0.5 * gain.min(0.0)).exp() * certain.sqrt());
+        let of_refined = |Refined { kind, step, certain, gain, left }: &Refined| {
+            // Coarser models follow more of the noise: those that explain the data as well are not contradicted.
+            let against = (-gain).max(0.0).min(*left);
+            let step = step * (kind.onwards * (-0.5 * against).exp() * certain.sqrt());
             own(kind.source, &(&step * step.transpose()))
         };
         // Several may explain the same.
@@ -193,13 +198,14 @@ mod tests {
         Standing { best, bowl: Bowl { slopes, bends, responses: Vec::new() }, excess }
     }
 
-    /// Standard deviations by a step of 0.01 of a refinement with this gain, and by what it leaves.
-    fn errors(excess: f64, gain: f64) -> Vec<f64> {
+    /// Standard deviations by a step of 0.01 of a refinement with this gain, which leaves this excess, and by what is not explained.
+    fn errors(excess: f64, gain: f64, left: f64) -> Vec<f64> {
         let prior = Prior::Uniform { low: -0.9, high: 0.9 };
         let free = [Free { parameter: Parameter::Spin, prior }];
         let kind = Refinement { source: "voxels", onwards: 1.5 };
         let step = DVector::from_element(1, 0.01 / Parameter::Spin.scale());
-        let errors = standing(excess).errors(&free, &[Refined { kind, step, certain: 1.0, gain }]);
+        let refined = Refined { kind, step, certain: 1.0, gain, left };
+        let errors = standing(excess).errors(&free, &[refined]);
         errors.iter().map(|error| error.covariance[0].sqrt()).collect()
     }
 
@@ -213,14 +219,17 @@ mod tests {
     #[test]
     fn exact_what_refinements_leave_of_an_excess_is_an_error() {
         // All is explained, or there is nothing to explain.
-        assert_close(&errors(100.0, 120.0), &[0.015]);
-        assert_close(&errors(0.0, 5.0), &[0.015]);
+        assert_close(&errors(100.0, 120.0, 0.0), &[0.015]);
+        assert_close(&errors(0.0, 5.0, 0.0), &[0.015]);
         // Data speak against the refinement, by four standard deviations.
-        assert_close(&errors(0.0, -8.0), &[0.015 * (-4.0f64).exp()]);
+        assert_close(&errors(0.0, -8.0, 20.0), &[0.015 * (-4.0f64).exp()]);
+        // A finer model that follows less of the noise explains them nevertheless, or all but a little.
+        assert_close(&errors(0.0, -80.0, 0.0), &[0.015]);
+        assert_close(&errors(0.0, -80.0, 2.0), &[0.015 * (-1.0f64).exp()]);
         // What is left can move the spin by √200 of its standard deviations.
-        assert_close(&errors(150.0, 50.0), &[0.015, 0.001 * 200f64.sqrt()]);
+        assert_close(&errors(150.0, 50.0, 100.0), &[0.015, 0.001 * 200f64.sqrt()]);
         // More than its prior is not an error.
-        let wide = errors(1e9, 0.0)[1];
+        let wide = errors(1e9, 0.0, 1e9)[1];
         assert!(wide < 1.8 / 12f64.sqrt() && wide > 0.99 * 1.8 / 12f64.sqrt(), "{wide}");
     }
 
