@@ -37,8 +37,8 @@ pub struct Refined {
     certain: f64,
     /// Decrease of χ²/2.
     gain: f64,
-    /// Excess of χ²/2 that the finer model leaves.
-    left: f64,
+    /// Excess of χ²/2 of the finer model.
+    excess: f64,
 }
 
 /// An error that the model has of itself.
@@ -128,7 +128,7 @@ impl Standing {
     ) -> Result<Option<Refined>, Error> {
         // As far from the end as the other volume: slopes that are left over from there cancel.
         let there = finer.solve(self.best.geometry)?;
-        let left = finer.excess(finer.scale * finer.left(&there)?);
+        let excess = finer.excess(finer.scale * finer.left(&there)?);
         let bowl = finer.bowl(&there, Polish::default().following)?;
         let left_by =
             |bends| covariance(finer.free, &self.best.geometry, bends, 1.0).filter(is_finite);
@@ -138,7 +138,7 @@ impl Standing {
         let slopes = bowl.slopes - &self.bowl.slopes;
         let certain = beyond_chance(&slopes, &finer, &own);
         let step = -finer * slopes;
-        Ok(Some(Refined { kind, step, certain, gain: self.best.value - there.value, left }))
+        Ok(Some(Refined { kind, step, certain, gain: self.best.value - there.value, excess }))
     }
 
     /// Errors that refinements make likely, each as much as the data do not contradict, and what the excess that they leave
@@ -152,9 +152,9 @@ impl Standing {
             source,
             covariance: in_own_units(free, covariance),
         };
-        let of_refined = |Refined { kind, step, certain, gain, left }: &Refined| {
-            // Coarser models follow more of the noise: those that explain the data as well are not contradicted.
-            let against = (-gain).max(0.0).min(*left);
+        let of_refined = |Refined { kind, step, certain, gain, excess }: &Refined| {
+            // Coarser models follow more of the noise: a finer one with a higher χ² that explains the data is not contradicted.
+            let against = (-gain).max(0.0).min(*excess);
             let step = step * (kind.onwards * (-0.5 * against).exp() * certain.sqrt());
             own(kind.source, &(&step * step.transpose()))
         };
@@ -198,13 +198,14 @@ mod tests {
         Standing { best, bowl: Bowl { slopes, bends, responses: Vec::new() }, excess }
     }
 
-    /// Standard deviations by a step of 0.01 of a refinement with this gain, which leaves this excess, and by what is not explained.
-    fn errors(excess: f64, gain: f64, left: f64) -> Vec<f64> {
+    /// Standard deviations by a step of 0.01 of a refinement with this gain and excess, and by what of the first excess it does not
+    /// explain.
+    fn errors(excess: f64, gain: f64, finer_excess: f64) -> Vec<f64> {
         let prior = Prior::Uniform { low: -0.9, high: 0.9 };
         let free = [Free { parameter: Parameter::Spin, prior }];
         let kind = Refinement { source: "voxels", onwards: 1.5 };
         let step = DVector::from_element(1, 0.01 / Parameter::Spin.scale());
-        let refined = Refined { kind, step, certain: 1.0, gain, left };
+        let refined = Refined { kind, step, certain: 1.0, gain, excess: finer_excess };
         let errors = standing(excess).errors(&free, &[refined]);
         errors.iter().map(|error| error.covariance[0].sqrt()).collect()
     }
