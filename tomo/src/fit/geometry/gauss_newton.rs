@@ -155,10 +155,11 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     /// Slope and second derivatives at a geometry with its best volume.
     pub(super) fn bowl(&self, at: &Estimate, following: usize) -> Result<Bowl, Error> {
         let forward: ForwardModel<T> = self.model.forward(&at.geometry)?;
-        let moved = self.image_differences(at)?;
+        let n = self.free.len();
+        let mut moved = self.image_differences(at, &DMatrix::from_diagonal_element(n, n, WIDTH))?;
+        moved.iter_mut().flatten().for_each(|x| *x *= T::of(1.0 / WIDTH));
         let Profile { slopes, bends, responses } =
             self.linear(&forward).profile(&at.x, &moved, following)?;
-        let n = self.free.len();
         let half = 0.5 * self.scale * self.unit();
         let mut bowl = Bowl {
             slopes: DVector::from_vec(slopes) * half,
@@ -174,19 +175,39 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         Ok(bowl)
     }
 
-    /// Returns the change of images of a held volume per scale of each free parameter.
-    fn image_differences(&self, at: &Estimate) -> Result<Vec<Vec<T>>, Error> {
-        let one = |free: &Free| -> Result<Vec<T>, Error> {
-            let ([low, high], here) = (free.bounds(), at.geometry.get(free.parameter));
-            let width = WIDTH * free.parameter.scale();
-            let ends = [(here - width).max(low), (here + width).min(high)];
-            let [before, after] = ends.map(|value| at.geometry.with(free.parameter, value));
-            let image = |geometry: Geometry| self.images(geometry, (&self.voxels(), &at.x));
-            let (before, after) = (image(before)?, image(after)?);
-            let factor = T::of(free.parameter.scale() / (ends[1] - ends[0]));
+    /// Returns the second derivatives with differences of images as wide as some steps to both sides, per step.
+    ///
+    /// Noise makes the slope of a value between both ends of a step scatter with this variance. They are more than the rise of
+    /// that value: the volume follows noise as well, which differs from geometry to geometry.
+    pub(super) fn scatter_of_slopes(
+        &self,
+        at: &Estimate,
+        steps: &DMatrix<f64>,
+    ) -> Result<DMatrix<f64>, Error> {
+        let forward: ForwardModel<T> = self.model.forward(&at.geometry)?;
+        let differences = self.image_differences(at, steps)?;
+        let following = Polish::default().following;
+        let Profile { bends, .. } =
+            self.linear(&forward).profile(&at.x, &differences, following)?;
+        let n = steps.ncols();
+        Ok(DMatrix::from_row_slice(n, n, &bends) * (0.5 * self.scale * self.unit()))
+    }
+
+    /// Returns the change of images of a held volume per step, in units of scales, from differences to both sides as far as bounds
+    /// allow.
+    fn image_differences(&self, at: &Estimate, steps: &DMatrix<f64>) -> Result<Vec<Vec<T>>, Error> {
+        let one = |step: DVector<f64>| -> Result<Vec<T>, Error> {
+            let part = |side: f64| side * self.part_within(&at.geometry, (side * &step).as_slice());
+            let [back, on] = [part(-1.0), part(1.0)];
+            let image = |part: f64| {
+                let geometry = self.moved(&at.geometry, (part * &step).as_slice());
+                self.images(geometry, (&self.voxels(), &at.x))
+            };
+            let (before, after) = (image(back)?, image(on)?);
+            let factor = T::of(1.0 / (on - back));
             Ok(after.iter().zip(&before).map(|(a, b)| (*a - *b) * factor).collect())
         };
-        self.free.iter().map(one).collect()
+        steps.column_iter().map(|step| one(step.into_owned())).collect()
     }
 
     /// Images of a volume in a geometry, frame after frame.

@@ -7,12 +7,15 @@ use super::quadratic_form::{Envelope, Evaluations, diagonals, ends, fitted};
 use crate::Error;
 use crate::fit::linear::{Voxels, refined};
 use kerrlight_common::simd::Float;
+use nalgebra::DMatrix;
 
 /// Neighbours of a geometry.
 pub struct Surroundings<'a> {
     polished: &'a Polished,
     voxels: Voxels,
     reach: Reach,
+    /// Variance of slopes per place of the reach; none where a prior bounds what the volume follows of the noise.
+    scatter: Option<DMatrix<f64>>,
     seen: Vec<Evaluations>,
 }
 
@@ -45,11 +48,12 @@ impl Surroundings<'_> {
         problem: &GeometryProblem<'_, T>,
         inflation: f64,
     ) -> Option<Envelope> {
-        let Self { polished, reach, seen, .. } = self;
+        let Self { polished, reach, scatter, seen, .. } = self;
         let form = fitted(seen, problem.free.len()).unwrap_or_else(|| reach.form());
         let trials = seen.iter().map(|seen| seen.values.len()).sum();
         let about = polished.best.geometry;
-        let found = problem.middle(about, (&form, &reach.columns), inflation, reach.is_wide);
+        let (seen, scatter) = ((&form, &reach.columns), scatter.as_ref());
+        let found = problem.middle(about, seen, scatter, inflation, reach.is_wide);
         let ripple = form.ripple;
         found.map(|(geometry, covariance)| Envelope { geometry, covariance, ripple, trials })
     }
@@ -66,6 +70,10 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         let mut seen = reach.seen();
         let places = (&reach.columns, diagonals(self.free.len()));
         self.look_at(&polished.best, &polished.responses, places, &mut seen)?;
-        Ok(Some(Surroundings { polished, voxels: self.voxels(), reach, seen: vec![seen] }))
+        let scatter = match self.gaussian {
+            None => Some(self.scatter_of_slopes(&polished.best, &reach.columns)?),
+            Some(_) => None,
+        };
+        Ok(Some(Surroundings { polished, voxels: self.voxels(), reach, scatter, seen: vec![seen] }))
     }
 }
