@@ -204,7 +204,8 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
                 self.images(geometry, (&self.voxels(), &at.x))
             };
             let (before, after) = (image(back)?, image(on)?);
-            let factor = T::of(1.0 / (on - back));
+            // Between bounds that touch it nothing changes.
+            let factor = T::of(if on > back { 1.0 / (on - back) } else { 0.0 });
             Ok(after.iter().zip(&before).map(|(a, b)| (*a - *b) * factor).collect())
         };
         steps.column_iter().map(|step| one(step.into_owned())).collect()

@@ -110,7 +110,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
             }
         }
         if let Some(scatter) = scatter {
-            moved += beyond_the_rise(scatter, form, &inverse) * inflation;
+            moved += sandwich_excess(scatter, form, &inverse) * inflation;
         }
         if is_wide || lowest.norm() > 1.0 {
             // Far from the middle a form is not quadratic: the lowest geometry is as good a guess. Where the middle lies beyond all
@@ -126,9 +126,9 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     }
 }
 
-/// Returns the covariance of the middle that slopes of this variance make, beyond that of a form whose second derivatives are the
-/// variance of its slopes (White 1982, Econometrica 50, 1).
-fn beyond_the_rise(scatter: &DMatrix<f64>, form: &Form, inverse: &DMatrix<f64>) -> DMatrix<f64> {
+/// Returns the sandwich covariance of the middle (White 1982, Econometrica 50, 1), from the variance of slopes, less the inverse of the
+/// form's second derivatives, in directions in which it is larger.
+fn sandwich_excess(scatter: &DMatrix<f64>, form: &Form, inverse: &DMatrix<f64>) -> DMatrix<f64> {
     let mut more = SymmetricEigen::new(scatter - &form.bends);
     more.eigenvalues.apply(|x| *x = x.max(0.0));
     inverse * more.recompose() * inverse
@@ -274,33 +274,28 @@ mod tests {
         let mut normal = |rows, columns| {
             DMatrix::from_fn(rows, columns, |_, _| random.sample::<f64, _>(StandardNormal))
         };
-        let [mut rise, mut stated] = [0.0; 2];
-        let rounds = 300;
-        for _ in 0..rounds {
+        let ([mut rise, mut stated], mut bowls) = ([0.0; 2], 0);
+        for _ in 0..300 {
             let [here, first, second] = [0; 3].map(|_| normal(DATA, NUMBERS));
             let truth = normal(NUMBERS, 1) * 0.2;
             let data = &here * truth + normal(DATA, 1);
-            let best = |a: &DMatrix<f64>| {
-                let x = (a.transpose() * a).cholesky().unwrap().solve(&(a.transpose() * &data));
-                let left = &data - a * &x;
-                (x, left)
+            let least = |a: &DMatrix<f64>, b: &DMatrix<f64>| {
+                (a.transpose() * a).cholesky().unwrap().solve(&(a.transpose() * b))
             };
             let value = |p: &DVector<f64>| {
-                let (_, left) = best(&(&here + REACH * (p[0] * &first + p[1] * &second)));
-                0.5 * left.norm_squared()
+                let there = &here + REACH * (p[0] * &first + p[1] * &second);
+                0.5 * (&data - &there * least(&there, &data)).norm_squared()
             };
             let values = places(2).iter().map(value).collect();
+            // Without a bowl no error is stated.
             let Some(form) = fitted(&[Evaluations { places: places(2), values }], 2) else {
                 continue;
             };
-            let x = best(&here).0;
+            bowls += 1;
+            let x = least(&here, &data);
             let moved =
                 REACH * DMatrix::from_columns(&[(&first * &x).column(0), (&second * &x).column(0)]);
-            let absorbed = &here
-                * (here.transpose() * &here)
-                    .cholesky()
-                    .unwrap()
-                    .solve(&(here.transpose() * &moved));
+            let absorbed = &here * least(&here, &moved);
             let scatter = moved.transpose() * (&moved - absorbed);
             let inverse = form.bends.clone().try_inverse().unwrap();
             let middle = -&inverse * &form.slopes[0];
@@ -308,9 +303,9 @@ mod tests {
                 middle.dot(&(covariance.try_inverse().unwrap() * &middle)) / 2.0
             };
             rise += square(inverse.clone());
-            stated += square(&inverse + beyond_the_rise(&scatter, &form, &inverse));
+            stated += square(&inverse + sandwich_excess(&scatter, &form, &inverse));
         }
-        let [rise, stated] = [rise, stated].map(|sum| sum / f64::from(rounds));
+        let [rise, stated] = [rise, stated].map(|sum| sum / f64::from(bowls));
         // The form is as wide as the scatter: slopes across it scatter by less than at its middle.
         assert!(rise > 1.4 && (0.75..1.1).contains(&stated), "{rise} {stated}");
     }
