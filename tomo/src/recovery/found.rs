@@ -73,7 +73,7 @@ impl Found<'_> {
     pub fn choice(&self) -> Choice {
         match self {
             Found::Geometry(_, _, found) => {
-                Choice::Geometry { geometry: found.geometry, rays: found.resolution.sampling() }
+                Choice::Geometry { geometry: found.geometry, rays: found.resolution.rays }
             }
             Found::Band(_, scan) => {
                 let best = &scan.geometries[scan.best];

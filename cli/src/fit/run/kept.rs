@@ -38,10 +38,11 @@ fn kept(error: anyhow::Error) -> Error {
 }
 
 /// Says what there is more of than one.
-fn asked_for(RaySampling { per_side, panels, .. }: RaySampling) -> String {
+fn asked_for(RaySampling { per_side, ring, panels, .. }: RaySampling) -> String {
     let rays = (per_side > 1).then(|| format!("{} rays per pixel", per_side * per_side));
+    let ring = ring.map(|count| format!("{count} rays of pixels near the critical curve"));
     let panels = (panels > 1).then(|| format!("{panels} times the panels of region.nodes"));
-    rays.into_iter().chain(panels).collect::<Vec<_>>().join(" and ")
+    rays.into_iter().chain(ring).chain(panels).collect::<Vec<_>>().join(" and ")
 }
 
 /// Names what goes on.

@@ -46,15 +46,17 @@ impl Spread {
         counts.filter_map(|count| Self::through(free, best, &samples[..count], reduced_chi2)).next()
     }
 
-    /// Moves the errors to another geometry near by: its distance from this one is part of its error.
+    /// Moves the errors to a geometry near by, to which another `source` leads: the distance is an error of the model.
     #[must_use]
-    pub fn moved(&self, free: &[Free], geometry: Geometry) -> Self {
+    pub fn moved(&self, free: &[Free], geometry: Geometry, source: &'static str) -> Self {
         let step = free.iter().map(|Free { parameter, .. }| {
             parameter.difference(geometry.get(*parameter), self.geometry.get(*parameter))
         });
         let step: Vec<f64> = step.collect();
         let both: Vec<f64> = step.iter().flat_map(|a| step.iter().map(move |b| a * b)).collect();
-        Self { geometry, ..self.widened(free, &both) }
+        let mut moved = Self { geometry, ..self.widened(free, &both) };
+        moved.own.known.push(ModelError { source, covariance: both });
+        moved
     }
 
     /// Adds errors that the model has of itself.
@@ -199,12 +201,13 @@ mod tests {
             own: ModelErrors::default(),
         };
         let names = free.map(|free| free.parameter);
-        let first = spread.moved(&free, geometry.with(names[0], geometry.get(names[0]) + 0.04));
+        let first =
+            spread.moved(&free, geometry.with(names[0], geometry.get(names[0]) + 0.04), "other");
         assert!((first.sigma[0] - 0.05).abs() < 1e-12 && (first.sigma[1] - 0.02).abs() < 1e-12);
         let before = 0.5 * 0.03 * 0.02;
         assert!((first.correlation[1] * 0.05 * 0.02 - before).abs() < 1e-12);
         let far = names.into_iter().fold(geometry, |far, name| far.with(name, far.get(name) + 0.2));
-        let both = spread.moved(&free, far);
+        let both = spread.moved(&free, far, "other");
         assert!(both.correlation[1] > 0.98 && both.geometry == far, "{both:?}");
     }
 

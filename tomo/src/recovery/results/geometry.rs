@@ -67,6 +67,9 @@ pub struct ResolutionResults {
     pub pixels: usize,
     /// Rays whose mean a pixel is.
     pub rays_per_pixel: usize,
+    /// The same of pixels near the critical curve; none where they are as others.
+    #[serde(default)]
+    pub ring_rays: Option<usize>,
     /// Panels of a ray for each of the coarsest.
     pub panels: u32,
 }
@@ -149,8 +152,8 @@ impl GeometryResults {
 
     /// Returns the rays that the best geometry was looked at through.
     pub fn rays(&self) -> RaySampling {
-        let ResolutionResults { rays_per_pixel, panels, .. } = self.resolution;
-        RaySampling { per_side: rays_per_pixel.isqrt(), panels, lattice: 0 }
+        let ResolutionResults { rays_per_pixel, ring_rays: ring, panels, .. } = self.resolution;
+        RaySampling { per_side: rays_per_pixel.isqrt(), ring, panels, lattice: 0 }
     }
 
     /// Returns the best geometry, with what is known of the settings; none if it lacks a free parameter.
@@ -181,8 +184,9 @@ impl GeometryResults {
 }
 
 impl From<Resolution> for ResolutionResults {
-    fn from(Resolution { nodes, pixels, rays, panels }: Resolution) -> Self {
-        Self { nodes, pixels, rays_per_pixel: rays * rays, panels }
+    fn from(Resolution { nodes, pixels, rays }: Resolution) -> Self {
+        let RaySampling { per_side, ring: ring_rays, panels, .. } = rays;
+        Self { nodes, pixels, rays_per_pixel: per_side * per_side, ring_rays, panels }
     }
 }
 

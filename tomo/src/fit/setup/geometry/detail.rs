@@ -13,10 +13,8 @@ pub struct Resolution {
     pub nodes: usize,
     /// Pixels along each side.
     pub pixels: usize,
-    /// Rays along each side of a pixel of images, which is their mean.
-    pub rays: usize,
-    /// Panels of a ray for each of the coarsest.
-    pub panels: u32,
+    /// Rays of a pixel of images, and nodes along them.
+    pub rays: RaySampling,
 }
 
 /// Rays through which a fit sees a geometry.
@@ -24,22 +22,27 @@ pub struct Resolution {
 pub struct RaySampling {
     /// Rays along each side of a pixel, which is their mean.
     pub per_side: usize,
+    /// Rays of a pixel near the critical curve; as those of others, without.
+    pub ring: Option<usize>,
     /// Panels of a ray for each of the settings.
     pub panels: u32,
     /// Number of the lattice of rays near the critical curve, 0 for the usual one.
     pub lattice: u64,
 }
 
-impl Default for RaySampling {
-    fn default() -> Self {
-        Self { per_side: 1, panels: 1, lattice: 0 }
+/// Rays of a pixel near the critical curve, where pixels are means: a few miss the narrow images there.
+const RING_RAYS: usize = 16;
+
+impl RaySampling {
+    /// Means over twice as many rays along each side.
+    pub fn denser(self) -> Self {
+        Self { per_side: 2 * self.per_side, ring: self.ring.or(Some(RING_RAYS)), ..self }
     }
 }
 
-impl Resolution {
-    /// Its rays.
-    pub fn sampling(self) -> RaySampling {
-        RaySampling { per_side: self.rays, panels: self.panels, lattice: 0 }
+impl Default for RaySampling {
+    fn default() -> Self {
+        Self { per_side: 1, ring: None, panels: 1, lattice: 0 }
     }
 }
 

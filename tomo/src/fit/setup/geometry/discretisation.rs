@@ -1,9 +1,9 @@
 //! Errors of a geometry that the model of the fit makes: its voxels, its pixels, and its sums along rays.
 
-use super::averaged;
-use super::detail::Place;
+use super::detail::{Place, RaySampling};
 use super::refinement::finer;
 use super::search_data::SearchData;
+use super::seen_through;
 use crate::fit::geometry::{
     Effort, GeometryModel, GeometryProblem, ModelErrors, Refined, Refinement, Spread, Standing,
 };
@@ -17,7 +17,7 @@ const MOST: usize = 128;
 /// Errors that the model has of itself in a geometry that a search has found with χ²/N of `reduced`.
 pub(super) fn errors(
     of: (&FitFile, &UnknownGeometry),
-    place: &Place,
+    (place, even): (&Place, Option<RaySampling>),
     problem: &GeometryProblem<'_, f32>,
     (spread, reduced): (&Spread, f64),
 ) -> Result<ModelErrors> {
@@ -30,7 +30,7 @@ pub(super) fn errors(
         let standing = problem.standing(geometry)?;
         let voxels = voxels(&standing, problem)?;
         let sums = sums(&standing, problem)?;
-        let pixels = pixels(of, place, &standing, problem)?;
+        let pixels = pixels(of, (place, even), &standing, problem)?;
         let refined: Vec<Refined> = [voxels, sums, pixels].into_iter().flatten().collect();
         Ok(ModelErrors { known: standing.errors(problem.free, &refined), left_out: None })
     })
@@ -67,11 +67,11 @@ fn sums(standing: &Standing, problem: &GeometryProblem<'_, f32>) -> Result<Optio
     standing.refined(kind, &GeometryProblem { model: &model, ..*problem })
 }
 
-/// Images may be samples or means over pixels. Visibilities are those of a smooth image, whose sums converge faster than any
+/// Images may be samples or means over pixels, or through `even` rays. Visibilities are those of a smooth image, whose sums converge faster than any
 /// power of the pixel, unless the data are known to have pixels. Polarised light is seen along single rays.
 fn pixels(
     (file, unknown): (&FitFile, &UnknownGeometry),
-    Place { seen, at, view, errors }: &Place,
+    (Place { seen, at, view, errors }, even): (&Place, Option<RaySampling>),
     standing: &Standing,
     problem: &GeometryProblem<'_, f32>,
 ) -> Result<Option<Refined>> {
@@ -80,8 +80,10 @@ fn pixels(
         return Ok(None);
     }
     if seen.is_images() {
-        let kind = Refinement { onwards: onwards(2.0, 2.0), ..kind };
-        let model = averaged(file, problem.model.clone(), 2 * at.rays)?;
+        let means = Refinement { onwards: onwards(2.0, 2.0), ..kind };
+        let (kind, rays) = even.map_or((means, at.rays.denser()), |even| (kind, even));
+        let rays = RaySampling { panels: 1, ..rays };
+        let model = seen_through(file, problem.model.clone(), rays)?;
         return standing.refined(kind, &GeometryProblem { model: &model, ..*problem });
     }
     if seen.view.measured.pulse != Pulse::Delta {

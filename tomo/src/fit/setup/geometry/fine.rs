@@ -1,12 +1,12 @@
 //! Detailed search, from the ends of the coarse searches to the best geometry and its errors.
 
-use super::detail::{Detail, Detailed, Place, Resolution, Sure, Trial};
+use super::detail::{Detail, Detailed, Place, RaySampling, Resolution, Sure, Trial};
 use super::posterior::{polished, surely};
 use super::search_data::SearchData;
 use super::tangent::Anchor;
-use super::{averaged, discretisation};
+use super::{discretisation, seen_through};
 use crate::fit::geometry::{
-    Effort, Exploration, Explored, Geometry, GeometryModel, GeometryProblem, Spread, TrialWatch,
+    Effort, Exploration, Explored, Geometry, GeometryProblem, Spread, TrialWatch,
 };
 use crate::fit::linear::{StopRule, refined};
 use crate::fit::settings::SearchView;
@@ -40,14 +40,16 @@ impl Detail<'_> {
             false => about_volumes(&place.seen, problem, anchor, how, watch),
         })?;
         let Some(found) = found else { return Ok(None) };
-        let sure = self.beside_its_own(&place, found)?;
+        let sure = self.beside_its_own((&place, None), found)?;
         Ok(Some(Detailed { sure, errors, resolution: place.at }))
     }
 
     /// Data at the resolution that refinements begin with.
     pub fn first(&self, errors: f64) -> Result<Place> {
         let SearchView { nodes, pixels, .. } = self.unknown.search.fine;
-        self.place(Resolution { nodes, pixels, rays: samples(self.file)?, panels: 1 }, errors)
+        let (per_side, ring) = (samples(self.file)?, self.file.screen.ring_rays);
+        let rays = RaySampling { per_side, ring, ..RaySampling::default() };
+        self.place(Resolution { nodes, pixels, rays }, errors)
     }
 
     /// Data at a resolution.
@@ -63,15 +65,19 @@ impl Detail<'_> {
         Ok(self.file.data.is_some() || is_drawn_elsewhere(self.file)?)
     }
 
-    /// Adds the errors that the model has of itself, where data are of another one.
-    pub fn beside_its_own(&self, place: &Place, sure: Sure) -> Result<Sure> {
+    /// Adds the errors that the model has of itself, where data are of another one, perhaps through an even lattice of rays.
+    pub fn beside_its_own(
+        &self,
+        (place, even): (&Place, Option<RaySampling>),
+        sure: Sure,
+    ) -> Result<Sure> {
         let Some(spread) = &sure.spread else { return Ok(sure) };
         if !self.is_foreign()? {
             return Ok(sure);
         }
         let of = (self.file, self.unknown);
         let own = self.through(place, |problem| {
-            discretisation::errors(of, place, problem, (spread, sure.reduced_chi2))
+            discretisation::errors(of, (place, even), problem, (spread, sure.reduced_chi2))
         })?;
         let spread = sure.spread.map(|spread| spread.beside(&self.unknown.free, own));
         Ok(Sure { spread, ..sure })
@@ -85,9 +91,7 @@ impl Detail<'_> {
     ) -> Result<R> {
         let Place { seen, at, view, errors } = place;
         seen.with(self.unknown, view, (*errors, self.memory), |problem| {
-            let split = at.panels * problem.model.split;
-            let model = GeometryModel { split, ..problem.model.clone() };
-            let model = averaged(self.file, model, at.rays)?;
+            let model = seen_through(self.file, problem.model.clone(), at.rays)?;
             work(&GeometryProblem { model: &model, ..*problem })
         })
     }

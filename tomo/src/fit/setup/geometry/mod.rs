@@ -54,9 +54,7 @@ pub fn in_geometry(
     rays: RaySampling,
 ) -> Result<(Instrument, Motion)> {
     let plain = motion(file, measured.times.clone())?;
-    let model = averaged(file, model(file, instrument, &plain)?, rays.per_side)?;
-    let split = model.split * rays.panels;
-    let model = GeometryModel { split, ..model.seen_along(rays.lattice) };
+    let model = seen_through(file, model(file, instrument, &plain)?, rays)?;
     let hole = Kerr::new(geometry.get(Parameter::Spin))?;
     let found = Instrument {
         pixels: instrument.pixels.clone(),
@@ -70,14 +68,16 @@ pub fn in_geometry(
     Ok((found, model.motion_of(geometry)?))
 }
 
-/// The model whose pixels are means over so many rays along each side, and over those of [`through`] near the critical curve.
-fn averaged(file: &FitFile, model: GeometryModel, per_side: usize) -> Result<GeometryModel> {
-    if per_side == 1 {
-        return Ok(model);
+/// The model seen through these rays.
+fn seen_through(file: &FitFile, model: GeometryModel, rays: RaySampling) -> Result<GeometryModel> {
+    let split = rays.panels * model.split;
+    let model = GeometryModel { split, ..model };
+    if rays.per_side == 1 {
+        return Ok(model.seen_along(rays.lattice));
     }
-    let parts = Some((spacing(&file.screen)?, per_side));
-    let file = through(file.clone(), RaySampling { per_side, ..RaySampling::default() });
-    Ok(GeometryModel { parts, ring: ring(&file)?, ..model })
+    let parts = Some((spacing(&file.screen)?, rays.per_side));
+    let ring = ring(&through(file.clone(), rays))?;
+    Ok(GeometryModel { parts, ring, ..model }.seen_along(rays.lattice))
 }
 
 /// Returns the properties that all geometries share.
@@ -158,22 +158,27 @@ mod tests {
     /// Settings that say how many rays a pixel has are obeyed everywhere.
     #[test]
     fn exact_only_pixels_of_which_nothing_is_said_have_more_rays_near_the_critical_curve() {
-        for (samples, asked, per_side, expected) in [
-            (None, None, 1, None),
-            (None, None, 2, Some(16)),
-            (None, Some(1), 2, Some(1)),
-            (None, Some(40), 2, Some(40)),
-            (Some(4), None, 2, None),
-            (Some(4), Some(8), 2, Some(8)),
+        let one = RaySampling::default();
+        let means = one.denser();
+        let even = RaySampling { ring: None, ..means };
+        for (samples, asked, rays, expected) in [
+            (None, None, one, None),
+            (None, None, means, Some(16)),
+            (None, None, even, None),
+            (None, Some(1), means, Some(1)),
+            (None, Some(40), means, Some(40)),
+            (None, Some(40), even, Some(40)),
+            (Some(4), None, means, None),
+            (Some(4), Some(8), means, Some(8)),
         ] {
             let mut file = settings(60.0.into(), 0.0.into());
             (file.screen.samples_per_pixel, file.screen.ring_rays) = (samples, asked);
             let instrument = Instrument::new(&file).unwrap();
             let plain = motion(&file, vec![0.0]).unwrap();
             let model = model(&file, &instrument, &plain).unwrap();
-            let rays = averaged(&file, model, per_side).unwrap().ring.map(|ring| ring.count);
-            assert_eq!(rays, expected.filter(|count| *count > 1), "{samples:?} {asked:?}");
-            let seen = through(file, RaySampling { per_side, ..RaySampling::default() });
+            let ring = seen_through(&file, model, rays).unwrap().ring.map(|ring| ring.count);
+            assert_eq!(ring, expected.filter(|count| *count > 1), "{samples:?} {asked:?}");
+            let seen = through(file, rays);
             assert_eq!(seen.screen.ring_rays, expected, "{samples:?} {asked:?}");
         }
     }

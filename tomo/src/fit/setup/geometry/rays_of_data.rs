@@ -2,7 +2,7 @@
 
 use super::detail::{Detail, RaySampling};
 use super::known_geometry;
-use super::refinement::MEANS;
+use super::refinement::{MEANS, by_chance};
 use crate::fit::Sampling;
 use crate::fit::geometry::Geometry;
 use crate::fit::journal::{Forgetful, Memory};
@@ -16,9 +16,6 @@ const NODES: usize = 24;
 const ITERATIONS: usize = 30;
 /// Pixels of all frames that are compared, about.
 const PIXELS: usize = 20_000;
-/// Rays of a pixel near the critical curve, where data tell that pixels are means: a few miss the narrow images there.
-const RING_RAYS: usize = 16;
-
 /// Returns the rays of a pixel and the panels of a ray that images of another program ask for, or the panels that visibilities
 /// do: more than one where they explain the data better by more than chance. None where settings say how many rays a pixel has,
 /// where the geometry has yet to be found, and of other data.
@@ -74,28 +71,23 @@ impl Detail<'_> {
         let mut here = self.solved(place, geometry)?;
         loop {
             let at = here.place.at;
-            let sums = self.finer_sums(&here.place, MEANS).into_iter();
-            let mut among = Vec::new();
-            for finer in sums.filter(|finer| finer.pixels == at.pixels) {
-                if self.is_pointed_to(&here, finer)? {
-                    among.push(finer);
-                }
-            }
-            let Some(there) = self.asked_for(&here, among)? else { return Ok(at.sampling()) };
+            let mut sums = self.finer_sums(&here.place, MEANS);
+            sums.retain(|finer| finer.pixels == at.pixels);
+            let among = self.pointed_to(&here, sums, by_chance)?;
+            let Some(there) = self.asked_for(&here, among)? else { return Ok(at.rays) };
             here = there;
         }
     }
 }
 
-/// The settings with these rays. Where settings say nothing of the rays of a pixel, one that is a mean has more of them near the
-/// critical curve.
+/// The settings with these rays. What settings say of the rays of a pixel stays.
 #[must_use]
 pub fn through(mut file: FitFile, rays: RaySampling) -> FitFile {
     if let Sampling::Gauss { split, .. } = &mut file.region.nodes {
         *split *= rays.panels;
     }
-    if rays.per_side > 1 && file.screen.samples_per_pixel.is_none() {
-        file.screen.ring_rays.get_or_insert(RING_RAYS);
+    if file.screen.samples_per_pixel.is_none() {
+        file.screen.ring_rays = file.screen.ring_rays.or(rays.ring);
     }
     file.screen.samples_per_pixel = Some(rays.per_side * rays.per_side);
     file

@@ -1,6 +1,7 @@
 //! Models as fine as data of another program ask for: more voxels, rays of a pixel, pixels, and panels of a ray.
 
-use super::detail::{Detail, Place, Resolution};
+use super::detail::{Detail, Place, RaySampling, Resolution};
+use super::search_data::SearchData;
 use crate::fit::geometry::{Estimate, Geometry, GeometryProblem};
 use crate::fit::linear::{Voxels, refined};
 use crate::fit::setup::{Result, spacing};
@@ -12,6 +13,11 @@ const FINER: f64 = 1.5;
 pub(super) const MEANS: usize = 2;
 /// Rays along each side of a pixel, and panels, at most.
 pub(super) const MOST: usize = 4;
+/// Rays along each side of a pixel of another program, at most.
+const MOST_EVEN: usize = 8;
+/// Decrease of χ²/2 by four standard deviations of the noise along one direction: more than chance, between models with as many
+/// unknowns.
+const CLEAR: f64 = 8.0;
 
 /// Returns the number along each side of a finer model.
 pub(super) fn finer(count: usize) -> usize {
@@ -25,7 +31,7 @@ pub(super) struct Solved {
 }
 
 /// Standard deviation of χ²/2 by chance.
-fn by_chance(problem: &GeometryProblem<'_, f32>) -> f64 {
+pub(super) fn by_chance(problem: &GeometryProblem<'_, f32>) -> f64 {
     (0.5 * problem.data()).sqrt()
 }
 
@@ -42,9 +48,14 @@ impl Detail<'_> {
     /// The resolution that explains most among some, if that is more than chance does. Pixels near the critical curve, which
     /// ask for many rays, are compared as well: the geometry stays.
     pub fn asked_for(&self, here: &Solved, among: Vec<Resolution>) -> Result<Option<Solved>> {
+        let chance = self.through(&here.place, |problem| Ok(by_chance(problem)))?;
+        self.lowest(here, among, chance)
+    }
+
+    /// The resolution that explains most among some, if χ²/2 becomes lower by more than `chance`.
+    fn lowest(&self, here: &Solved, among: Vec<Resolution>, chance: f64) -> Result<Option<Solved>> {
         let (geometry, errors) = (here.best.geometry, here.place.errors);
-        let (chance, voxels) =
-            self.through(&here.place, |problem| Ok((by_chance(problem), problem.voxels())))?;
+        let voxels = self.through(&here.place, |problem| Ok(problem.voxels()))?;
         let mut most: Option<Solved> = None;
         for at in among {
             let place = self.place(at, errors)?;
@@ -59,13 +70,44 @@ impl Detail<'_> {
         Ok(most)
     }
 
-    /// Returns whether residuals point to what other sums over rays change, where little but these can explain them: a volume
-    /// need not be solved for to tell.
-    pub fn is_pointed_to(&self, here: &Solved, at: Resolution) -> Result<bool> {
-        let there = self.place(at, here.place.errors)?;
-        self.through(&here.place, |problem| {
-            self.through(&there, |other| Ok(problem.gain(&here.best, other)? > by_chance(problem)))
-        })
+    /// The resolutions to whose sums over rays residuals point, by a gain of more than `chance`, where little but these can explain
+    /// them: a volume need not be solved for to tell.
+    pub fn pointed_to(
+        &self,
+        here: &Solved,
+        mut among: Vec<Resolution>,
+        chance: impl Fn(&GeometryProblem<'_, f32>) -> f64,
+    ) -> Result<Vec<Resolution>> {
+        let is_pointed_to = |at: &Resolution| {
+            let there = self.place(*at, here.place.errors)?;
+            self.through(&here.place, |problem| {
+                self.through(&there, |other| Ok(problem.gain(&here.best, other)? > chance(problem)))
+            })
+        };
+        let pointed_to = among.iter().map(is_pointed_to).collect::<Result<Vec<bool>>>()?;
+        let mut each = pointed_to.into_iter();
+        among.retain(|_| each.next() == Some(true));
+        Ok(among)
+    }
+
+    /// The even lattice of rays, the same in all pixels, through which another program has computed images; none where means
+    /// over pixels explain these as well.
+    pub fn matched(&self, here: &Solved) -> Result<Option<Solved>> {
+        let Place { at, seen, .. } = &here.place;
+        let is_said = self.file.screen.ring_rays.is_some();
+        if !self.has_open_rays(seen) || at.rays.ring.is_none() || is_said {
+            return Ok(None);
+        }
+        let even = |per_side| RaySampling { per_side, ring: None, ..at.rays };
+        let all = (MEANS..=MOST_EVEN).map(|n| Resolution { rays: even(n), ..*at });
+        let among = self.pointed_to(here, all.collect(), |_| CLEAR)?;
+        self.lowest(here, among, CLEAR)
+    }
+
+    /// Returns whether the data are images and nobody has said which rays their pixels have.
+    fn has_open_rays(&self, seen: &SearchData) -> bool {
+        let screen = &self.file.screen;
+        seen.is_images() && screen.samples_per_pixel.is_none() && self.file.polarization.is_none()
     }
 
     /// Resolutions with finer sums over rays, along them and over pixels. Pixels of images have at most `most` rays along each
@@ -73,32 +115,80 @@ impl Detail<'_> {
     pub fn finer_sums(&self, place: &Place, most: usize) -> Vec<Resolution> {
         let Place { at, seen, .. } = place;
         let mut all = Vec::new();
-        let are_open = self.file.screen.samples_per_pixel.is_none();
-        if seen.is_images() && are_open && self.file.polarization.is_none() && at.rays < most {
-            all.push(Resolution { rays: 2 * at.rays, ..*at });
+        if self.has_open_rays(seen) && at.rays.per_side < most {
+            all.push(Resolution { rays: at.rays.denser(), ..*at });
         }
         if !seen.is_images() && self.measured.pulse == Pulse::Delta {
             let pixels = finer(at.pixels);
             let most = 2 * self.unknown.search.fine.pixels;
             all.extend((pixels <= most).then_some(Resolution { pixels, ..*at }));
         }
-        if (at.panels as usize) < MOST {
-            all.push(Resolution { panels: 2 * at.panels, ..*at });
+        if (at.rays.panels as usize) < MOST {
+            let rays = RaySampling { panels: 2 * at.rays.panels, ..at.rays };
+            all.push(Resolution { rays, ..*at });
         }
         all
     }
 
     /// The resolution with more voxels, which explain more in any case, where χ² is above its expectation: down to half a pixel,
-    /// and none where a prior says what is between them.
-    pub fn more_voxels(&self, here: &Solved) -> Result<Option<Resolution>> {
+    /// and none where a prior says what is between them, or `even` rays explain the data.
+    pub fn more_voxels(&self, here: &Solved, even: Option<&Solved>) -> Result<Option<Resolution>> {
         let Place { at, seen, .. } = &here.place;
         let nodes = finer(at.nodes);
         let (asks, degree) = self.through(&here.place, |problem| {
-            let excess = problem.excess(problem.scale * problem.reduced(here.best.chi2));
+            let chi2 = even.map_or(here.best.chi2, |even| even.best.chi2);
+            let excess = problem.excess(problem.scale * problem.reduced(chi2));
             Ok((excess > 0.0 && problem.gaussian.is_none(), problem.effort.degree))
         })?;
         let voxels = Voxels::cube(nodes, self.file.region.r_max, degree);
         let is_wide = voxels.shape().spacing[0] >= 0.5 * spacing(&seen.view.file.screen)?;
         Ok((asks && is_wide).then_some(Resolution { nodes, ..*at }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::journal::{Forgetful, Memory};
+    use crate::fit::settings::{
+        FitFile, GeometrySearch, Hole, Kind, SearchView, Spot, Truth, UnknownGeometry,
+    };
+    use crate::fit::setup::geometry::known_geometry;
+    use crate::fit::setup::{FitData, Instrument};
+
+    /// Returns the rays along each side of a pixel that are told from means, of images through so many.
+    fn told(per_side: usize) -> Option<usize> {
+        let spot = Spot { center: [4.5, 0.0, 0.0], sigma: 1.2, amplitude: 1.0, ..Spot::default() };
+        let truth = Truth { spot: vec![spot], ..Truth::default() };
+        let mut file = FitFile::new(Hole::new(0.6), 50.0, [2.0, 9.0], Kind::LinearGrid).simulating(
+            truth,
+            (4, 0.0, 40.0),
+            1e-3,
+        );
+        file.screen.pixels = 16;
+        let mut seen = file.clone();
+        seen.screen.samples_per_pixel = Some(per_side * per_side);
+        let instrument = Instrument::new(&seen).unwrap();
+        let measured = FitData::simulated(&seen, &instrument, None).unwrap();
+        let fine = SearchView { trials: 1, nodes: 24, iterations: 60, pixels: 16, frames: 4 };
+        let search = GeometrySearch { fine, ..GeometrySearch::default() };
+        let detail = Detail {
+            file: &file,
+            measured: &measured,
+            unknown: &UnknownGeometry { free: Vec::new(), search },
+            memory: Memory::new(&Forgetful),
+            scale: &|_| 1.0,
+        };
+        let first = detail.first(1.0).unwrap();
+        let means = Resolution { rays: first.at.rays.denser(), ..first.at };
+        let here = detail.solved(detail.place(means, 1.0).unwrap(), known_geometry(&file)).unwrap();
+        let matched = detail.matched(&here).unwrap();
+        matched.map(|there| there.place.at.rays.per_side)
+    }
+
+    /// Images of another program through an even lattice are told from means by the pixels that the photon ring crosses.
+    #[test]
+    fn exact_rays_of_another_program_are_told() {
+        assert_eq!([2, 3, 5].map(told), [Some(2), Some(3), Some(5)]);
     }
 }

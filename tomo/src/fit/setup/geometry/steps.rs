@@ -1,7 +1,7 @@
 //! Steps from the ends of all searches to the best geometry, through voxels, pixels and sums along rays as fine as the data ask
 //! for.
 
-use super::detail::{Detail, Detailed, Place, Sure, Trial};
+use super::detail::{Detail, Detailed, Place, RaySampling, Resolution, Sure, Trial};
 use super::posterior::{Resampled, polished, surely};
 use super::refinement::{MEANS, MOST, Solved};
 use crate::fit::geometry::{Estimate, Free, Geometry, Polished, TrialWatch};
@@ -56,7 +56,7 @@ impl Detail<'_> {
         let Some(near) = self.each(&place, None, &ends, watch)? else { return Ok(None) };
         let Some(best) = lowest(&near).cloned() else { return Ok(None) };
         let from = best.geometry();
-        let (place, refined) = self.refined(place, best)?;
+        let ((place, even), refined) = self.refined(place, best)?;
         let about = refined.geometry();
         let ends = near.iter().map(Stepped::geometry);
         let ends: Vec<Geometry> = ends.map(|end| if end == from { about } else { end }).collect();
@@ -71,8 +71,9 @@ impl Detail<'_> {
         let Some(best) = lowest(&all) else { return Ok(None) };
         let errors = (self.scale)(best.reduced / place.errors);
         let place = Place { errors, ..place };
-        let sure = self.sure(&place, best)?;
-        Ok(Some(Detailed { sure, errors, resolution: place.at }))
+        let sure = self.sure((&place, even), best)?;
+        let resolution = Resolution { rays: even.unwrap_or(place.at.rays), ..place.at };
+        Ok(Some(Detailed { sure, errors, resolution }))
     }
 
     /// Steps from each geometry, from those that are alike once, without the pixels near the critical curve of the best end or of
@@ -134,27 +135,40 @@ impl Detail<'_> {
         Ok(here.place)
     }
 
-    /// Returns the resolution that the data ask for, and the end of steps with it: these follow whenever it has become higher.
-    fn refined(&self, mut place: Place, mut best: Stepped) -> Result<(Place, Stepped)> {
+    /// Returns the resolution that the data ask for, with the even lattice of rays that explains them better than means do, and the
+    /// end of steps with it: these follow whenever it has become higher.
+    ///
+    /// Steps go through means in any case: values through a lattice that stays, of narrow images that move, have ripples in which
+    /// these end.
+    fn refined(
+        &self,
+        mut place: Place,
+        mut best: Stepped,
+    ) -> Result<((Place, Option<RaySampling>), Stepped)> {
         if !self.is_foreign()? {
-            return Ok((place, best));
+            return Ok(((place, None), best));
         }
         loop {
             let Estimate { geometry, x, .. } = &best.polished.best;
             let again = self.through(&place, |problem| problem.solve_from(*geometry, x))?;
             let here = Solved { best: again, place };
             // Whether pixels are means at all was decided where steps began: either model has minima of its own.
-            let rays = here.place.at.rays;
-            let mut among = self.finer_sums(&here.place, if rays > 1 { MOST } else { rays });
-            among.extend(self.more_voxels(&here)?);
-            let Some(there) = self.asked_for(&here, among)? else { return Ok((here.place, best)) };
+            let rays = here.place.at.rays.per_side;
+            let even = self.matched(&here)?;
+            let most = if rays > 1 && even.is_none() { MOST } else { rays };
+            let mut among = self.finer_sums(&here.place, most);
+            among.extend(self.more_voxels(&here, even.as_ref())?);
+            let Some(there) = self.asked_for(&here, among)? else {
+                let even = even.map(|even| even.place.at.rays);
+                return Ok(((here.place, even), best));
+            };
             best = self.stepped(&there.place, *geometry, &there.best)?;
             place = there.place;
         }
     }
 
     /// Returns the errors of the best geometry, with those that the model has of itself.
-    fn sure(&self, place: &Place, best: &Stepped) -> Result<Sure> {
+    fn sure(&self, (place, even): (&Place, Option<RaySampling>), best: &Stepped) -> Result<Sure> {
         let resampled: Resampled<'_> = Some((&place.seen, self.unknown, &place.view));
         let sure = self.smoothly(place, best.geometry(), |problem| {
             // Pixels of images that count are now those about this geometry.
@@ -165,6 +179,24 @@ impl Detail<'_> {
             };
             surely(problem, resampled, &polished, reduced)
         })?;
-        self.beside_its_own(place, sure)
+        let sure = self.beside_its_own((place, even), sure)?;
+        match even {
+            Some(rays) => {
+                self.moved(self.place(Resolution { rays, ..place.at }, place.errors)?, sure)
+            }
+            None => Ok(sure),
+        }
+    }
+
+    /// Goes on to where steps through the rays of the data lead: how far that is from the end through means is part of the errors.
+    fn moved(&self, place: Place, sure: Sure) -> Result<Sure> {
+        let (polished, reduced_chi2) = self.through(&place, |problem| {
+            let start = problem.solve(sure.geometry)?;
+            polished(problem, &start)
+        })?;
+        let geometry = polished.best.geometry;
+        let spread =
+            sure.spread.map(|spread| spread.moved(&self.unknown.free, geometry, "rays of pixels"));
+        Ok(Sure { geometry, spread, reduced_chi2 })
     }
 }
