@@ -53,6 +53,9 @@ pub(super) struct Place {
     pub view: SearchView,
     /// Factor of χ².
     pub errors: f64,
+    /// The rays of the data on an even lattice, where these explain images better than the means through which geometries are
+    /// compared.
+    pub even: Option<RaySampling>,
 }
 
 /// End of one search, in [`Geometry`]'s units.

@@ -17,7 +17,7 @@ const MOST: usize = 128;
 /// Errors that the model has of itself in a geometry that a search has found with χ²/N of `reduced`.
 pub(super) fn errors(
     of: (&FitFile, &UnknownGeometry),
-    (place, even): (&Place, Option<RaySampling>),
+    place: &Place,
     problem: &GeometryProblem<'_, f32>,
     (spread, reduced): (&Spread, f64),
 ) -> Result<ModelErrors> {
@@ -30,7 +30,7 @@ pub(super) fn errors(
         let standing = problem.standing(geometry)?;
         let voxels = voxels(&standing, problem)?;
         let sums = sums(&standing, problem)?;
-        let pixels = pixels(of, (place, even), &standing, problem)?;
+        let pixels = pixels(of, place, &standing, problem)?;
         let refined: Vec<Refined> = [voxels, sums, pixels].into_iter().flatten().collect();
         Ok(ModelErrors { known: standing.errors(problem.free, &refined), left_out: None })
     })
@@ -67,11 +67,12 @@ fn sums(standing: &Standing, problem: &GeometryProblem<'_, f32>) -> Result<Optio
     standing.refined(kind, &GeometryProblem { model: &model, ..*problem })
 }
 
-/// Images may be samples or means over pixels, or through `even` rays. Visibilities are those of a smooth image, whose sums converge faster than any
-/// power of the pixel, unless the data are known to have pixels. Polarised light is seen along single rays.
+/// Images may be samples or means over pixels, or have rays on an even lattice. Visibilities are those of a smooth image, whose
+/// sums converge faster than any power of the pixel, unless the data are known to have pixels. Polarised light is seen along single
+/// rays.
 fn pixels(
     (file, unknown): (&FitFile, &UnknownGeometry),
-    (Place { seen, at, view, errors }, even): (&Place, Option<RaySampling>),
+    Place { seen, at, view, errors, even }: &Place,
     standing: &Standing,
     problem: &GeometryProblem<'_, f32>,
 ) -> Result<Option<Refined>> {

@@ -40,7 +40,7 @@ impl Detail<'_> {
             false => about_volumes(&place.seen, problem, anchor, how, watch),
         })?;
         let Some(found) = found else { return Ok(None) };
-        let sure = self.beside_its_own((&place, None), found)?;
+        let sure = self.beside_its_own(&place, found)?;
         Ok(Some(Detailed { sure, errors, resolution: place.at }))
     }
 
@@ -57,7 +57,7 @@ impl Detail<'_> {
         let Resolution { nodes, pixels, .. } = at;
         let view = SearchView { nodes, pixels, ..self.unknown.search.fine };
         let seen = SearchData::finely(self.file, self.measured, &view)?;
-        Ok(Place { seen, at, view, errors })
+        Ok(Place { seen, at, view, errors, even: None })
     }
 
     /// Returns whether data are of another model than that of the fit.
@@ -65,19 +65,15 @@ impl Detail<'_> {
         Ok(self.file.data.is_some() || is_drawn_elsewhere(self.file)?)
     }
 
-    /// Adds the errors that the model has of itself, where data are of another one, perhaps through an even lattice of rays.
-    pub fn beside_its_own(
-        &self,
-        (place, even): (&Place, Option<RaySampling>),
-        sure: Sure,
-    ) -> Result<Sure> {
+    /// Adds the errors that the model has of itself, where data are of another one.
+    pub fn beside_its_own(&self, place: &Place, sure: Sure) -> Result<Sure> {
         let Some(spread) = &sure.spread else { return Ok(sure) };
         if !self.is_foreign()? {
             return Ok(sure);
         }
         let of = (self.file, self.unknown);
         let own = self.through(place, |problem| {
-            discretisation::errors(of, (place, even), problem, (spread, sure.reduced_chi2))
+            discretisation::errors(of, place, problem, (spread, sure.reduced_chi2))
         })?;
         let spread = sure.spread.map(|spread| spread.beside(&self.unknown.free, own));
         Ok(Sure { spread, ..sure })
@@ -89,7 +85,7 @@ impl Detail<'_> {
         place: &Place,
         work: impl FnOnce(&GeometryProblem<'_, f32>) -> Result<R>,
     ) -> Result<R> {
-        let Place { seen, at, view, errors } = place;
+        let Place { seen, at, view, errors, .. } = place;
         seen.with(self.unknown, view, (*errors, self.memory), |problem| {
             let model = seen_through(self.file, problem.model.clone(), at.rays)?;
             work(&GeometryProblem { model: &model, ..*problem })

@@ -1,7 +1,7 @@
 //! Steps from the ends of all searches to the best geometry, through voxels, pixels and sums along rays as fine as the data ask
 //! for.
 
-use super::detail::{Detail, Detailed, Place, RaySampling, Resolution, Sure, Trial};
+use super::detail::{Detail, Detailed, Place, Resolution, Sure, Trial};
 use super::posterior::{Resampled, polished, surely};
 use super::refinement::{MEANS, MOST, Solved};
 use crate::fit::geometry::{Estimate, Free, Geometry, Polished, TrialWatch};
@@ -56,7 +56,7 @@ impl Detail<'_> {
         let Some(near) = self.each(&place, None, &ends, watch)? else { return Ok(None) };
         let Some(best) = lowest(&near).cloned() else { return Ok(None) };
         let from = best.geometry();
-        let ((place, even), refined) = self.refined(place, best)?;
+        let (place, refined) = self.refined(place, best)?;
         let about = refined.geometry();
         let ends = near.iter().map(Stepped::geometry);
         let ends: Vec<Geometry> = ends.map(|end| if end == from { about } else { end }).collect();
@@ -71,8 +71,8 @@ impl Detail<'_> {
         let Some(best) = lowest(&all) else { return Ok(None) };
         let errors = (self.scale)(best.reduced / place.errors);
         let place = Place { errors, ..place };
-        let sure = self.sure((&place, even), best)?;
-        let resolution = Resolution { rays: even.unwrap_or(place.at.rays), ..place.at };
+        let sure = self.sure(&place, best)?;
+        let resolution = Resolution { rays: place.even.unwrap_or(place.at.rays), ..place.at };
         Ok(Some(Detailed { sure, errors, resolution }))
     }
 
@@ -140,13 +140,9 @@ impl Detail<'_> {
     ///
     /// Steps go through means in any case: values through a lattice that stays, of narrow images that move, have ripples in which
     /// these end.
-    fn refined(
-        &self,
-        mut place: Place,
-        mut best: Stepped,
-    ) -> Result<((Place, Option<RaySampling>), Stepped)> {
+    fn refined(&self, mut place: Place, mut best: Stepped) -> Result<(Place, Stepped)> {
         if !self.is_foreign()? {
-            return Ok(((place, None), best));
+            return Ok((place, best));
         }
         loop {
             let Estimate { geometry, x, .. } = &best.polished.best;
@@ -160,7 +156,7 @@ impl Detail<'_> {
             among.extend(self.more_voxels(&here, even.as_ref())?);
             let Some(there) = self.asked_for(&here, among)? else {
                 let even = even.map(|even| even.place.at.rays);
-                return Ok(((here.place, even), best));
+                return Ok((Place { even, ..here.place }, best));
             };
             best = self.stepped(&there.place, *geometry, &there.best)?;
             place = there.place;
@@ -168,7 +164,7 @@ impl Detail<'_> {
     }
 
     /// Returns the errors of the best geometry, with those that the model has of itself.
-    fn sure(&self, (place, even): (&Place, Option<RaySampling>), best: &Stepped) -> Result<Sure> {
+    fn sure(&self, place: &Place, best: &Stepped) -> Result<Sure> {
         let resampled: Resampled<'_> = Some((&place.seen, self.unknown, &place.view));
         let sure = self.smoothly(place, best.geometry(), |problem| {
             // Pixels of images that count are now those about this geometry.
@@ -179,8 +175,8 @@ impl Detail<'_> {
             };
             surely(problem, resampled, &polished, reduced)
         })?;
-        let sure = self.beside_its_own((place, even), sure)?;
-        match even {
+        let sure = self.beside_its_own(place, sure)?;
+        match place.even {
             Some(rays) => {
                 self.moved(self.place(Resolution { rays, ..place.at }, place.errors)?, sure)
             }
