@@ -3,7 +3,7 @@
 use kerrlight_tomo::fit::settings::{Loss, LossKind};
 use kerrlight_tomo::fit::setup::FitData;
 use kerrlight_vlbi::products::{ClosureCount, ClosureKind};
-use serde_json::{Value, json};
+use serde::Serialize;
 
 /// The counts of every loss of closure quantities.
 fn counts<'a>(measured: &FitData, losses: &'a [Loss]) -> Vec<(&'a Loss, ClosureCount)> {
@@ -38,16 +38,20 @@ pub fn sentences(measured: &FitData, losses: &[Loss]) -> Vec<String> {
     counts(measured, losses).iter().map(sentence).collect()
 }
 
-/// The same for results.json.
-pub fn json(measured: &FitData, losses: &[Loss]) -> Option<Value> {
-    let one = |(loss, count): &(&Loss, ClosureCount)| {
-        json!({
-            "data": loss.data.name(),
-            "used": count.used,
-            "possible": count.possible,
-            "of_scans": count.of_scans,
-        })
+/// Closure quantities of a loss, as results.json has them.
+#[derive(Serialize)]
+pub struct ClosureResults {
+    data: &'static str,
+    used: usize,
+    possible: usize,
+    of_scans: Option<usize>,
+}
+
+/// Returns them for results.json.
+pub fn results(measured: &FitData, losses: &[Loss]) -> Vec<ClosureResults> {
+    let one = |(loss, count): (&Loss, ClosureCount)| {
+        let ClosureCount { used, possible, of_scans } = count;
+        ClosureResults { data: loss.data.name(), used, possible, of_scans }
     };
-    let all: Vec<Value> = counts(measured, losses).iter().map(one).collect();
-    (!all.is_empty()).then(|| json!(all))
+    counts(measured, losses).into_iter().map(one).collect()
 }

@@ -2,6 +2,7 @@
 
 use crate::Complex64;
 use crate::observation::Observation;
+use serde::Serialize;
 use std::collections::HashMap;
 
 /// The gain of a station at a time.
@@ -84,7 +85,7 @@ const SAME_S: f64 = 0.5;
 
 /// Distance of gains from true ones, apart from what no data know: one factor on all amplitudes, which the flux takes up,
 /// and a phase that all stations of a time share.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct GainDistance {
     /// The factor on all amplitudes, taken out.
     pub scale: f64,

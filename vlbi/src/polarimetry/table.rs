@@ -7,6 +7,7 @@ use crate::Complex64;
 use crate::Error;
 use crate::array::Station;
 use crate::observation::{Basis, Observation, Row};
+use serde::Serialize;
 
 /// Leakage of a station.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,7 +29,7 @@ pub struct LeakageTable {
 }
 
 /// Distance of leakage from the true one.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LeakageDistance {
     /// Root mean square of |d − d_true|.
     pub rms: f64,

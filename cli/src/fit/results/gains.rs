@@ -12,7 +12,7 @@ use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::gains::{GainDistance, GainTable, StationGain};
 use kerrlight_vlbi::observation::{Observation, Row};
-use serde_json::{Value, json};
+use serde::Serialize;
 
 /// The table of all gains.
 const TABLE: &str = "gains.csv";
@@ -24,6 +24,27 @@ const CURVES: usize = 6;
 pub struct Gains {
     table: GainTable,
     distance: Option<GainDistance>,
+}
+
+/// The gains, as results.json has them.
+#[derive(Serialize)]
+pub struct GainResults {
+    file: &'static str,
+    stations: Vec<StationGains>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    beside_the_truth: Option<GainDistance>,
+}
+
+/// Gains of a station over all frames.
+#[derive(Serialize)]
+struct StationGains {
+    station: String,
+    scans: usize,
+    amplitude: f64,
+    scatter: f64,
+    amplitude_error: f64,
+    phase_error_deg: Option<f64>,
+    largest_log_amplitude: f64,
 }
 
 /// Own name of a station of the present file; none of stations of other files.
@@ -132,27 +153,19 @@ impl Gains {
     }
 
     /// Returns the gains for results.json.
-    pub fn json(&self) -> Value {
+    pub fn results(&self) -> GainResults {
         let has_phases = self.table.has_phases();
-        let station = |s: Summary<'_>| {
-            json!({
-                "station": s.station, "scans": s.scans, "amplitude": s.mean, "scatter": s.scatter,
-                "amplitude_error": s.errors[0],
-                "phase_error_deg": has_phases.then(|| s.errors[1].to_degrees()),
-                "largest_log_amplitude": s.largest,
-            })
+        let station = |s: Summary<'_>| StationGains {
+            station: s.station.to_owned(),
+            scans: s.scans,
+            amplitude: s.mean,
+            scatter: s.scatter,
+            amplitude_error: s.errors[0],
+            phase_error_deg: has_phases.then(|| s.errors[1].to_degrees()),
+            largest_log_amplitude: s.largest,
         };
-        let mut all = json!({
-            "file": TABLE,
-            "stations": self.summaries().into_iter().map(station).collect::<Vec<_>>(),
-        });
-        if let Some(distance) = self.distance {
-            all["beside_the_truth"] = json!({
-                "rms": distance.rms, "median": distance.median, "scale": distance.scale,
-                "count": distance.count,
-            });
-        }
-        all
+        let stations = self.summaries().into_iter().map(station).collect();
+        GainResults { file: TABLE, stations, beside_the_truth: self.distance }
     }
 
     /// Sentences for the report.

@@ -9,12 +9,31 @@ use kerrlight_common::frames::Frames;
 use kerrlight_tomo::fit::setup::FitData;
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::polarimetry::{LeakageDistance, LeakageTable, StationLeakage};
-use serde_json::{Value, json};
+use serde::Serialize;
 
 /// Leakage that was found.
 pub struct Leakage {
     table: LeakageTable,
     truth: Option<LeakageTable>,
+}
+
+/// The leakage, as results.json has it.
+#[derive(Serialize)]
+pub struct LeakageResults {
+    file: &'static str,
+    stations: Vec<StationTerms>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    beside_the_truth: Option<LeakageDistance>,
+}
+
+/// Real and imaginary parts of the terms of a station, with the standard deviation of each part.
+#[derive(Serialize)]
+struct StationTerms {
+    station: String,
+    d_r: [f64; 2],
+    d_r_error: f64,
+    d_l: [f64; 2],
+    d_l_error: f64,
 }
 
 impl Estimate<'_> {
@@ -50,21 +69,14 @@ impl Leakage {
     }
 
     /// Returns the leakage for results.json.
-    pub fn json(&self) -> Value {
+    pub fn results(&self) -> LeakageResults {
         let station = |s: &StationLeakage| {
-            json!({
-                "station": s.station,
-                "d_r": [s.terms[0].re, s.terms[0].im], "d_r_error": s.errors[0],
-                "d_l": [s.terms[1].re, s.terms[1].im], "d_l_error": s.errors[1],
-            })
+            let [d_r, d_l] = s.terms.map(|term| [term.re, term.im]);
+            let [d_r_error, d_l_error] = s.errors;
+            StationTerms { station: s.station.clone(), d_r, d_r_error, d_l, d_l_error }
         };
-        let stations: Vec<Value> = self.table.stations.iter().map(station).collect();
-        let mut all = json!({ "file": TABLE, "stations": stations });
-        if let Some(LeakageDistance { rms, largest, size, count }) = self.distance() {
-            all["beside_the_truth"] =
-                json!({ "rms": rms, "largest": largest, "size": size, "count": count });
-        }
-        all
+        let stations = self.table.stations.iter().map(station).collect();
+        LeakageResults { file: TABLE, stations, beside_the_truth: self.distance() }
     }
 
     /// Sentences for the report.

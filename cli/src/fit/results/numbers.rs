@@ -1,13 +1,15 @@
 //! Results in numbers.
 
 use super::bounds::Reached;
-use super::gains::Gains;
-use super::leakage::Leakage;
-use super::quiescent::Quiescent;
-use super::{Estimate, Found, verdict};
+use super::gains::{GainResults, Gains};
+use super::leakage::{Leakage, LeakageResults};
+use super::quiescent::{Quiescent, QuiescentResults};
+use super::verdict::VerdictResults;
+use super::{Estimate, Found};
 use crate::checksum::Sealed;
+use crate::fit::closures::{self, ClosureResults};
 use crate::fit::inputs::InputFile;
-use crate::fit::{band_search, closures, geometry_search, held_out, linear};
+use crate::fit::{band_search, geometry_search, held_out, linear};
 use crate::report;
 use crate::session;
 use crate::usage::usage;
@@ -17,7 +19,6 @@ use kerrlight_tomo::fit::settings::AxisSearch;
 use kerrlight_tomo::fit::{State, Trainer};
 use kerrlight_tomo::recovery::results::{BandResults, GeometryResults, HeldOutResults};
 use serde::Serialize;
-use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// Words on a truth without emission.
@@ -60,17 +61,17 @@ pub struct Results {
     pub chi2_per_datum: BTreeMap<String, f64>,
     axis: [f64; 3],
     inputs: Vec<InputFile>,
-    verdict: Value,
+    verdict: VerdictResults,
     #[serde(skip_serializing_if = "Option::is_none")]
     device: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     validation_chi2_per_datum: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    gains: Option<Value>,
+    gains: Option<GainResults>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    leakage: Option<Value>,
+    leakage: Option<LeakageResults>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    quiescent: Option<Value>,
+    quiescent: Option<QuiescentResults>,
     #[serde(skip_serializing_if = "Option::is_none")]
     mask_error: Option<f64>,
     rays_per_pixel: usize,
@@ -86,8 +87,8 @@ pub struct Results {
     /// The weight that was chosen by held-out data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<Sealed<HeldOutResults>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    closures: Option<Value>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    closures: Vec<ClosureResults>,
     /// The geometry, where it was not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub geometry: Option<Sealed<GeometryResults>>,
@@ -182,19 +183,19 @@ impl Estimate<'_> {
             chi2_per_datum: names.zip(found.loss.terms.iter().copied()).collect(),
             axis: now.axis.vector(),
             inputs: self.folder.inputs().files.clone(),
-            verdict: verdict::json(&found.judged),
+            verdict: VerdictResults::from(&found.judged),
             device: self.device.clone(),
             validation_chi2_per_datum: validation,
-            gains: found.gains.as_ref().map(Gains::json),
-            leakage: found.leakage.as_ref().map(Leakage::json),
-            quiescent: found.quiescent.as_ref().map(Quiescent::json),
+            gains: found.gains.as_ref().map(Gains::results),
+            leakage: found.leakage.as_ref().map(Leakage::results),
+            quiescent: found.quiescent.as_ref().map(Quiescent::results),
             mask_error: found.mask,
             rays_per_pixel: self.file.screen.samples_per_pixel.unwrap_or(1),
             quadrature_error: found.quadrature,
             advice: self.advice(found, &log),
             linear: linear::outcome(self.file, &log),
             held_out: held_out::found(self.folder)?,
-            closures: closures::json(self.measured, &self.file.loss),
+            closures: closures::results(self.measured, &self.file.loss),
             of_searches: errors.chain(numbers).collect(),
             geometry,
             band,

@@ -7,7 +7,8 @@ use kerrlight_render::polarization::StokesParameter;
 use kerrlight_tomo::fit::setup::Truth;
 use kerrlight_tomo::fit::{State, Trainer};
 use kerrlight_vlbi::files::images;
-use serde_json::{Value, json};
+use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// The images as arrays, as channels, and as a picture.
 const ARRAYS: &str = "quiescent.npz";
@@ -26,10 +27,30 @@ pub struct Quiescent {
     truth: Option<Vec<Vec<f32>>>,
 }
 
-/// Distance of an image from the truth.
+/// What does not move, as results.json has it.
+#[derive(Serialize)]
+pub struct QuiescentResults {
+    #[serde(flatten)]
+    images: BTreeMap<&'static str, ImageResults>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file: Option<&'static str>,
+}
+
+/// Light of one parameter.
+#[derive(Serialize)]
+struct ImageResults {
+    flux_jy: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    beside_the_truth: Option<Closeness>,
+}
+
+/// Distance of an image from the truth; nothing but the true flux of what is no image.
+#[derive(Serialize)]
 struct Closeness {
-    correlation: f64,
-    relative_error: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    correlation: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    relative_error: Option<f64>,
     flux_jy: f64,
 }
 
@@ -124,9 +145,11 @@ impl Quiescent {
         let (found, truth) = (double(found), double(truth));
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let apart: Vec<f64> = found.iter().zip(&truth).map(|(a, b)| a - b).collect();
+        let correlation = dot(&found, &truth) / (dot(&found, &found) * dot(&truth, &truth)).sqrt();
+        let relative_error = (dot(&apart, &apart) / dot(&truth, &truth)).sqrt();
         Some(Closeness {
-            correlation: dot(&found, &truth) / (dot(&found, &found) * dot(&truth, &truth)).sqrt(),
-            relative_error: (dot(&apart, &apart) / dot(&truth, &truth)).sqrt(),
+            correlation: (!self.is_flux).then_some(correlation),
+            relative_error: (!self.is_flux).then_some(relative_error),
             flux_jy: truth.iter().sum(),
         })
     }
@@ -136,24 +159,14 @@ impl Quiescent {
     }
 
     /// Returns its numbers for results.json.
-    pub fn json(&self) -> Value {
+    pub fn results(&self) -> QuiescentResults {
         let one = |k: usize| {
-            let name = self.images[k].0.name();
-            let mut value = json!({ "flux_jy": self.flux(k) });
-            if let Some(close) = self.closeness(k) {
-                value["beside_the_truth"] = json!({ "flux_jy": close.flux_jy });
-                if !self.is_flux {
-                    value["beside_the_truth"]["correlation"] = json!(close.correlation);
-                    value["beside_the_truth"]["relative_error"] = json!(close.relative_error);
-                }
-            }
-            (name.to_owned(), value)
+            let beside_the_truth = self.closeness(k);
+            let image = ImageResults { flux_jy: self.flux(k), beside_the_truth };
+            (self.images[k].0.name(), image)
         };
-        let mut all: serde_json::Map<String, Value> = (0..self.images.len()).map(one).collect();
-        if !self.is_flux {
-            all.insert("file".to_owned(), json!(ARRAYS));
-        }
-        Value::Object(all)
+        let images = (0..self.images.len()).map(one).collect();
+        QuiescentResults { images, file: (!self.is_flux).then_some(ARRAYS) }
     }
 
     /// Sentences for the report.
@@ -163,10 +176,14 @@ impl Quiescent {
         let what =
             if self.is_flux { "Fluxes that do not change" } else { "An image that does not move" };
         let mut all = vec![format!("{what} recovered beside the emission: {}.", fluxes.join(", "))];
-        if let (false, Some(close)) = (self.is_flux, self.closeness(0)) {
+        if let Some(Closeness {
+            correlation: Some(correlation),
+            relative_error: Some(error),
+            flux_jy,
+        }) = self.closeness(0)
+        {
             all.push(format!(
-                "Its correlation with the true one, which has {:.4} Jy, is {:.4}; the relative error is {:.3}.",
-                close.flux_jy, close.correlation, close.relative_error
+                "Its correlation with the true one, which has {flux_jy:.4} Jy, is {correlation:.4}; the relative error is {error:.3}."
             ));
         }
         all

@@ -6,77 +6,122 @@ pub mod parts;
 mod tests;
 
 use crate::report::{Notice, Table, Tone};
-use kerrlight_tomo::fit::verdict::{Errors, Outcome, Tested, worst};
+use kerrlight_tomo::fit::verdict::{Errors, Outcome, Part, Tested, ZeroSpacing, worst};
 pub use kerrlight_tomo::recovery::{DataVerdict, Evidence};
 use kerrlight_tomo::recovery::{range_of, short};
-use serde_json::{Value, json};
+use serde::Serialize;
+use std::collections::BTreeMap;
 
-/// Returns the verdict for results.json.
-pub fn json(judged: &DataVerdict) -> Value {
-    let outcome = match judged.verdict.outcome {
-        Outcome::Explained => "explained",
-        Outcome::Reproduced => "reproduced",
-        Outcome::FitsNoise => "fits-noise",
-        Outcome::Unexplained => "unexplained",
-    };
-    let reasons: Vec<String> = judged.reasons();
-    let mut all = json!({
-        "outcome": outcome,
-        "text": judged.headline(),
-        "reasons": reasons,
-        "data": judged.terms.iter().map(|(name, tested)| term(judged, name, tested)).collect::<Vec<_>>(),
-    });
-    if let Some(flux) = &judged.flux {
-        all["zero_spacing"] = json!({
-            "measured_jy": flux.measured_jy,
-            "error_jy": flux.error_jy,
-            "model_jy": flux.model_jy,
-            "visibilities": flux.count,
-        });
-    }
-    all
+/// The verdict, as results.json has it.
+#[derive(Serialize)]
+pub struct VerdictResults {
+    outcome: Outcome,
+    text: String,
+    reasons: Vec<String>,
+    data: Vec<TermResults>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    zero_spacing: Option<ZeroSpacing>,
 }
 
-fn term(judged: &DataVerdict, name: &str, tested: &Tested) -> Value {
-    let Tested { statistics, errors, expected } = tested;
-    let errors = match errors {
-        Errors::Known => "noise",
-        Errors::Stated => "stated",
-        Errors::Shared => "shared",
-        Errors::Assumed => "assumed",
-        Errors::Weight => "weight",
-    };
-    let mut term = json!({
-        "data": name,
-        "count": statistics.all.count,
-        "chi2_per_datum": statistics.chi2(),
-        "sigma_is": errors,
-        "mean": statistics.mean(),
-        "misfit": statistics.misfit(),
-        "correlation_in_time": statistics.in_time.correlation(),
-        "correlation_in_space": statistics.in_space.correlation(),
-    });
-    if tested.errors != Errors::Weight {
-        term["expected"] =
-            json!({ "mean": expected.chi2, "deviation": expected.spread, "taken": expected.taken });
+/// Residuals of one kind of data.
+#[derive(Serialize)]
+struct TermResults {
+    data: String,
+    count: usize,
+    chi2_per_datum: Option<f64>,
+    sigma_is: Errors,
+    mean: Option<f64>,
+    misfit: Option<f64>,
+    correlation_in_time: Option<f64>,
+    correlation_in_space: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    expected: Option<ExpectedChi2>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    worst_frame: Option<WorstFrame>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    worst_group: Option<WorstGroup>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    worst_station: Option<WorstStation>,
+    /// χ² per data point by station.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    stations: BTreeMap<String, Option<f64>>,
+}
+
+#[derive(Serialize)]
+struct ExpectedChi2 {
+    mean: f64,
+    deviation: f64,
+    taken: f64,
+}
+
+#[derive(Serialize)]
+struct WorstFrame {
+    frame: usize,
+    time: Option<f64>,
+    chi2_per_datum: f64,
+    count: usize,
+}
+
+#[derive(Serialize)]
+struct WorstGroup {
+    stations: String,
+    chi2_per_datum: f64,
+    count: usize,
+}
+
+#[derive(Serialize)]
+struct WorstStation {
+    station: String,
+    chi2_per_datum: f64,
+    count: usize,
+}
+
+impl From<&DataVerdict> for VerdictResults {
+    fn from(judged: &DataVerdict) -> Self {
+        let term = |(name, tested): &(String, Tested)| TermResults::new(judged, name, tested);
+        Self {
+            outcome: judged.verdict.outcome,
+            text: judged.headline(),
+            reasons: judged.reasons(),
+            data: judged.terms.iter().map(term).collect(),
+            zero_spacing: judged.flux,
+        }
     }
-    if let Some((frame, part, chi2)) = worst(statistics.frames.iter().enumerate()) {
-        let time = judged.times.get(frame);
-        term["worst_frame"] =
-            json!({ "frame": frame, "time": time, "chi2_per_datum": chi2, "count": part.count });
+}
+
+impl TermResults {
+    fn new(judged: &DataVerdict, name: &str, tested: &Tested) -> Self {
+        let Tested { statistics, errors, expected } = tested;
+        let expected =
+            ExpectedChi2 { mean: expected.chi2, deviation: expected.spread, taken: expected.taken };
+        let frame = worst(statistics.frames.iter().enumerate());
+        let station =
+            |(station, part): (&u16, &Part)| (judged.names(&[*station]), part.per_datum());
+        Self {
+            data: name.to_owned(),
+            count: statistics.all.count,
+            chi2_per_datum: statistics.chi2(),
+            sigma_is: *errors,
+            mean: statistics.mean(),
+            misfit: statistics.misfit(),
+            correlation_in_time: statistics.in_time.correlation(),
+            correlation_in_space: statistics.in_space.correlation(),
+            expected: (*errors != Errors::Weight).then_some(expected),
+            worst_frame: frame.map(|(frame, part, chi2_per_datum)| {
+                let time = judged.times.get(frame).copied();
+                WorstFrame { frame, time, chi2_per_datum, count: part.count }
+            }),
+            worst_group: worst(statistics.groups.iter()).map(|(group, part, chi2_per_datum)| {
+                let stations = judged.names(group);
+                WorstGroup { stations, chi2_per_datum, count: part.count }
+            }),
+            worst_station: worst(statistics.stations.iter()).map(|(at, part, chi2_per_datum)| {
+                let station = judged.names(&[*at]);
+                WorstStation { station, chi2_per_datum, count: part.count }
+            }),
+            stations: statistics.stations.iter().map(station).collect(),
+        }
     }
-    if let Some((stations, part, chi2)) = worst(statistics.groups.iter()) {
-        let names = judged.names(stations);
-        term["worst_group"] =
-            json!({ "stations": names, "chi2_per_datum": chi2, "count": part.count });
-    }
-    if let Some((station, part, chi2)) = worst(statistics.stations.iter()) {
-        let name = judged.names(&[*station]);
-        term["worst_station"] =
-            json!({ "station": name, "chi2_per_datum": chi2, "count": part.count });
-        term["stations"] = json!(parts::station_values(judged, tested));
-    }
-    term
 }
 
 /// Returns the notice at the top of the page.

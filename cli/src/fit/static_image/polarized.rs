@@ -1,7 +1,7 @@
 //! The linear polarisation of a static image: numbers and sentences.
 
 use super::numbers::with_error;
-use crate::fit::results::leakage::Leakage;
+use crate::fit::results::leakage::{Leakage, LeakageResults};
 use crate::report::{Axis, LinePlot, Marks, Outcome, Series};
 use anyhow::Context;
 use kerrlight_imaging::settings::{StaticImageFile, StaticPolarization};
@@ -11,7 +11,6 @@ use kerrlight_tomo::fit::settings::LossKind;
 use kerrlight_tomo::fit::setup::{FitData, best_held};
 use kerrlight_tomo::fit::verdict::{Errors, Statistics, Tested};
 use serde::Serialize;
-use serde_json::Value;
 
 /// A number: its key and period in results.json, name, unit, digits, and meaning.
 struct Number {
@@ -170,8 +169,8 @@ impl Polarized {
     }
 
     /// The leakage of stations for results.json, where it was solved for.
-    pub fn leakage(&self) -> Option<Value> {
-        self.leakage.as_ref().map(Leakage::json)
+    pub fn leakage(&self) -> Option<LeakageResults> {
+        self.leakage.as_ref().map(Leakage::results)
     }
 
     /// The page's numbers.

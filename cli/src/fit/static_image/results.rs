@@ -3,16 +3,16 @@
 use super::Found;
 use super::numbers::{Number, RING, chi2_of_draws, of_ring};
 use super::polarized::{Polarized, PolarizedNumbers};
-use crate::fit::closures;
+use crate::fit::closures::{self, ClosureResults};
 use crate::fit::inputs::InputFile;
-use crate::fit::results::gains::Gains;
-use crate::fit::results::verdict;
+use crate::fit::results::gains::{GainResults, Gains};
+use crate::fit::results::leakage::LeakageResults;
+use crate::fit::results::verdict::VerdictResults;
 use crate::session;
 use crate::usage::usage;
 use kerrlight_imaging::{Candidate, ShapeFit};
 use kerrlight_tomo::fit::setup::Held;
 use serde::Serialize;
-use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// All numbers of a static image, as results.json has them; what was not asked for is left out.
@@ -30,7 +30,7 @@ pub struct Results {
     chi2_not_fitted: BTreeMap<&'static str, f64>,
     chi2_of_draws: BTreeMap<&'static str, OfDraws>,
     inputs: Vec<InputFile>,
-    verdict: Value,
+    verdict: VerdictResults,
     /// All light of the field, Jy.
     pub flux_jy: f64,
     /// Its standard deviation.
@@ -41,16 +41,16 @@ pub struct Results {
     strengths: Vec<ImageNumbers>,
     draws: Vec<ImageNumbers>,
     has_converged: bool,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    closures: Option<Value>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    closures: Vec<ClosureResults>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     held_out: Vec<HeldLoss>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    gains: Option<Value>,
+    gains: Option<GainResults>,
     #[serde(skip_serializing_if = "Option::is_none")]
     polarization: Option<PolarizedNumbers>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    leakage: Option<Value>,
+    leakage: Option<LeakageResults>,
     shapes: Vec<ShapeNumbers>,
     images_with_ring: WithRing,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -171,7 +171,7 @@ impl Found<'_> {
                 .zip(chi2_of_draws(&self.survey).into_iter().map(drawn))
                 .collect(),
             inputs: self.folder.inputs().files.clone(),
-            verdict: verdict::json(&self.judged),
+            verdict: VerdictResults::from(&self.judged),
             flux_jy: found.solution.image.iter().sum(),
             flux_error_jy: self.survey.flux_error(),
             strength: self.survey.strength,
@@ -180,9 +180,9 @@ impl Found<'_> {
             strengths: all(&self.survey.strengths),
             draws: all(&self.survey.draws),
             has_converged: found.solution.has_converged,
-            closures: closures::json(self.measured, &self.file.loss),
+            closures: closures::results(self.measured, &self.file.loss),
             held_out: self.survey.held.iter().map(held).collect(),
-            gains: self.gains.as_ref().map(Gains::json),
+            gains: self.gains.as_ref().map(Gains::results),
             polarization: polarized.map(PolarizedNumbers::from),
             leakage: polarized.and_then(Polarized::leakage),
             shapes: self.shapes.iter().map(ShapeNumbers::from).collect(),

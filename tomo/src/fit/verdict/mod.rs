@@ -11,6 +11,7 @@ mod statistics;
 mod tests;
 
 pub use predictive::Predicted;
+use serde::Serialize;
 pub use statistics::{Pairs, Part, PixelSum, Statistics};
 
 /// Standard deviations of χ² that chance is granted: 5 of them come about once in a million.
@@ -33,9 +34,11 @@ pub const MISFIT: f64 = 0.1;
 pub const FLUX: f64 = 0.1;
 
 /// Meaning of σ of the data.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Errors {
     /// The noise that was added to a simulation.
+    #[serde(rename = "noise")]
     Known,
     /// Errors that measured data state, with whatever was added for calibration.
     Stated,
@@ -118,7 +121,7 @@ impl Tested {
 }
 
 /// Total flux where baselines are too short to resolve anything: mean over the frames that have them, Jy.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ZeroSpacing {
     /// Flux of the data.
     pub measured_jy: f64,
@@ -127,11 +130,13 @@ pub struct ZeroSpacing {
     /// Flux of the model in the same frames.
     pub model_jy: f64,
     /// Visibilities that it is a mean of.
+    #[serde(rename = "visibilities")]
     pub count: usize,
 }
 
 /// Verdict on a fit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Outcome {
     /// All residuals are as expected.
     Explained,

@@ -120,14 +120,3 @@ pub fn by_station(judged: &DataVerdict) -> Option<Table> {
         links: Vec::new(),
     })
 }
-
-/// Returns χ² per data point by station, for results.json.
-pub(super) fn station_values(
-    judged: &DataVerdict,
-    tested: &Tested,
-) -> serde_json::Map<String, serde_json::Value> {
-    let of = |(station, part): (&u16, &Part)| {
-        (judged.names(&[*station]), serde_json::json!(part.per_datum()))
-    };
-    tested.statistics.stations.iter().map(of).collect()
-}

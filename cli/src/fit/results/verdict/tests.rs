@@ -59,7 +59,7 @@ fn exact_a_faint_truth_explains_visibilities_and_amplitudes() {
 fn exact_another_flux_does_not_explain_visibilities() {
     for scale in [0.95, 1.05] {
         let judged = of_truth(&[], scale);
-        let json = json(&judged);
+        let json = serde_json::to_value(VerdictResults::from(&judged)).unwrap();
         assert_eq!(json["outcome"], "unexplained", "{json}");
         assert!(json["data"][0]["chi2_per_datum"].as_f64().unwrap() > 1.1, "{json}");
         assert_eq!(json["data"][0]["sigma_is"], "noise");
