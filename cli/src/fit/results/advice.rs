@@ -1,11 +1,14 @@
 //! Settings to raise where a fit does not explain its data, or where its sums are too coarse for them, and by how much.
 
 use super::{Estimate, Found, quadrature};
+use core::f64::consts::PI;
 use kerrlight_tomo::fit::settings::{FitFile, Kind};
 use kerrlight_tomo::fit::setup::spacing;
 use kerrlight_tomo::fit::verdict::Outcome;
 use serde_json::Value;
 
+/// Pixels in the shortest period of an encoding, at most.
+const SHORT: f64 = 2.0;
 /// Decrease of the mean loss from a third of the steps to the next one from which on more steps would help.
 const FALLING: f64 = 0.03;
 /// Standard deviations of the difference of two means that count as chance.
@@ -22,7 +25,8 @@ impl Estimate<'_> {
             return sums.into_iter().collect();
         }
         let losses: Vec<f64> = log.iter().filter_map(|line| line["loss"].as_f64()).collect();
-        sums.into_iter().chain(voxels(self.file)).chain(steps(self.file, &losses)).collect()
+        let detail = voxels(self.file).or_else(|| encoding(self.file));
+        sums.into_iter().chain(detail).chain(steps(self.file, &losses)).collect()
     }
 }
 
@@ -40,6 +44,24 @@ fn voxels(file: &FitFile) -> Option<String> {
         let wide = width / (nodes - 1) as f64 / pixel;
         format!(
             "Voxels are {wide:.2} pixels wide: representation.{key}.nodes = {enough} makes them half a pixel."
+        )
+    })
+}
+
+/// A positional encoding whose shortest period is above two pixels: a network learns what is smaller slowly, if at all.
+fn encoding(file: &FitFile) -> Option<String> {
+    let representation = &file.representation;
+    if !matches!(representation.kind, Kind::Bhnerf | Kind::Mlp4d) {
+        return None;
+    }
+    let network = &representation.network;
+    let longest = 2.0 * PI * network.length_scale / spacing(&file.screen).ok()?;
+    let shortest = longest / 2f64.powi(network.degree as i32 - 1);
+    let enough = 1 + (longest / SHORT).log2().ceil().max(0.0) as usize;
+    (network.degree < enough).then(|| {
+        format!(
+            "The shortest period of the network's encoding is {shortest:.1} pixels: representation.network.degree = {enough} makes it \
+             {SHORT} or less."
         )
     })
 }
@@ -91,6 +113,21 @@ mod tests {
         let said = of("representation.linear-grid.nodes=33").unwrap();
         assert!(said.contains("1.00 pixels wide") && said.contains("nodes = 65 "), "{said}");
         assert_eq!(of("representation.linear-grid.nodes=65"), None);
+    }
+
+    /// 2π · 2 M/2² in pixels of 26/32 M.
+    #[test]
+    fn exact_long_periods_are_named_with_their_degree() {
+        let of = |kind: &str, degree: &str| {
+            encoding(&file(&[kind, degree, "screen.pixels=32", "screen.width=26"]))
+        };
+        let [three, four] = [3, 4].map(|degree| format!("representation.network.degree={degree}"));
+        for kind in ["representation=bhnerf", "representation=mlp4d"] {
+            let said = of(kind, &three).unwrap();
+            assert!(said.contains("is 3.9 pixels") && said.contains("degree = 4 "), "{said}");
+            assert_eq!(of(kind, &four), None);
+        }
+        assert_eq!(of("representation=grid", &three), None);
     }
 
     #[test]
