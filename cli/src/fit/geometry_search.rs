@@ -22,7 +22,7 @@ pub fn chosen(folder: &Folder, file: &FitFile) -> anyhow::Result<Option<Choice>>
     results.lines().iter().for_each(|line| eprintln!("{line}"));
     let geometry = results.geometry_in(file, &unknown.free);
     let geometry = geometry.with_context(|| folder.damaged(FILE))?;
-    Ok(Some(Choice::Geometry { geometry, rays: results.rays() }))
+    Ok(Some(Choice::Geometry { geometry, resolution: results.resolution.into() }))
 }
 
 /// Geometries of one of the coarse searches at most.

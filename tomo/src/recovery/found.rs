@@ -5,7 +5,7 @@ use crate::fit::FluxDatum;
 use crate::fit::geometry::Geometry;
 use crate::fit::scan::{AxisLoss, AxisScan};
 use crate::fit::settings::{FitFile, UnknownGeometry};
-use crate::fit::setup::{self, BandScan, FoundGeometry, Held, RaySampling};
+use crate::fit::setup::{self, BandScan, FoundGeometry, Held, Resolution};
 use kerrlight_render::dynamics::Axis;
 
 /// Stage before the emission is fitted.
@@ -50,8 +50,8 @@ pub enum Choice {
     Geometry {
         /// Spin, direction of the observer and parameters of the flow.
         geometry: Geometry,
-        /// Rays through which it was found.
-        rays: RaySampling,
+        /// Resolution at which it was found.
+        resolution: Resolution,
     },
     /// The best band.
     Band {
@@ -73,7 +73,7 @@ impl Found<'_> {
     pub fn choice(&self) -> Choice {
         match self {
             Found::Geometry(_, _, found) => {
-                Choice::Geometry { geometry: found.geometry, rays: found.resolution.rays }
+                Choice::Geometry { geometry: found.geometry, resolution: found.resolution }
             }
             Found::Band(_, scan) => {
                 let best = &scan.geometries[scan.best];

@@ -43,8 +43,9 @@ impl ResolvedFit {
     fn of(problem: &Problem, choice: &Choice) -> Result<Option<Self>, Error> {
         let Problem { settings, measured, .. } = problem;
         let placed = match choice {
-            Choice::Geometry { geometry, rays } => {
-                Self::in_geometry(problem, settings, geometry, *rays)?
+            Choice::Geometry { geometry, resolution } => {
+                let file = setup::with_voxels(settings.clone(), resolution.nodes);
+                Self::in_geometry(problem, &file, geometry, resolution.rays)?
             }
             Choice::Band { inclination_deg, position_angle_deg, rotation_factor, background } => {
                 let mut file = setup::in_band_geometry(settings, *inclination_deg);

@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::fit::BatchSize;
-use crate::fit::settings::{Spot, Start, Truth};
+use crate::fit::geometry::Geometry;
+use crate::fit::settings::{PriorSettings, Spot, Start, Truth};
+use crate::fit::setup::{RaySampling, Resolution};
 use kerrlight_vlbi::simulate::Movie;
 
 fn settings(kind: Kind) -> FitFile {
@@ -81,4 +83,28 @@ fn exact_settings_without_data_name_what_is_missing() {
     let bare = FitFile::new(hole, 40.0, [3.0, 9.0], Kind::LinearGrid);
     let error = Problem::simulated(bare, None).err().unwrap().to_string();
     assert!(error.contains("truth"), "{error}");
+}
+
+/// Has found a geometry with so many voxels.
+struct Chosen(usize);
+
+impl Progress for Chosen {
+    fn chosen(&mut self, _: Stage) -> Result<Option<Choice>, Error> {
+        let geometry = Geometry::new(0.5, 40f64.to_radians());
+        let resolution = Resolution { nodes: self.0, pixels: 10, rays: RaySampling::default() };
+        Ok(Some(Choice::Geometry { geometry, resolution }))
+    }
+}
+
+/// Emission is solved for with as many voxels as the data asked a search for, and no fewer than the settings say.
+#[test]
+fn exact_voxels_of_a_search_are_those_of_the_fit() {
+    let mut settings = settings(Kind::LinearGrid);
+    settings.observer.inclination_deg = PriorSettings::Uniform([30.0, 50.0]).into();
+    settings.simulation.as_mut().unwrap().drawn = true;
+    let problem = Problem::simulated(settings, None).unwrap();
+    for (of_search, expected) in [(13, 13), (8, 10)] {
+        let recovery = fit(&problem, &mut Chosen(of_search)).unwrap();
+        assert_eq!(recovery.state.now.parameters.len(), expected * expected * expected);
+    }
 }

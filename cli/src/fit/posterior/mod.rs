@@ -20,7 +20,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use kerrlight_render::volume::{Volume, VolumeFile};
 use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, UnknownGeometry};
-use kerrlight_tomo::fit::setup::{GeometryPosterior, RaySampling};
+use kerrlight_tomo::fit::setup::{GeometryPosterior, RaySampling, Resolution, with_voxels};
 use kerrlight_tomo::recovery::results::{GeometryResults, PerParameter};
 use kerrlight_tomo::recovery::{Problem, ResolvedFit};
 use kerrlight_tomo::representation::Registry;
@@ -276,7 +276,12 @@ impl<'a> Drawing<'a> {
             None => noise_of(folder)?,
         };
         let file = held_out::settled(&prepared.settings, folder)?;
-        let rays = geometry.as_ref().map(|geometry| geometry.rays()).unwrap_or_default();
+        let found = geometry.as_ref().map(|geometry| Resolution::from(geometry.resolution));
+        let file = match found {
+            Some(found) => with_voxels(file, found.nodes),
+            None => file,
+        };
+        let rays = found.map(|found| found.rays).unwrap_or_default();
         Ok(Self { prepared, file, unknown, geometries, rays, factor })
     }
 

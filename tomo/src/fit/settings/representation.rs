@@ -96,7 +96,7 @@ pub struct Grid {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LinearGrid {
-    /// Nodes along each axis, 2^30 in all at most.
+    /// Nodes along each axis, 2^30 in all at most; after a search for the geometry as many as it needed, if these are more.
     #[schemars(range(min = 2, max = 2048), extend("unit" = "nodes along each axis"))]
     pub nodes: usize,
 }

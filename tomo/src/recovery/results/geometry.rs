@@ -150,12 +150,6 @@ impl GeometryResults {
         })
     }
 
-    /// Returns the rays that the best geometry was looked at through.
-    pub fn rays(&self) -> RaySampling {
-        let ResolutionResults { rays_per_pixel, ring_rays: ring, panels, .. } = self.resolution;
-        RaySampling { per_side: rays_per_pixel.isqrt(), ring, panels, lattice: 0 }
-    }
-
     /// Returns the best geometry, with what is known of the settings; none if it lacks a free parameter.
     pub fn geometry_in(&self, file: &FitFile, free: &[Free]) -> Option<Geometry> {
         free.iter().try_fold(setup::known_geometry(file), |geometry, Free { parameter, .. }| {
@@ -180,6 +174,14 @@ impl GeometryResults {
             trials: 0,
             own: ModelErrors::default(),
         })
+    }
+}
+
+impl From<ResolutionResults> for Resolution {
+    fn from(results: ResolutionResults) -> Self {
+        let ResolutionResults { nodes, pixels, rays_per_pixel, ring_rays: ring, panels } = results;
+        let rays = RaySampling { per_side: rays_per_pixel.isqrt(), ring, panels, lattice: 0 };
+        Self { nodes, pixels, rays }
     }
 }
 
