@@ -2,7 +2,7 @@
 
 use super::{Estimate, Found, quadrature};
 use core::f64::consts::PI;
-use kerrlight_tomo::fit::settings::{FitFile, Kind};
+use kerrlight_tomo::fit::settings::{FitFile, Kind, LossKind};
 use kerrlight_tomo::fit::setup::spacing;
 use kerrlight_tomo::fit::verdict::Outcome;
 use serde_json::Value;
@@ -51,7 +51,9 @@ fn voxels(file: &FitFile) -> Option<String> {
 /// A positional encoding whose shortest period is above two pixels: a network learns what is smaller slowly, if at all.
 fn encoding(file: &FitFile) -> Option<String> {
     let representation = &file.representation;
-    if !matches!(representation.kind, Kind::Bhnerf | Kind::Mlp4d) {
+    // Pixels are the resolution of images alone.
+    let are_images = file.loss.iter().all(|loss| loss.data == LossKind::Image);
+    if !are_images || !matches!(representation.kind, Kind::Bhnerf | Kind::Mlp4d) {
         return None;
     }
     let network = &representation.network;
@@ -119,7 +121,8 @@ mod tests {
     #[test]
     fn exact_long_periods_are_named_with_their_degree() {
         let of = |kind: &str, degree: &str| {
-            encoding(&file(&[kind, degree, "screen.pixels=32", "screen.width=26"]))
+            let loss = "loss=[{data=\"image\",weight=1.0}]";
+            encoding(&file(&[kind, degree, loss, "screen.pixels=32", "screen.width=26"]))
         };
         let [three, four] = [3, 4].map(|degree| format!("representation.network.degree={degree}"));
         for kind in ["representation=bhnerf", "representation=mlp4d"] {
@@ -128,6 +131,8 @@ mod tests {
             assert_eq!(of(kind, &four), None);
         }
         assert_eq!(of("representation=grid", &three), None);
+        // The built-in fit is one of visibilities.
+        assert_eq!(encoding(&file(&["representation=bhnerf", &three])), None);
     }
 
     #[test]
