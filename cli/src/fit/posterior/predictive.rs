@@ -51,7 +51,10 @@ fn check(data: &str, draws: &[Kept]) -> Option<Check> {
 impl Check {
     /// Describes it, in words.
     pub fn sentence(&self) -> String {
-        let name = self.data.replace('-', " ");
+        let name = match self.data.as_str() {
+            "image" => "images".to_owned(),
+            name => name.replace('-', " "),
+        };
         let least = [Some(self.larger_chi2), self.larger_on_a_baseline, self.larger_in_a_frame];
         let least = least.into_iter().flatten().fold(1.0, f64::min);
         let chi2 = self.chi2_per_datum;
