@@ -44,7 +44,7 @@ impl ResolvedFit {
         let Problem { settings, measured, .. } = problem;
         let placed = match choice {
             Choice::Geometry { geometry, resolution } => {
-                let file = setup::with_voxels(settings.clone(), resolution.nodes);
+                let file = resolution.refined(settings.clone());
                 Self::in_geometry(problem, &file, geometry, resolution.rays)?
             }
             Choice::Band { inclination_deg, position_angle_deg, rotation_factor, background } => {

@@ -20,7 +20,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use kerrlight_render::volume::{Volume, VolumeFile};
 use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, UnknownGeometry};
-use kerrlight_tomo::fit::setup::{GeometryPosterior, RaySampling, Resolution, with_voxels};
+use kerrlight_tomo::fit::setup::{GeometryPosterior, RaySampling, Resolution};
 use kerrlight_tomo::recovery::results::{GeometryResults, PerParameter};
 use kerrlight_tomo::recovery::{Problem, ResolvedFit};
 use kerrlight_tomo::representation::Registry;
@@ -278,7 +278,7 @@ impl<'a> Drawing<'a> {
         let file = held_out::settled(&prepared.settings, folder)?;
         let found = geometry.as_ref().map(|geometry| Resolution::from(geometry.resolution));
         let file = match found {
-            Some(found) => with_voxels(file, found.nodes),
+            Some(found) => found.refined(file),
             None => file,
         };
         let rays = found.map(|found| found.rays).unwrap_or_default();

@@ -45,7 +45,7 @@ pub use drawn::{Drawn, OtherModel};
 pub use fit_data::FitData;
 pub use geometry::{
     FoundGeometry, GeometryPosterior, RaySampling, Resolution, SearchWatch, Trial, find_geometry,
-    in_geometry, known_geometry, rays_of_data, through, true_geometry, with_voxels,
+    in_geometry, known_geometry, rays_of_data, through, true_geometry,
 };
 pub use held_out::{Held, HeldWatch, best as best_held, check_folds, hold_out};
 pub use imported::Reduction;

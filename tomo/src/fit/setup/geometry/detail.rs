@@ -17,6 +17,16 @@ pub struct Resolution {
     pub rays: RaySampling,
 }
 
+impl Resolution {
+    /// Returns the settings with as many voxels that are solved for, if they have fewer.
+    #[must_use]
+    pub fn refined(&self, mut file: FitFile) -> FitFile {
+        let grid = &mut file.representation.linear_grid;
+        grid.nodes = grid.nodes.max(self.nodes);
+        file
+    }
+}
+
 /// Rays through which a fit sees a geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RaySampling {

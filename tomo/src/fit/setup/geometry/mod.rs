@@ -13,7 +13,7 @@ mod tangent;
 
 pub use detail::{RaySampling, Resolution, Trial};
 pub use posterior::GeometryPosterior;
-pub use rays_of_data::{rays_of_data, through, with_voxels};
+pub use rays_of_data::{rays_of_data, through};
 pub use search::{FoundGeometry, SearchWatch, find_geometry};
 
 use super::instrument::ring;

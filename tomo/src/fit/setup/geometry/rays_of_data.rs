@@ -80,14 +80,6 @@ impl Detail<'_> {
     }
 }
 
-/// The settings with so many voxels that are solved for along each axis, if they have fewer.
-#[must_use]
-pub fn with_voxels(mut file: FitFile, nodes: usize) -> FitFile {
-    let grid = &mut file.representation.linear_grid;
-    grid.nodes = grid.nodes.max(nodes);
-    file
-}
-
 /// The settings with these rays. What settings say of the rays of a pixel stays.
 #[must_use]
 pub fn through(mut file: FitFile, rays: RaySampling) -> FitFile {
