@@ -40,15 +40,17 @@ pub struct Survey {
     /// Images of the measurement of the image with other noise.
     pub draws: Vec<Candidate>,
     /// Images of a known sky; none without simple shapes.
-    pub calibration: Option<Calibration>,
+    pub known_sky: Option<Calibration>,
 }
 
 /// A simple shape that fits the same data, and images of measurements of that shape: what the method makes of a known sky. The shape
 /// is the best one with a hole where the image has a ring, and the best of all otherwise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
-    /// Flux of the shape, Jy.
-    pub flux_jy: f64,
+    /// Pixels of the shape, Jy.
+    pub shape: Vec<f64>,
+    /// True if the shape explains the data.
+    pub explains: bool,
     /// Ring of the shape, where it has one.
     pub ring: Option<Ring>,
     /// The images.
@@ -56,20 +58,32 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// Mean of a number of the images that have it and came to a minimum, with its standard error; none if fewer than two do.
-    fn mean(&self, number: impl Fn(&Candidate) -> Option<f64>) -> Option<(f64, f64)> {
-        let at_minimum = self.images.iter().filter(|image| image.solution.has_converged);
-        let all: Vec<f64> = at_minimum.filter_map(number).collect();
+    /// Images at a minimum: others say nothing of the method.
+    pub fn at_minimum(&self) -> impl Iterator<Item = &Candidate> {
+        self.images.iter().filter(|image| image.solution.has_converged)
+    }
+
+    /// What the method adds to a number, with its error, over the images that have it; none if fewer than two do. The error is that of
+    /// the mean; to a sky that is not like the shape the method may add anything from half to one and a half times as much.
+    fn added(&self, number: &Number<'_>) -> Option<(f64, f64)> {
+        let of_shape = number(&self.shape, self.ring.as_ref())?;
+        let all: Vec<f64> = self.at_minimum().filter_map(|image| image.number(number)).collect();
         let count = all.len() as f64;
         let mean = all.iter().sum::<f64>() / count;
         let square: f64 = all.iter().map(|one| (one - mean).powi(2)).sum();
-        (all.len() >= 2).then(|| (mean, (square / (count * (count - 1.0))).sqrt()))
+        let of_mean = (square / (count * (count - 1.0))).sqrt();
+        let added = mean - of_shape;
+        let of_sky = if self.explains { 0.0 } else { added / 12f64.sqrt() };
+        (all.len() >= 2).then(|| (added, of_mean.hypot(of_sky)))
     }
+}
 
-    /// Diameter that the method adds to a ring, µas, with its standard error.
-    fn added_diameter(&self) -> Option<(f64, f64)> {
-        let (found, error) = self.mean(|image| image.ring.map(|ring| ring.diameter_uas))?;
-        Some((found - self.ring?.diameter_uas, error))
+/// A number of the pixels of an image, Jy, and of its ring, where it has one.
+type Number<'a> = dyn Fn(&[f64], Option<&Ring>) -> Option<f64> + 'a;
+
+impl Candidate {
+    fn number(&self, number: &Number<'_>) -> Option<f64> {
+        number(&self.solution.image, self.ring.as_ref())
     }
 }
 
@@ -110,26 +124,33 @@ impl Survey {
     /// Diameter of the ring in µas, less what the method adds to that of the best simple shape, and its error where that is known:
     /// a blurred ring is smaller. An image that is not at a minimum is taken as it is.
     pub fn ring_diameter(&self) -> Option<(f64, Option<f64>)> {
-        let here = self.found().ring?.diameter_uas;
-        let error = self.ring_error(|ring| ring.diameter_uas);
-        let added = self.calibration().and_then(Calibration::added_diameter);
+        self.calibrated(&|_, ring| Some(ring?.diameter_uas))
+    }
+
+    /// Flux in Jy, likewise, if the shape explains the data: brightness that no baseline sees costs an image little, so that it has more
+    /// of it than the sky. Otherwise that of the image, with what the method adds to the shape's in its error.
+    pub fn flux(&self) -> Option<(f64, Option<f64>)> {
+        let number: &Number<'_> = &|image, _| Some(image.iter().sum());
+        let Some(known) = self.calibration().filter(|known| !known.explains) else {
+            return self.calibrated(number);
+        };
+        let error = self.error(|image| image.number(number));
+        let added = known.added(number).map_or(0.0, |(added, _)| added);
+        Some((self.found().number(number)?, error.map(|error| error.hypot(added))))
+    }
+
+    /// A number less what the method adds to that of the best simple shape, with its error.
+    fn calibrated(&self, number: &Number<'_>) -> Option<(f64, Option<f64>)> {
+        let here = self.found().number(number)?;
+        let error = self.error(|image| image.number(number));
+        let added = self.calibration().and_then(|known| known.added(number));
         let (added, of_added) = added.unwrap_or((0.0, 0.0));
-        // To another ring it may add anything from half to one and a half times that.
-        let of_added = of_added.hypot(added / 12f64.sqrt());
         Some((here - added, error.map(|error| error.hypot(of_added))))
     }
 
     /// Images of a known sky, if they say what the method has done to the image: it came to a minimum.
-    fn calibration(&self) -> Option<&Calibration> {
-        self.calibration.as_ref().filter(|_| self.found().solution.has_converged)
-    }
-
-    /// Error of the flux, Jy: as [`error`](Self::error), and what the method adds to the flux of the best simple shape.
-    pub fn flux_error(&self) -> Option<f64> {
-        let flux = |image: &Candidate| Some(image.solution.image.iter().sum::<f64>());
-        let of_shape = self.calibration();
-        let added = of_shape.and_then(|of_shape| Some(of_shape.mean(flux)?.0 - of_shape.flux_jy));
-        Some(self.error(flux)?.hypot(added.unwrap_or(0.0)))
+    pub fn calibration(&self) -> Option<&Calibration> {
+        self.known_sky.as_ref().filter(|_| self.found().solution.has_converged)
     }
 
     /// Error of a number of the ring: as [`error`](Self::error), over images that have a ring.
@@ -149,5 +170,49 @@ impl Survey {
         let (draws, count) = square(&mut self.draws.iter());
         let (others, _) = square(&mut self.alternatives());
         (count >= 2).then(|| (draws + others).sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(flux: f64) -> Candidate {
+        let solution = Solution {
+            parameters: Vec::new(),
+            image: vec![0.25 * flux, 0.75 * flux],
+            loss: 1.0,
+            iterations: 1,
+            has_converged: true,
+        };
+        Candidate { start: 0, strength: 1.0, solution, chi2: Vec::new(), ring: None }
+    }
+
+    /// An image of 1.1 Jy, its draws off by 0.03, and images of a shape of 1 Jy which have 1.05 and 1.07.
+    fn survey(explains: bool) -> Survey {
+        let images = vec![image(1.05), image(1.07)];
+        Survey {
+            envelope: None,
+            held: Vec::new(),
+            strength: 1.0,
+            starts: vec![image(1.1)],
+            best: 0,
+            strengths: Vec::new(),
+            draws: vec![image(1.07), image(1.13)],
+            known_sky: Some(Calibration { shape: vec![0.4, 0.6], explains, ring: None, images }),
+        }
+    }
+
+    #[test]
+    fn exact_flux_that_the_method_adds_is_taken_off_where_the_shape_explains() {
+        let near = |(flux, error): (f64, Option<f64>), expected: [f64; 2]| {
+            let off = [flux - expected[0], error.expect("an error") - expected[1]];
+            assert!(off.iter().all(|off| off.abs() < 1e-12), "{flux} {error:?}");
+        };
+        near(survey(true).flux().expect("a flux"), [1.04, 0.03f64.hypot(0.01)]);
+        near(survey(false).flux().expect("a flux"), [1.1, 0.03f64.hypot(0.06)]);
+        let mut stopped = survey(true);
+        stopped.starts[0].solution.has_converged = false;
+        near(stopped.flux().expect("a flux"), [1.1, 0.03]);
     }
 }

@@ -9,6 +9,7 @@ use core::f64::consts::{LN_2, TAU};
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_tomo::fit::settings::LossKind;
 use kerrlight_tomo::fit::setup::FitData;
+use kerrlight_tomo::fit::verdict::is_chance;
 use kerrlight_vlbi::operator::ImageGrid;
 use rayon::prelude::*;
 
@@ -21,7 +22,7 @@ pub enum Shape {
     Disc,
     /// A round ring of even brightness with a Gaussian cross-section.
     Ring,
-    /// The same, brighter on one side.
+    /// The same, brighter on one side: 1 + b cos φ along the ring (Johnson et al. 2020, Science Advances 6, eaaz1310).
     Crescent,
     /// Two round Gaussians.
     Double,
@@ -43,6 +44,9 @@ pub struct ShapeFit {
     /// χ² of all independent data, plus the number of parameters times the logarithm of that of the data (Schwarz 1978, Annals
     /// of Statistics 6, 461): the less, the better.
     pub criterion: f64,
+    /// True if χ² of each kind is what chance allows; false where errors stand for what the source varies, which any shape may
+    /// explain.
+    pub explains: bool,
 }
 
 impl ShapeFit {
@@ -92,7 +96,8 @@ impl Shape {
         matches!(self, Self::Ring | Self::Crescent)
     }
 
-    /// Parameters to start from for a source of this size, µas. Lengths are logarithms of µas, offsets are in sizes.
+    /// Parameters to start from for a source of this size, µas. Lengths are logarithms of µas, offsets are in sizes; b is the
+    /// hyperbolic tangent of its parameter.
     fn starts(self, size: f64) -> Vec<Vec<f64>> {
         let l = size.ln();
         let turns =
@@ -134,8 +139,9 @@ impl Shape {
             Self::Ring => bell((east.hypot(north) - 0.5 * width(x[0])).powi(2), x[1]),
             Self::Crescent => {
                 let r = east.hypot(north).max(1e-9);
-                let side = (x[2] * east + x[3] * north) / r;
-                bell((r - 0.5 * width(x[0])).powi(2), x[1]) * side.exp()
+                let size = x[2].hypot(x[3]).max(1e-9);
+                let side = size.tanh() / size * (x[2] * east + x[3] * north) / r;
+                bell((r - 0.5 * width(x[0])).powi(2), x[1]) * (1.0 + side)
             }
             Self::Double => {
                 let off = [0.5 * size * x[2], 0.5 * size * x[3]];
@@ -261,6 +267,9 @@ fn best(
     let found = all?.into_iter().min_by(|a, b| a.loss.total_cmp(&b.loss))?;
     let here = image(&found.parameters);
     let chi2 = problem.chi2(&here);
+    let is_still = file.data.visibilities.variability.is_none();
+    let mut kinds = chi2.iter().zip(problem.counts());
+    let explains = is_still && kinds.all(|(chi2, count)| is_chance(*chi2, count));
     let (total, count) = independent(problem, file, &chi2);
     Some(ShapeFit {
         shape,
@@ -269,6 +278,7 @@ fn best(
         flux_jy: here.iter().sum(),
         chi2,
         criterion: total + found.parameters.len() as f64 * count.max(1.0).ln(),
+        explains,
     })
 }
 

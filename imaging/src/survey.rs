@@ -81,21 +81,25 @@ pub fn survey(
     // The image's own strength first: it is the one that draws have where the data choose none.
     let chosen = [strength].into_iter().chain(others).collect();
     let others = Others { starts: good, strengths: chosen };
-    let image = &starts[best].solution.image;
-    let count = file.image.draws.unwrap_or(0);
-    let Some(draws) = search.draws(measured, (image, &others), &frames, count)? else {
-        return Ok(None);
-    };
     let has_ring = starts[best].ring.is_some();
     let shape = best_shape(shapes.iter().filter(|fit| fit.shape.is_ring() || !has_ring));
-    let calibration = match shape {
+    let spread = match shape.is_some_and(|shape| shape.explains) {
+        true => 0.0,
+        false => file.image.flux_sigma_jy,
+    };
+    let image = &starts[best].solution.image;
+    let count = file.image.draws.unwrap_or(0);
+    let Some(draws) = search.draws(measured, (image, &others, spread), &frames, count)? else {
+        return Ok(None);
+    };
+    let known_sky = match shape {
         Some(shape) => {
-            search.calibration(measured, (shape, &others), &frames, count.div_ceil(2))?
+            search.calibration(measured, (shape, &others, spread), &frames, count.div_ceil(2))?
         }
         None => None,
     };
     let envelope = expected.map(|(envelope, _)| envelope);
-    Ok(Some(Survey { envelope, held, strength, starts, best, strengths, draws, calibration }))
+    Ok(Some(Survey { envelope, held, strength, starts, best, strengths, draws, known_sky }))
 }
 
 /// The image of visibilities of a source that does not change, as `kerrlight fit` finds it: from the starts of the settings and
@@ -278,12 +282,12 @@ impl Search<'_> {
         .map(voting)
     }
 
-    /// Images of measurements of an image with other noise, with a flux and a width of the envelope drawn from their priors, each
-    /// from one of the starts that are as good as the best, with one of the strengths that are.
+    /// Images of measurements of an image with other noise, with a prior of the flux about a value drawn with `spread` and a width of
+    /// the envelope drawn from its prior, each from one of the starts that are as good as the best, with one of the strengths that are.
     fn draws(
         &self,
         measured: &FitData,
-        (image, others): (&[f64], &Others<'_>),
+        (image, others, spread): (&[f64], &Others<'_>, f64),
         frames: &[usize],
         count: usize,
     ) -> Result<Option<Vec<Candidate>>, Error> {
@@ -295,7 +299,7 @@ impl Search<'_> {
             let [of_flux, of_width]: [f64; 2] = [(); 2].map(|()| random.sample(StandardNormal));
             let FluxPrior { jy, sigma_jy } = self.flux();
             // A flux below 0 is none: far from it for any prior that says something.
-            let flux = FluxPrior { jy: (jy + of_flux * sigma_jy).max(0.01 * jy), sigma_jy };
+            let flux = FluxPrior { jy: (jy + of_flux * spread).max(0.01 * jy), sigma_jy };
             let envelope = self.expected.map(|(expected, weight)| {
                 let fwhm_uas = expected.fwhm_uas * (ENVELOPE_SPREAD * of_width).exp();
                 (Envelope { fwhm_uas, ..expected }.shares(self.grid), weight)
@@ -322,15 +326,16 @@ impl Search<'_> {
     fn calibration(
         &self,
         measured: &FitData,
-        (shape, others): (&ShapeFit, &Others<'_>),
+        (shape, others, spread): (&ShapeFit, &Others<'_>, f64),
         frames: &[usize],
         count: usize,
     ) -> Result<Option<Calibration>, Error> {
         let image: Vec<f64> = shape.shares.iter().map(|share| share * shape.flux_jy).collect();
         let ring = self.file.ring.as_ref();
         let ring = ring.and_then(|ring| Ring::measure(&image, self.grid, ring));
-        let images = self.draws(measured, (&image, others), frames, count)?;
-        Ok(images.map(|images| Calibration { flux_jy: shape.flux_jy, ring, images }))
+        let images = self.draws(measured, (&image, others, spread), frames, count)?;
+        let explains = shape.explains;
+        Ok(images.map(|images| Calibration { shape: image, explains, ring, images }))
     }
 }
 

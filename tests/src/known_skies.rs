@@ -8,11 +8,13 @@ use crate::static_sky::data;
 use crate::support::succeed;
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::files;
+use kerrlight_vlbi::gains::GainTable;
 use kerrlight_vlbi::noise::{GainErrors, add_thermal_noise, apply_gains};
 use kerrlight_vlbi::observation::Averaging;
 use kerrlight_vlbi::operator::{ImageGrid, Method, Pulse};
 use kerrlight_vlbi::simulate::{Movie, fill};
 use serde_json::Value;
+use std::f64::consts::PI;
 use std::path::Path;
 
 /// Night of M87* whose stations, times and errors are taken.
@@ -22,11 +24,15 @@ const FIELD_UAS: f64 = 160.0;
 const SIDE: usize = 160;
 /// Flux of each sky, Jy.
 const FLUX_JY: f64 = 0.6;
+/// Standard deviation of the prior of the flux that `kerrlight fit --data` has for M87*, Jy.
+const FLUX_SIGMA_JY: f64 = 0.1;
 
 /// A sky: its brightness at a place to the east and north, µas.
 struct Sky {
     name: &'static str,
-    light: fn(f64, f64) -> f64,
+    light: Box<dyn Fn(f64, f64) -> f64>,
+    /// Jy.
+    flux: f64,
     /// Diameter of its ring, µas, and the direction in which it is brightest, degrees; none for an even ring.
     ring: Option<(f64, Option<f64>)>,
 }
@@ -43,7 +49,12 @@ fn blob([east, north]: [f64; 2], [x, y]: [f64; 2], width: f64) -> f64 {
 }
 
 fn skies() -> Vec<Sky> {
-    let sky = |name, light, ring| Sky { name, light, ring };
+    let sky = |name, light: fn(f64, f64) -> f64, ring| Sky {
+        name,
+        light: Box::new(light),
+        flux: FLUX_JY,
+        ring,
+    };
     vec![
         sky("ring", |x, y| ring([x, y], [42.0, 10.0], [0.0, 0.0]), Some((42.0, None))),
         sky("crescent", |x, y| ring([x, y], [42.0, 10.0], [0.7, 170.0]), Some((42.0, Some(170.0)))),
@@ -94,11 +105,11 @@ fn pixels(sky: &Sky) -> Vec<f64> {
     let light: Vec<f64> =
         (0..SIDE * SIDE).map(|k| (sky.light)(place(k % SIDE), place(k / SIDE))).collect();
     let sum: f64 = light.iter().sum();
-    light.iter().map(|light| FLUX_JY * light / sum).collect()
+    light.iter().map(|light| sky.flux * light / sum).collect()
 }
 
-/// Writes the data of a sky: with noise, lost phases, and gains of 10 %, of the LMT 60 %.
-fn observe(sky: &Sky, night: &Path, seed: u64, path: &Path) {
+/// Writes the data of a sky: with noise, lost phases, and gains of 10 %, of the LMT 60 %. Returns the gains.
+fn observe(sky: &Sky, night: &Path, seed: u64, path: &Path) -> GainTable {
     let (_, seen) = files::decode(&std::fs::read(night).unwrap()).unwrap();
     // Phases are lost from minute to minute, and stable within.
     let mut seen = seen.averaged(Averaging::over(60.0));
@@ -114,9 +125,10 @@ fn observe(sky: &Sky, night: &Path, seed: u64, path: &Path) {
         stations: large.collect(),
     };
     assert_eq!(errors.stations.len(), 1, "no LMT");
-    apply_gains(&mut seen, &errors, seed);
+    let gains = apply_gains(&mut seen, &errors, seed);
     add_thermal_noise(&mut seen, seed);
     std::fs::write(path, files::write_uvfits(&seen).unwrap()).unwrap();
+    gains
 }
 
 /// Distances of what was found from the truth, over their errors.
@@ -153,14 +165,14 @@ fn exact_known_skies_through_a_real_night() {
             let image = array(&path.join("run/image.npz"), "recovered.npy");
             let side = image.len().isqrt();
             let field = array(&path.join("run/image.npz"), "field_uas.npy")[0];
-            let alike = correlation(&image, side, field, sky.light);
+            let alike = correlation(&image, side, field, &sky.light);
             let has_ring = found["ring_diameter_uas"].is_number();
             let of_ring = sky.ring.and_then(|(d, _)| pull(&found, "ring_diameter_uas", d, None));
             let angle = sky.ring.and_then(|(_, angle)| angle);
             let of_angle =
                 angle.and_then(|angle| pull(&found, "ring_position_angle_deg", angle, Some(360.0)));
             let flux = Some(
-                (found["flux_jy"].as_f64().unwrap() - FLUX_JY)
+                (found["flux_jy"].as_f64().unwrap() - sky.flux)
                     / found["flux_error_jy"].as_f64().unwrap(),
             );
             eprintln!(
@@ -183,4 +195,137 @@ fn exact_known_skies_through_a_real_night() {
         }
     }
     assert!(wrong.is_empty(), "rings where there are none, or none where there is one: {wrong:?}");
+}
+
+/// Skies of four shapes whose sizes fall evenly in wide ranges, and whose fluxes are drawn from the prior that `kerrlight fit --data`
+/// has for M87*.
+fn drawn_skies(count: usize) -> Vec<Sky> {
+    // Multiples of powers of the inverse of x⁷ = x + 1 fall evenly in the cube of six sides.
+    let even =
+        |k: usize, axis: i32| ((k + 1) as f64 * 1.112_775_684_278_705_5f64.powi(-axis)).fract();
+    let within = |part: f64, [least, most]: [f64; 2]| least + (most - least) * part;
+    (0..count)
+        .map(|k| {
+            let [a, b, c, d] = [1, 2, 3, 4].map(|axis| even(k, axis));
+            let diameter = within(a, [36.0, 48.0]);
+            let width = within(b, [8.0, 14.0]);
+            let angle = 360.0 * c;
+            let part = within(d, [0.4, 0.9]);
+            let normal = (-2.0 * even(k, 5).ln()).sqrt() * (2.0 * PI * even(k, 6)).cos();
+            let flux = FLUX_JY + FLUX_SIGMA_JY * normal;
+            let sky = |name, light, ring| Sky { name, light, flux, ring };
+            match k % 4 {
+                0 => sky(
+                    "ring",
+                    Box::new(move |x, y| ring([x, y], [diameter, width], [0.0, 0.0])),
+                    Some((diameter, None)),
+                ),
+                1 => sky(
+                    "crescent",
+                    Box::new(move |x, y| ring([x, y], [diameter, width], [part, angle])),
+                    Some((diameter, Some(angle))),
+                ),
+                2 => sky(
+                    "disc",
+                    Box::new(move |x, y| 1.0 / (1.0 + ((x.hypot(y) - 0.6 * diameter) / 1.5).exp())),
+                    None,
+                ),
+                _ => sky(
+                    "Gaussian",
+                    Box::new(move |x, y| {
+                        let (sin, cos) = angle.to_radians().sin_cos();
+                        let [along, beside] = [x * sin + y * cos, x * cos - y * sin];
+                        bell(along / diameter, 1.0) * bell(beside / (diameter * part), 1.0)
+                    }),
+                    None,
+                ),
+            }
+        })
+        .collect()
+}
+
+/// Distances of the gains of a table from the true ones, in errors of ln |g|.
+fn pulls_of_gains(found: &Path, truth: &GainTable) -> Vec<f64> {
+    let truth = truth.by_station();
+    let text = std::fs::read_to_string(found).unwrap();
+    text.lines()
+        .skip(1)
+        .map(|line| {
+            let cells: Vec<&str> = line.split(',').collect();
+            let number = |k: usize| cells[k].parse::<f64>().unwrap();
+            let gain = truth.at(cells[2], number(0)).expect("a gain of the truth");
+            (number(3) / gain.norm()).ln() / (number(4) / number(3))
+        })
+        .collect()
+}
+
+/// The root mean square pull of a number over all nights; prints how many intervals have the truth.
+fn told_coverage(name: &str, pulls: &[f64]) -> f64 {
+    let count = pulls.len() as f64;
+    let within = |most: f64| pulls.iter().filter(|pull| pull.abs() <= most).count() as f64 / count;
+    let mean = pulls.iter().sum::<f64>() / count;
+    let square = (pulls.iter().map(|pull| pull * pull).sum::<f64>() / count).sqrt();
+    eprintln!(
+        "{name}: {count} in all, 68 %: {:.0} ± {:.0}, 95 %: {:.0}, mean pull {mean:.2}, root mean square {:.2}",
+        100.0 * within(1.0),
+        100.0 * (0.68 * 0.32 / count).sqrt(),
+        100.0 * within(1.96),
+        square,
+    );
+    square
+}
+
+#[test]
+#[ignore = "an hour"]
+fn exact_intervals_hold_on_simulated_nights() {
+    let Some(night) = data(NIGHT) else { return };
+    let count = std::env::var("KERRLIGHT_NIGHTS").map_or(100, |count| count.parse().unwrap());
+    let [mut flux, mut diameter, mut angle, mut gains] = [const { Vec::new() }; 4];
+    let mut wrong = 0;
+    for (k, sky) in drawn_skies(count).iter().enumerate() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path();
+        let truth = observe(sky, &night, k as u64 + 1, &path.join("sky.uvfits"));
+        succeed(path, &["fit", "--data", "sky.uvfits", "--model", "image", "-o", "run"]);
+        let found = results(&path.join("run"));
+        let has_ring = found["ring_diameter_uas"].is_number();
+        wrong += usize::from(has_ring != sky.ring.is_some());
+        let of_flux = (found["flux_jy"].as_f64().unwrap() - sky.flux)
+            / found["flux_error_jy"].as_f64().unwrap();
+        let of_diameter = sky.ring.and_then(|(d, _)| pull(&found, "ring_diameter_uas", d, None));
+        let of_angle = sky
+            .ring
+            .and_then(|(_, angle)| pull(&found, "ring_position_angle_deg", angle?, Some(360.0)));
+        let of_gains = pulls_of_gains(&path.join("run/gains.csv"), &truth);
+        let inside = of_gains.iter().filter(|pull| pull.abs() <= 1.0).count();
+        eprintln!(
+            "{} | {has_ring} | {:.3}: {} ± {} ({of_flux:.2}) | {}: {} ± {} ({}) | {}: {} ± {} ({}) | {inside} of {} | {:.0}",
+            sky.name,
+            sky.flux,
+            told(found["flux_jy"].as_f64()),
+            told(found["flux_error_jy"].as_f64()),
+            told(sky.ring.map(|(d, _)| d)),
+            told(found["ring_diameter_uas"].as_f64()),
+            told(found["ring_diameter_uas_error"].as_f64()),
+            told(of_diameter),
+            told(sky.ring.and_then(|(_, angle)| angle)),
+            told(found["ring_position_angle_deg"].as_f64()),
+            told(found["ring_position_angle_deg_error"].as_f64()),
+            told(of_angle),
+            of_gains.len(),
+            found["cpu_seconds"].as_f64().unwrap(),
+        );
+        flux.push(of_flux);
+        diameter.extend(of_diameter);
+        angle.extend(of_angle);
+        gains.extend(of_gains);
+    }
+    let all = [("flux", flux), ("diameter", diameter), ("angle", angle), ("gains", gains)];
+    let too_small: Vec<&str> = all
+        .iter()
+        .filter(|(name, pulls)| told_coverage(name, pulls) > 1.3)
+        .map(|(name, _)| *name)
+        .collect();
+    assert!(too_small.is_empty(), "errors are too small: {too_small:?}");
+    assert_eq!(wrong, 0, "rings where there are none, or none where there is one");
 }

@@ -3,7 +3,7 @@
 
 use kerrlight_imaging::settings::StaticImageFile;
 use kerrlight_imaging::{data, survey};
-use kerrlight_tomo::fit::verdict::CHANCE;
+use kerrlight_tomo::fit::verdict::is_chance;
 use kerrlight_vlbi::observation::Observation;
 
 /// Residuals of a static image.
@@ -32,8 +32,7 @@ impl QuickLook {
 
     /// Returns whether χ² of each kind is what chance allows, or less.
     pub fn explains(&self) -> bool {
-        let allowed = |count: usize| 1.0 + CHANCE * (2.0 / count.max(1) as f64).sqrt();
-        self.kinds.iter().all(|(_, chi2, count)| *chi2 <= allowed(*count))
+        self.kinds.iter().all(|(_, chi2, count)| is_chance(*chi2, *count))
     }
 
     /// Describes the result, in a sentence.

@@ -22,6 +22,9 @@ const CURVES: usize = 6;
 
 /// Gains that were found.
 pub struct Gains {
+    /// Gains that explain the data best beside the model.
+    beside: GainTable,
+    /// The same less what the method adds to them, with their errors: those that are told.
     table: GainTable,
     distance: Option<GainDistance>,
 }
@@ -88,47 +91,96 @@ struct Summary<'a> {
     largest: f64,
 }
 
+/// Adds the root mean square distance of the gains of other images to errors in quadrature.
+fn widen(table: &mut GainTable, here: &GainTable, others: &[GainTable]) {
+    let count = others.len().max(1) as f64;
+    for (k, (gain, here)) in table.gains.iter_mut().zip(&here.gains).enumerate() {
+        let apart = || others.iter().map(|other| (other.gains[k].gain / here.gain).ln());
+        let squares = [
+            apart().map(|apart| apart.re * apart.re).sum::<f64>(),
+            apart().map(|apart| apart.im * apart.im).sum(),
+        ];
+        for (error, square) in gain.errors.iter_mut().zip(squares) {
+            *error = error.hypot((square / count).sqrt());
+        }
+    }
+}
+
+/// Takes off amplitudes what those beside images of a known sky have more than those beside the sky, or adds it to their errors.
+fn calibrate(table: &mut GainTable, sky: &GainTable, images: &[GainTable], takes_off: bool) {
+    if images.len() < 2 {
+        return;
+    }
+    let count = images.len() as f64;
+    for (k, (gain, sky)) in table.gains.iter_mut().zip(&sky.gains).enumerate() {
+        let all = || images.iter().map(|image| (image.gains[k].gain / sky.gain).norm().ln());
+        let added = all().sum::<f64>() / count;
+        let square: f64 = all().map(|one| (one - added).powi(2)).sum();
+        let of_mean = (square / (count * (count - 1.0))).sqrt();
+        if takes_off {
+            gain.gain *= (-added).exp();
+            gain.errors[0] = gain.errors[0].hypot(of_mean);
+        } else {
+            gain.errors[0] = gain.errors[0].hypot(added);
+        }
+    }
+}
+
 impl Estimate<'_> {
     /// The gains of all stations and frames, beside these images and what data see of them, where they are solved for; writes their table.
     pub fn gains(&self, movie: &Frames<f32>, seen: &Frames<f32>) -> anyhow::Result<Option<Gains>> {
         let is_polarized =
             self.file.loss.iter().any(|loss| loss.data == LossKind::PolarizedVisibilities);
         if !is_polarized || self.measured.gains.is_none() {
-            return Gains::beside(&self.evidence(), (movie, &[]), self.folder);
+            return Gains::beside(&self.evidence(), movie, &Others::default(), self.folder);
         }
         let table = self.measured.polarized_gains(&seen.to_vec()?)?;
         table.map(|table| Gains::written(table, self.measured, self.folder)).transpose()
     }
 }
 
+/// Other images of all frames, which tell errors of gains.
+#[derive(Default)]
+pub struct Others {
+    /// Images that may as well be the one that was found: the root mean square distance of their gains is part of the errors.
+    pub draws: Vec<Frames<f32>>,
+    /// A sky that is known, which tells what the method adds to gains.
+    pub known_sky: Option<KnownSky>,
+}
+
+/// A known sky in all frames, and images of it.
+pub struct KnownSky {
+    pub sky: Frames<f32>,
+    pub images: Vec<Frames<f32>>,
+    /// True if the sky explains the data: what images add to gains is then taken off, and otherwise part of their error.
+    pub explains: bool,
+}
+
 impl Gains {
-    /// The gains of all stations and frames beside images of all frames, where they are solved for; writes their table. Where
-    /// `others` may as well be the images, the root mean square distance of their gains is added to errors in quadrature.
+    /// The gains of all stations and frames beside images of all frames, where they are solved for; writes their table.
     pub fn beside(
         evidence: &Evidence<'_>,
-        (movie, others): (&Frames<f32>, &[Frames<f32>]),
+        movie: &Frames<f32>,
+        others: &Others,
         folder: &Folder,
     ) -> anyhow::Result<Option<Self>> {
         let Evidence { measured, losses, .. } = *evidence;
-        let of = |movie| -> anyhow::Result<Option<GainTable>> {
+        let of = |movie: &Frames<f32>| -> anyhow::Result<Option<GainTable>> {
             let Some(model) = evidence.model_visibilities(movie)? else { return Ok(None) };
             Ok(measured.gains(losses, &model)?)
         };
-        let Some(mut table) = of(movie)? else { return Ok(None) };
-        let mut squares = vec![[0.0; 2]; table.gains.len()];
-        for other in others {
-            let other = of(other)?.unwrap_or_default();
-            for ((sum, here), there) in squares.iter_mut().zip(&table.gains).zip(&other.gains) {
-                let apart = (there.gain / here.gain).ln();
-                *sum = [sum[0] + apart.re * apart.re, sum[1] + apart.im * apart.im];
-            }
+        let all = |movies: &[Frames<f32>]| -> anyhow::Result<Vec<GainTable>> {
+            movies.iter().filter_map(|movie| of(movie).transpose()).collect()
+        };
+        let Some(beside) = of(movie)? else { return Ok(None) };
+        let mut table = beside.clone();
+        widen(&mut table, &beside, &all(&others.draws)?);
+        if let Some(known) = &others.known_sky
+            && let Some(sky) = of(&known.sky)?
+        {
+            calibrate(&mut table, &sky, &all(&known.images)?, known.explains);
         }
-        for (gain, sum) in table.gains.iter_mut().zip(squares) {
-            for (error, sum) in gain.errors.iter_mut().zip(sum) {
-                *error = error.hypot((sum / others.len().max(1) as f64).sqrt());
-            }
-        }
-        Self::written(table, measured, folder).map(Some)
+        Ok(Some(Gains { beside, ..Self::written(table, measured, folder)? }))
     }
 
     fn written(table: GainTable, measured: &FitData, folder: &Folder) -> anyhow::Result<Self> {
@@ -139,12 +191,12 @@ impl Gains {
             files::gains_to_csv(&GainTable { gains: gains.collect() })
         })?;
         let distance = measured.true_gains.as_ref().and_then(|truth| table.distance(truth));
-        Ok(Gains { table, distance })
+        Ok(Gains { beside: table.clone(), table, distance })
     }
 
     /// Multiplies visibilities of a model by g₁ ḡ₂ of their stations at their times; by 1 where a station has none.
     pub fn put_on(&self, observation: &Observation, rows: &[&Row], model: &mut [Complex64]) {
-        let gains = self.table.by_station();
+        let gains = self.beside.by_station();
         for (row, v) in rows.iter().zip(model) {
             let gain = |name: &str| gains.at(name, row.time_h).unwrap_or(1.0.into());
             let [first, second] = observation.names(row).map(gain);

@@ -12,7 +12,7 @@ mod words;
 use super::closures;
 use super::data;
 use super::folder::{self, Folder};
-use super::results::gains::Gains;
+use super::results::gains::{Gains, KnownSky, Others};
 use super::results::leakage::Leakage;
 use super::results::verdict::{DataVerdict, Evidence};
 use crate::answer::Answer;
@@ -23,8 +23,8 @@ use anyhow::bail;
 use kerrlight_common::frames::Frames;
 use kerrlight_imaging::settings::{StaticImageFile, StrengthSettings};
 use kerrlight_imaging::{
-    Candidate, PolarizedSurvey, Ring, Shape, ShapeFit, Stage, Survey, fit_shapes, survey,
-    survey_polarized,
+    Calibration, Candidate, PolarizedSurvey, Ring, Shape, ShapeFit, Stage, Survey, fit_shapes,
+    survey, survey_polarized,
 };
 use kerrlight_tomo::fit::FrameTerm;
 use kerrlight_tomo::fit::settings::{Loss, LossKind};
@@ -92,19 +92,13 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
     let begun = Instant::now();
     folder.file(folder::LOG)?.write(b"")?;
     let (survey, shapes, polarized) = searched(prepared)?;
-    let image: Vec<f32> = survey.found().solution.image.iter().map(|x| *x as f32).collect();
-    let movie = Frames::of(image.repeat(measured.times.len()), image.len());
+    let movie = still(&survey.found().solution.image, measured);
     let evidence = Evidence { file: None, losses: &file.loss, seed: file.seed, measured };
     let (polarized, tested) = told(prepared, polarized, folder)?.unzip();
-    let others = tested.into_iter().collect();
-    let mut judged = evidence.judged_beside(compared(file, measured, &survey)?, &movie, others)?;
+    let tested = tested.into_iter().collect();
+    let mut judged = evidence.judged_beside(compared(file, measured, &survey)?, &movie, tested)?;
     judged.expect(&numbers::chi2_of_draws(&survey), survey.draws.len());
-    let of_draw = |draw: &Candidate| {
-        let image: Vec<f32> = draw.solution.image.iter().map(|x| *x as f32).collect();
-        Frames::of(image.repeat(measured.times.len()), image.len())
-    };
-    let draws: Vec<Frames<f32>> = survey.draws.iter().map(of_draw).collect();
-    let gains = Gains::beside(&evidence, (&movie, &draws), folder)?;
+    let gains = Gains::beside(&evidence, &movie, &others(&survey, measured), folder)?;
     let beside = beside(file, measured, &survey);
     let found = Found {
         file,
@@ -129,6 +123,26 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
         .with_all(serde_json::to_value(results)?)
         .with("folder", folder.path().display().to_string())
         .files(files.iter().map(|path| path.as_path())))
+}
+
+/// An image once a frame.
+fn still(image: &[f64], measured: &FitData) -> Frames<f32> {
+    let image: Vec<f32> = image.iter().map(|x| *x as f32).collect();
+    Frames::of(image.repeat(measured.times.len()), image.len())
+}
+
+/// Images that tell errors of gains.
+fn others(survey: &Survey, measured: &FitData) -> Others {
+    let of = |image: &Candidate| still(&image.solution.image, measured);
+    let known = |known: &Calibration| KnownSky {
+        sky: still(&known.shape, measured),
+        images: known.at_minimum().map(of).collect(),
+        explains: known.explains,
+    };
+    Others {
+        draws: survey.draws.iter().map(of).collect(),
+        known_sky: survey.calibration().map(known),
+    }
 }
 
 /// Returns the polarisation that was found, and its residuals; writes the leakage of stations, where it was solved for.
@@ -273,6 +287,12 @@ impl Found<'_> {
         let all = draws.iter().flat_map(|draw| &draw.solution.image).map(|x| *x as f32).collect();
         let bytes = images::movie_archive([draws.len(), n, n], &[("draws", all)], &[field]);
         self.folder.file("draws.npz")?.write(&bytes)
+    }
+
+    /// The flux less what the method adds to it, Jy, with its error.
+    fn flux(&self) -> (f64, Option<f64>) {
+        let image = &self.survey.found().solution.image;
+        self.survey.flux().unwrap_or_else(|| (image.iter().sum(), None))
     }
 
     /// The ring, where one is claimed.

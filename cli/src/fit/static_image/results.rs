@@ -31,15 +31,18 @@ pub struct Results {
     chi2_of_draws: BTreeMap<&'static str, OfDraws>,
     inputs: Vec<InputFile>,
     verdict: VerdictResults,
-    /// All light of the field, Jy.
+    /// All light of the field less what the method adds, Jy.
     pub flux_jy: f64,
     /// Its standard deviation.
     pub flux_error_jy: Option<f64>,
+    flux_of_image_jy: f64,
     strength: f64,
     envelope_fwhm_uas: Option<f64>,
     starts: Vec<ImageNumbers>,
     strengths: Vec<ImageNumbers>,
     draws: Vec<ImageNumbers>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    known_sky: Option<KnownSky>,
     has_converged: bool,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     closures: Vec<ClosureResults>,
@@ -102,6 +105,18 @@ struct ImageNumbers {
     has_converged: bool,
     chi2_per_datum: Vec<f64>,
     ring_diameter_uas: Option<f64>,
+    ring_position_angle_deg: Option<f64>,
+    ring_asymmetry: Option<f64>,
+}
+
+/// A simple shape, and images of its simulated data.
+#[derive(Serialize)]
+struct KnownSky {
+    flux_jy: f64,
+    ring_diameter_uas: Option<f64>,
+    ring_position_angle_deg: Option<f64>,
+    ring_asymmetry: Option<f64>,
+    images: Vec<ImageNumbers>,
 }
 
 impl From<&Candidate> for ImageNumbers {
@@ -115,6 +130,8 @@ impl From<&Candidate> for ImageNumbers {
             has_converged: image.solution.has_converged,
             chi2_per_datum: image.chi2.clone(),
             ring_diameter_uas: image.ring.map(|ring| ring.diameter_uas),
+            ring_position_angle_deg: image.ring.map(|ring| ring.position_angle_deg),
+            ring_asymmetry: image.ring.map(|ring| ring.asymmetry),
         }
     }
 }
@@ -156,6 +173,7 @@ impl Found<'_> {
         let drawn = |[mean, deviation]: [f64; 2]| OfDraws { mean, deviation };
         let [with, of] = self.survey.with_ring();
         let of_polarized = polarized.map(Polarized::numbers).into_iter().flatten();
+        let (flux_jy, flux_error_jy) = self.flux();
         let chi2 = kinds().zip(found.chi2.iter().copied());
         Results {
             version: env!("CARGO_PKG_VERSION"),
@@ -172,13 +190,21 @@ impl Found<'_> {
                 .collect(),
             inputs: self.folder.inputs().files.clone(),
             verdict: VerdictResults::from(&self.judged),
-            flux_jy: found.solution.image.iter().sum(),
-            flux_error_jy: self.survey.flux_error(),
+            flux_jy,
+            flux_error_jy,
+            flux_of_image_jy: found.solution.image.iter().sum(),
             strength: self.survey.strength,
             envelope_fwhm_uas: self.survey.envelope.map(|envelope| envelope.fwhm_uas),
             starts: all(&self.survey.starts),
             strengths: all(&self.survey.strengths),
             draws: all(&self.survey.draws),
+            known_sky: self.survey.known_sky.as_ref().map(|known| KnownSky {
+                flux_jy: known.shape.iter().sum(),
+                ring_diameter_uas: known.ring.map(|ring| ring.diameter_uas),
+                ring_position_angle_deg: known.ring.map(|ring| ring.position_angle_deg),
+                ring_asymmetry: known.ring.map(|ring| ring.asymmetry),
+                images: all(&known.images),
+            }),
             has_converged: found.solution.has_converged,
             closures: closures::results(self.measured, &self.file.loss),
             held_out: self.survey.held.iter().map(held).collect(),

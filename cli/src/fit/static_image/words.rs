@@ -7,7 +7,7 @@ use crate::fit::closures;
 use crate::fit::results::medium;
 use crate::report::Part;
 use kerrlight_imaging::settings::StartImage;
-use kerrlight_imaging::{Envelope, Profile, ShapeFit, Survey, best_shape};
+use kerrlight_imaging::{Calibration, Envelope, Profile, ShapeFit, Survey, best_shape};
 use kerrlight_tomo::fit::settings::LossKind;
 
 impl Found<'_> {
@@ -25,16 +25,19 @@ fn ring(survey: &Survey, shapes: &[ShapeFit]) -> String {
     }
     let [diameter, width, angle, ..] =
         RING.map(|(name, number)| of_ring(survey, &ring, name, number));
+    let bright = match angle.1 {
+        Some(error) if error > EVEN_DEG => "as bright on all sides within the errors".to_owned(),
+        error => format!("brightest at {}° east of north", with_error(angle.0, error, 0)),
+    };
     let [with, all] = survey.with_ring();
     let others = match with == all {
         true => String::new(),
         false => format!(" {with} of {all} images that the data allow have one."),
     };
     format!(
-        "The image has a ring of {} µas, {} µas wide, brightest at {}° east of north.{others}{}",
+        "The image has a ring of {} µas, {} µas wide, {bright}.{others}{}",
         with_error(diameter.0, diameter.1, 1),
         with_error(width.0, width.1, 1),
-        with_error(angle.0, angle.1, 0),
         match survey.found().solution.has_converged {
             true => "",
             false =>
@@ -77,6 +80,9 @@ pub fn doubt(survey: &Survey, shapes: &[ShapeFit]) -> Option<String> {
         )
     })
 }
+
+/// Error of the direction in which a ring is brightest from which on it has none: directions of an even ring scatter by 104°.
+const EVEN_DEG: f64 = 45.0;
 
 /// Part of the images that the data allow which have to have a ring.
 const LEAST_AGREEMENT: f64 = 0.8;
@@ -133,16 +139,18 @@ impl Found<'_> {
             .iter()
             .map(|penalty| format!("{:?} (weight {})", penalty.kind, penalty.weight))
             .collect();
+        let (flux, error) = self.flux();
         let mut text = vec![
             format!(
                 "One image of {} × {} positive pixels in a field of {} µas for all frames: nothing moves. No hole, no gas and no \
-                 ring is assumed. Its flux has a Gaussian prior, {} ± {} Jy, and came out as {} Jy.",
+                 ring is assumed. Its flux has a Gaussian prior, {} ± {} Jy, and came out as {} Jy ({:.3} Jy in the image).",
                 image.pixels,
                 image.pixels,
                 image.field_uas,
                 image.flux_jy,
                 image.flux_sigma_jy,
-                format_args!("{:.3}", self.survey.found().solution.image.iter().sum::<f64>())
+                with_error(flux, error, 3),
+                self.survey.found().solution.image.iter().sum::<f64>()
             ),
             format!("Starts: {}; then the simple shapes that fit the data.", starts.join("; ")),
         ];
@@ -186,21 +194,19 @@ impl Found<'_> {
         if draws < 2 {
             return vec!["No draws were asked for: numbers have no errors.".to_owned()];
         }
+        let known_sky = self.survey.known_sky.as_ref();
+        let flux = match known_sky.is_some_and(|known| known.explains) {
+            true => "",
+            false => "a flux drawn from its prior, ",
+        };
         let mut text = vec![format!(
-            "Errors add in quadrature how far {draws} images of measurements of this image with other noise, with a flux drawn from its \
-             prior, an envelope 10 % wider or narrower (one standard deviation), and starts and factors that are as good, are from it (root mean square, what the method distorts included), and how far {others} images are \
-             that the data do not tell from the best: of other starts with a loss within 1 %, and of other factors that predict \
-             held-out frames as well. The kind of penalty, the field and the size of pixels stay what they are: what they \
-             decide is in no error."
+            "Errors add in quadrature how far {draws} images of measurements of this image with other noise, {flux}an envelope 10 % \
+             wider or narrower (one standard deviation), and starts and factors that are as good, are from it (root mean \
+             square, what the method distorts included), and how far {others} images are that the data do not tell from the \
+             best: of other starts with a loss within 1 %, and of other factors that predict held-out frames as well. The kind \
+             of penalty, the field and the size of pixels stay what they are: what they decide is in no error."
         )];
-        text.extend(self.survey.calibration.as_ref().map(|known| {
-            format!(
-                "{} images of measurements of the best simple shape tell what the method makes of a known sky: what it adds to \
-                 the diameter of the ring is taken off, with its own error, and what it adds to the flux is part of the flux's \
-                 error. Where an image did not come to a minimum, neither is done with it.",
-                known.images.len()
-            )
-        }));
+        text.extend(known_sky.map(calibrated));
         text.extend(self.polarized.as_ref().and_then(Polarized::errors));
         text
     }
@@ -242,6 +248,23 @@ impl Found<'_> {
         }
         text
     }
+}
+
+/// What images of a known sky have changed.
+fn calibrated(known: &Calibration) -> String {
+    let rest = match known.explains {
+        true => {
+            "explains the data, so that what the method adds to the flux and to gains is taken off as well"
+        }
+        false => {
+            "does not explain the data, so that what the method adds to the flux and to gains is part of their errors"
+        }
+    };
+    format!(
+        "{} images of measurements of the best simple shape tell what the method makes of a known sky: what it adds to the \
+         diameter of the ring is taken off. The shape {rest}. Where an image did not come to a minimum, nothing is taken off.",
+        known.images.len()
+    )
 }
 
 /// χ² of a kind of data, as it is computed.

@@ -16,6 +16,11 @@ pub use statistics::{Pairs, Part, PixelSum, Statistics};
 
 /// Standard deviations of χ² that chance is granted: 5 of them come about once in a million.
 pub const CHANCE: f64 = 5.0;
+
+/// Returns whether χ² per datum of so many data is what chance allows, or less.
+pub fn is_chance(chi2: f64, count: usize) -> bool {
+    chi2 <= 1.0 + CHANCE * (2.0 / count.max(1) as f64).sqrt()
+}
 /// Excess of χ² per datum that is tolerated for any number of data: an error of the model of 0.3 σ, smaller than
 /// anything that single data can tell.
 pub const EXCESS: f64 = 0.1;
