@@ -46,6 +46,7 @@ fn exact_visibilities_are_fitted_at_once() {
     for key in ["hole.mass_msun", "hole.distance_kpc", "observer.inclination_deg"] {
         assert!(missing.contains(&format!("--set '{key}=")), "{missing}");
     }
+    assert!(missing.contains("--model image"), "{missing}");
     assert!(!path.join("b").exists());
     let given = ["hole.mass_msun=1e9", "hole.distance_kpc=1e4", "observer.inclination_deg=40"];
     let given: Vec<&str> = given.iter().flat_map(|set| ["--set", set]).collect();
@@ -70,6 +71,7 @@ fn exact_light_curves_are_fitted_at_once() {
     std::fs::write(path.join("qu.csv"), &text).unwrap();
     let missing = fail(path, &["fit", "--data", "qu.csv", "-o", "none"]);
     assert!(missing.contains("--set 'hole.mass_msun=4.154e6'"), "{missing}");
+    assert!(!missing.contains("--model image"), "a light curve has no image: {missing}");
     let quick = [
         "hole.mass_msun=4.154e6",
         "band.radii={from=9.0,to=11.0,step=1.0}",

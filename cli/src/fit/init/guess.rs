@@ -86,7 +86,13 @@ impl Guess {
             |m: &&Missing| format!("\n  {} ({}): --set '{}={}'", m.key, m.why, m.key, m.example);
         let lines: String = open.iter().map(line).collect();
         let names: Vec<String> = data.iter().map(|path| path.display().to_string()).collect();
-        bail!("{} does not say what decides the result; give{lines}", names.join(", "))
+        let image = match has(&table, "data.visibilities") {
+            true => {
+                "\nor, for a source that does not change while it is observed, --model image: it needs none of these"
+            }
+            false => "",
+        };
+        bail!("{} does not say what decides the result; give{lines}{image}", names.join(", "))
     }
 
     /// Describes what was read and what was assumed, in lines.
