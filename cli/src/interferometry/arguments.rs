@@ -93,7 +93,7 @@ pub struct Observing {
     /// Earth-orientation model
     #[arg(long, value_name = "FRAME", default_value = "catalogue")]
     pub frame: FrameName,
-    /// UT1 - UTC in seconds, instead of the built-in table's (1999 to 2026)
+    /// UT1 - UTC in seconds, instead of the built-in table's (1999 to September 2026)
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     pub ut1_utc: Option<f64>,
 }

@@ -16,7 +16,8 @@ pub use view::{Frame, SourcePosition, View};
 pub enum EarthError {
     /// A day outside the built-in table of UT1 − UTC.
     #[error(
-        "UT1 - UTC at MJD {mjd} is not in the built-in table (MJD {first} to {last}): give a value"
+        "UT1 - UTC at MJD {mjd} is not in the built-in table (MJD {first} to {last}): give it in seconds (--ut1-utc, in Python \
+         ut1_utc); 0 turns the Earth by less than 14 arcseconds"
     )]
     Ut1Unknown {
         /// The day requested.
