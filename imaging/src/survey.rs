@@ -80,21 +80,21 @@ pub fn survey(
     let good = starts.iter().filter(|start| start.solution.loss <= 1.01 * least).collect();
     // The image's own strength first: it is the one that draws have where the data choose none.
     let chosen = [strength].into_iter().chain(others).collect();
-    let others = Others { starts: good, strengths: chosen };
     let has_ring = starts[best].ring.is_some();
     let shape = best_shape(shapes.iter().filter(|fit| fit.shape.is_ring() || !has_ring));
-    let spread = match shape.is_some_and(|shape| shape.explains) {
+    let flux_sigma_jy = match shape.is_some_and(|shape| shape.explains) {
         true => 0.0,
         false => file.image.flux_sigma_jy,
     };
+    let others = Others { starts: good, strengths: chosen, flux_sigma_jy };
     let image = &starts[best].solution.image;
     let count = file.image.draws.unwrap_or(0);
-    let Some(draws) = search.draws(measured, (image, &others, spread), &frames, count)? else {
+    let Some(draws) = search.draws(measured, (image, &others), &frames, count)? else {
         return Ok(None);
     };
     let known_sky = match shape {
         Some(shape) => {
-            search.calibration(measured, (shape, &others, spread), &frames, count.div_ceil(2))?
+            search.calibration(measured, (shape, &others), &frames, count.div_ceil(2))?
         }
         None => None,
     };
@@ -282,12 +282,12 @@ impl Search<'_> {
         .map(voting)
     }
 
-    /// Images of measurements of an image with other noise, with a prior of the flux about a value drawn with `spread` and a width of
-    /// the envelope drawn from its prior, each from one of the starts that are as good as the best, with one of the strengths that are.
+    /// Images of measurements of an image with other noise, with priors of the flux about drawn values and envelopes of drawn
+    /// widths, each from one of the starts that are as good as the best, with one of the strengths that are.
     fn draws(
         &self,
         measured: &FitData,
-        (image, others, spread): (&[f64], &Others<'_>, f64),
+        (image, others): (&[f64], &Others<'_>),
         frames: &[usize],
         count: usize,
     ) -> Result<Option<Vec<Candidate>>, Error> {
@@ -299,7 +299,8 @@ impl Search<'_> {
             let [of_flux, of_width]: [f64; 2] = [(); 2].map(|()| random.sample(StandardNormal));
             let FluxPrior { jy, sigma_jy } = self.flux();
             // A flux below 0 is none: far from it for any prior that says something.
-            let flux = FluxPrior { jy: (jy + of_flux * spread).max(0.01 * jy), sigma_jy };
+            let flux =
+                FluxPrior { jy: (jy + of_flux * others.flux_sigma_jy).max(0.01 * jy), sigma_jy };
             let envelope = self.expected.map(|(expected, weight)| {
                 let fwhm_uas = expected.fwhm_uas * (ENVELOPE_SPREAD * of_width).exp();
                 (Envelope { fwhm_uas, ..expected }.shares(self.grid), weight)
@@ -326,14 +327,14 @@ impl Search<'_> {
     fn calibration(
         &self,
         measured: &FitData,
-        (shape, others, spread): (&ShapeFit, &Others<'_>, f64),
+        (shape, others): (&ShapeFit, &Others<'_>),
         frames: &[usize],
         count: usize,
     ) -> Result<Option<Calibration>, Error> {
         let image: Vec<f64> = shape.shares.iter().map(|share| share * shape.flux_jy).collect();
         let ring = self.file.ring.as_ref();
         let ring = ring.and_then(|ring| Ring::measure(&image, self.grid, ring));
-        let images = self.draws(measured, (&image, others, spread), frames, count)?;
+        let images = self.draws(measured, (&image, others), frames, count)?;
         let explains = shape.explains;
         Ok(images.map(|images| Calibration { shape: image, explains, ring, images }))
     }
@@ -342,12 +343,14 @@ impl Search<'_> {
 /// Standard deviation of the logarithm of the envelope's width: how far those from different baselines are apart.
 const ENVELOPE_SPREAD: f64 = 0.1;
 
-/// Starts and strengths of draws.
+/// Choices of draws.
 struct Others<'a> {
     /// Starts with a loss within 1 % of the least.
     starts: Vec<&'a Candidate>,
     /// Strengths that are as good as the best.
     strengths: Vec<f64>,
+    /// Standard deviation of the flux that their priors are about, Jy: 0 where what the prior does is taken off.
+    flux_sigma_jy: f64,
 }
 
 #[cfg(test)]
