@@ -43,8 +43,7 @@ pub struct Survey {
     pub known_sky: Option<Calibration>,
 }
 
-/// A simple shape that fits the same data, and images of measurements of that shape: what the method makes of a known sky. The shape
-/// is the best one with a hole where the image has a ring, and the best of all otherwise.
+/// The simple shape that fits the same data best, and images of measurements of that shape: what the method makes of a known sky.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
     /// Pixels of the shape, Jy.

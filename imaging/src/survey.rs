@@ -80,8 +80,7 @@ pub fn survey(
     let good = starts.iter().filter(|start| start.solution.loss <= 1.01 * least).collect();
     // The image's own strength first: it is the one that draws have where the data choose none.
     let chosen = [strength].into_iter().chain(others).collect();
-    let has_ring = starts[best].ring.is_some();
-    let shape = best_shape(shapes.iter().filter(|fit| fit.shape.is_ring() || !has_ring));
+    let shape = best_shape(shapes.iter());
     let flux_sigma_jy = match shape.is_some_and(|shape| shape.explains) {
         true => 0.0,
         false => file.image.flux_sigma_jy,
