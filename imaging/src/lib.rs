@@ -88,7 +88,7 @@ mod tests;
 
 pub use beam::blurred;
 pub use envelope::{Envelope, Profile};
-pub use found::{Calibration, Candidate, Survey};
+pub use found::{Calibration, Candidate, Survey, mean_with_error};
 pub use kerrlight_tomo::Error;
 pub use polarized::{
     LinearPolarization, PolarizedCandidate, PolarizedProblem, PolarizedSurvey, survey_polarized,

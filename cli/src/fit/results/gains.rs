@@ -6,6 +6,7 @@ use crate::fit::folder::Folder;
 use crate::report::{Axis, LinePlot, Marks, Series, Table};
 use kerrlight_common::frames::Frames;
 use kerrlight_imaging::data::station_of_file;
+use kerrlight_imaging::mean_with_error;
 use kerrlight_tomo::fit::settings::LossKind;
 use kerrlight_tomo::fit::setup::FitData;
 use kerrlight_vlbi::Complex64;
@@ -108,15 +109,9 @@ fn widen(table: &mut GainTable, here: &GainTable, others: &[GainTable]) {
 
 /// Takes off amplitudes what those beside images of a known sky have more than those beside the sky, or adds it to their errors.
 fn calibrate(table: &mut GainTable, sky: &GainTable, images: &[GainTable], takes_off: bool) {
-    if images.len() < 2 {
-        return;
-    }
-    let count = images.len() as f64;
     for (k, (gain, sky)) in table.gains.iter_mut().zip(&sky.gains).enumerate() {
-        let all = || images.iter().map(|image| (image.gains[k].gain / sky.gain).norm().ln());
-        let added = all().sum::<f64>() / count;
-        let square: f64 = all().map(|one| (one - added).powi(2)).sum();
-        let of_mean = (square / (count * (count - 1.0))).sqrt();
+        let more = images.iter().map(|image| (image.gains[k].gain / sky.gain).norm().ln());
+        let Some((added, of_mean)) = mean_with_error(&more.collect::<Vec<f64>>()) else { return };
         if takes_off {
             gain.gain *= (-added).exp();
             gain.errors[0] = gain.errors[0].hypot(of_mean);

@@ -289,12 +289,6 @@ impl Found<'_> {
         self.folder.file("draws.npz")?.write(&bytes)
     }
 
-    /// The flux less what the method adds to it, Jy, with its error.
-    fn flux(&self) -> (f64, Option<f64>) {
-        let image = &self.survey.found().solution.image;
-        self.survey.flux().unwrap_or_else(|| (image.iter().sum(), None))
-    }
-
     /// The ring, where one is claimed.
     fn ring(&self) -> Option<Ring> {
         let ring = self.survey.found().ring?;

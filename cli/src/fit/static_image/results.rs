@@ -173,7 +173,7 @@ impl Found<'_> {
         let drawn = |[mean, deviation]: [f64; 2]| OfDraws { mean, deviation };
         let [with, of] = self.survey.with_ring();
         let of_polarized = polarized.map(Polarized::numbers).into_iter().flatten();
-        let (flux_jy, flux_error_jy) = self.flux();
+        let (flux_jy, flux_error_jy) = self.survey.flux();
         let chi2 = kinds().zip(found.chi2.iter().copied());
         Results {
             version: env!("CARGO_PKG_VERSION"),

@@ -139,7 +139,7 @@ impl Found<'_> {
             .iter()
             .map(|penalty| format!("{:?} (weight {})", penalty.kind, penalty.weight))
             .collect();
-        let (flux, error) = self.flux();
+        let (flux, error) = self.survey.flux();
         let mut text = vec![
             format!(
                 "One image of {} × {} positive pixels in a field of {} µas for all frames: nothing moves. No hole, no gas and no \
