@@ -81,7 +81,9 @@ pub fn survey(
     // The image's own strength first: it is the one that draws have where the data choose none.
     let chosen = [strength].into_iter().chain(others).collect();
     let shape = best_shape(shapes.iter());
-    let flux_sigma_jy = match shape.is_some_and(|shape| shape.explains) {
+    // What the prior does is taken off where a shape explains the data, from an image at a minimum.
+    let is_taken_off = starts[best].solution.has_converged;
+    let flux_sigma_jy = match is_taken_off && shape.is_some_and(|shape| shape.explains) {
         true => 0.0,
         false => file.image.flux_sigma_jy,
     };

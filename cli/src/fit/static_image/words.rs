@@ -195,7 +195,7 @@ impl Found<'_> {
             return vec!["No draws were asked for: numbers have no errors.".to_owned()];
         }
         let known_sky = self.survey.known_sky.as_ref();
-        let flux = match known_sky.is_some_and(|known| known.explains) {
+        let flux = match self.survey.calibration().is_some_and(|known| known.explains) {
             true => "",
             false => "a flux drawn from its prior, ",
         };
