@@ -181,6 +181,38 @@ fn exact_scattering_and_variability_of_data() {
     }
 }
 
+/// Redrawn data of an image that explains the measured ones are its own with noise, times gains that scatter as their priors say: 20 %
+/// for each station. Their errors are larger by the same, so that χ² is that of a prior about other gains.
+#[test]
+fn exact_redrawn_data_shift_the_priors_of_gains() {
+    let file = StaticImageFile::parse(SETTINGS).unwrap();
+    let grid = file.image.grid().unwrap();
+    let mut image = ring(grid, [44.0, 16.0], [0.0, 0.0], [0.5, 170.0]);
+    let sum: f64 = image.iter().sum();
+    image.iter_mut().for_each(|x| *x *= 0.6 / sum);
+    let (mut seen, hours) = night();
+    let movie = Movie { grid, pixels: image.repeat(hours.len()) };
+    simulate::fill(&mut seen, &movie, Pulse::Triangle, &hours, Method::Direct).unwrap();
+    let measured = data::total_intensity(&file, seen, "data").unwrap();
+    let known = FitData { gains: None, ..measured.without_truth() };
+    let drawn = |measured: &FitData, seed: u64| {
+        let drawn = data::redrawn(measured, &file.loss, &image, seed).unwrap();
+        drawn.visibilities.unwrap().0.rows
+    };
+    let mut squares = Vec::new();
+    for seed in 0..20 {
+        for (row, plain) in drawn(&measured, seed).iter().zip(drawn(&known, seed)) {
+            let gain = row.noise_sigma[0] / plain.noise_sigma[0];
+            let apart = (row.products[0] / gain - plain.products[0]).norm();
+            // Gains are those of amplitudes without the bias of noise, 1 as far as that goes.
+            assert!(apart < 0.1 * plain.noise_sigma[0], "{apart} {}", plain.noise_sigma[0]);
+            squares.push(gain.ln().powi(2));
+        }
+    }
+    let scatter = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+    assert!((scatter / (0.2 * 2f64.sqrt()) - 1.0).abs() < 0.05, "{scatter}");
+}
+
 /// The gradient of everything at once, with gains, beside central differences.
 #[test]
 fn exact_gradients_of_the_loss() {

@@ -4,11 +4,16 @@ use crate::Error;
 use kerrlight_tomo::fit::settings::Loss;
 use kerrlight_tomo::fit::setup::FitData;
 use kerrlight_vlbi::Complex64;
+use kerrlight_vlbi::gains::{GainPriors, GainTable, GainsByStation};
 use kerrlight_vlbi::noise::add_thermal_noise;
+use kerrlight_vlbi::observation::{Observation, Row};
 use kerrlight_vlbi::operator::{Method, Operator, Transform};
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
 
-/// Simulates the measurement of a static image, with the gains that explain the data best beside it and with other
-/// noise. Data without visibilities stay as they are.
+/// Simulates the measurement of a static image, with the gains that explain the data best beside it, with other noise, and with
+/// gains whose priors are about drawn values. Data without visibilities stay as they are.
 ///
 /// # Errors
 /// If data make no term.
@@ -27,18 +32,52 @@ pub fn redrawn(
     let mut model = vec![Complex64::default(); transform.data()];
     transform.forward(image, &mut model);
     let gains = measured.gains(losses, &model)?.unwrap_or_default();
-    let gains = gains.by_station();
     let basis = observation.basis;
     let names: Vec<String> = observation.stations.iter().map(|s| s.name.clone()).collect();
+    let by_station = gains.by_station();
     let seen = observation.rows.iter_mut().filter(|row| row.stokes_i(basis).is_some());
     for (row, v) in seen.zip(model) {
-        let [first, second] = row
-            .stations
-            .map(|k| gains.at(&names[usize::from(k)], row.time_h).unwrap_or(1.0.into()));
         // Both parallel hands; in a basis of Stokes parameters the second has no part in I.
-        let v = v * first * second.conj();
+        let v = v * factor(row, &by_station, &names);
         (row.products[0], row.products[1]) = (v, v);
     }
     add_thermal_noise(observation, seed);
+    if let Some(priors) = &measured.gains {
+        shift_priors(observation, &drawn(&gains, priors, &names, seed), &names);
+    }
     Ok(copy)
+}
+
+/// What gains make of the visibility of a row.
+fn factor(row: &Row, gains: &GainsByStation<'_>, names: &[String]) -> Complex64 {
+    let [first, second] =
+        row.stations.map(|k| gains.at(&names[usize::from(k)], row.time_h).unwrap_or(1.0.into()));
+    first * second.conj()
+}
+
+/// Makes the random numbers of gains other than those of noise.
+const GAINS: u64 = 0x6761_696e;
+
+/// Gains of the same stations and times from their priors.
+fn drawn(gains: &GainTable, priors: &GainPriors, names: &[String], seed: u64) -> GainTable {
+    let mut drawn = gains.clone();
+    let mut random = Pcg64::seed_from_u64(seed ^ GAINS);
+    for gain in &mut drawn.gains {
+        let station = names.iter().position(|name| *name == gain.station);
+        let sigma = station.map_or(0.0, |k| priors.amplitude_sigma[k]);
+        let off: f64 = random.sample(StandardNormal);
+        gain.gain = (sigma * off).exp().into();
+    }
+    drawn
+}
+
+/// Makes priors of gains that are about 1 be about the inverse of others: data and their errors times these others have the same χ² with
+/// gains that are larger by them.
+fn shift_priors(observation: &mut Observation, gains: &GainTable, names: &[String]) {
+    let gains = gains.by_station();
+    for row in &mut observation.rows {
+        let factor = factor(row, &gains, names);
+        row.products.iter_mut().for_each(|product| *product *= factor);
+        row.noise_sigma.iter_mut().for_each(|sigma| *sigma *= factor.norm());
+    }
 }
