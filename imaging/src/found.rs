@@ -54,12 +54,20 @@ pub struct Calibration {
     pub ring: Option<Ring>,
     /// The images.
     pub images: Vec<Candidate>,
+    /// Fluxes of the shape in measurements of itself, Jy; none where it does not explain the data.
+    pub fluxes: Vec<f64>,
 }
 
 impl Calibration {
     /// Images at a minimum: others say nothing of the method.
     pub fn at_minimum(&self) -> impl Iterator<Item = &Candidate> {
         self.images.iter().filter(|image| image.solution.has_converged)
+    }
+
+    /// Error of the shape's own flux, Jy: the standard deviation of what measurements of it say; 0 with fewer than two.
+    fn flux_error(&self) -> f64 {
+        let of_mean = mean_with_error(&self.fluxes).map_or(0.0, |(_, error)| error);
+        of_mean * (self.fluxes.len() as f64).sqrt()
     }
 
     /// What the method adds to a number, with its error, over the images that have it; none if fewer than two do. The error is that of
@@ -136,10 +144,12 @@ impl Survey {
     pub fn flux(&self) -> (f64, Option<f64>) {
         let number: &Number<'_> = &|image, _| Some(image.iter().sum());
         let here = self.found().solution.image.iter().sum();
-        let Some(known) = self.calibration().filter(|known| !known.explains) else {
-            return self.calibrated(number).unwrap_or((here, None));
-        };
         let error = self.error(|image| image.number(number));
+        let Some(known) = self.calibration().filter(|known| !known.explains) else {
+            let (flux, error) = self.calibrated(number).unwrap_or((here, error));
+            let of_shape = self.calibration().map_or(0.0, Calibration::flux_error);
+            return (flux, error.map(|error| error.hypot(of_shape)));
+        };
         let added = known.added(number).map_or(0.0, |(added, _)| added);
         (here, error.map(|error| error.hypot(added)))
     }
@@ -193,9 +203,11 @@ mod tests {
         Candidate { start: 0, strength: 1.0, solution, chi2: Vec::new(), ring: None }
     }
 
-    /// An image of 1.1 Jy, its draws off by 0.03, and images of a shape of 1 Jy which have 1.05 and 1.07.
+    /// An image of 1.1 Jy, its draws off by 0.03, and images of a shape of 1 Jy which have 1.05 and 1.07. Where it explains the data, its
+    /// own flux scatters by 0.04.
     fn survey(explains: bool) -> Survey {
         let images = vec![image(1.05), image(1.07)];
+        let fluxes = if explains { vec![0.96, 1.0, 1.04] } else { Vec::new() };
         Survey {
             envelope: None,
             held: Vec::new(),
@@ -204,7 +216,13 @@ mod tests {
             best: 0,
             strengths: Vec::new(),
             draws: vec![image(1.07), image(1.13)],
-            known_sky: Some(Calibration { shape: vec![0.4, 0.6], explains, ring: None, images }),
+            known_sky: Some(Calibration {
+                shape: vec![0.4, 0.6],
+                explains,
+                ring: None,
+                images,
+                fluxes,
+            }),
         }
     }
 
@@ -214,7 +232,7 @@ mod tests {
             let off = [flux - expected[0], error.expect("an error") - expected[1]];
             assert!(off.iter().all(|off| off.abs() < 1e-12), "{flux} {error:?}");
         };
-        near(survey(true).flux(), [1.04, 0.03f64.hypot(0.01)]);
+        near(survey(true).flux(), [1.04, 0.03f64.hypot(0.01).hypot(0.04)]);
         near(survey(false).flux(), [1.1, 0.03f64.hypot(0.06)]);
         let mut stopped = survey(true);
         stopped.starts[0].solution.has_converged = false;

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::envelope::{Envelope, Profile};
 use crate::problem::{FluxPrior, ImageProblem};
 use crate::settings::StaticImageFile;
-use crate::solve::minimum;
+use crate::solve::{Minimum, minimum};
 use core::f64::consts::{LN_2, TAU};
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_tomo::fit::settings::LossKind;
@@ -39,6 +39,8 @@ pub struct ShapeFit {
     pub shares: Vec<f64>,
     /// Its flux, Jy.
     pub flux_jy: f64,
+    /// The logarithm of its flux over the expected one, and the parameters of its shares.
+    pub(crate) parameters: Vec<f64>,
     /// χ² per datum of each kind.
     pub chi2: Vec<f64>,
     /// χ² of all independent data, plus the number of parameters times the logarithm of that of the data (Schwarz 1978, Annals
@@ -231,41 +233,77 @@ pub fn fit_shapes(
 /// Iterations from one start, at most.
 const ITERATIONS: usize = 60;
 
+/// A shape and the data that it is fitted to.
+struct Fitting<'a> {
+    shape: Shape,
+    problem: &'a ImageProblem<'a>,
+    grid: ImageGrid,
+    /// Size of a source in this field, µas.
+    size: f64,
+}
+
+impl Fitting<'_> {
+    fn image(&self, x: &[f64]) -> Vec<f64> {
+        let (flux, sizes) = x.split_first().unwrap_or((&0.0, &[]));
+        let shares = self.shape.shares(sizes, self.size, self.grid);
+        shares.into_iter().map(|share| share * self.problem.flux.jy * flux.exp()).collect()
+    }
+
+    /// The minimum from parameters, by derivatives of the pixels from differences; none if `go_on` said no.
+    fn solved(&self, begin: &[f64], go_on: &(dyn Fn() -> bool + Sync)) -> Option<Minimum> {
+        let mut objective = |x: &[f64], g: &mut [f64]| {
+            let (value, of_image) = self.problem.data_and_gradient(&self.image(x), x[0].exp());
+            for (k, g) in g.iter_mut().enumerate() {
+                const STEP: f64 = 1e-4;
+                let moved = |step: f64| {
+                    let mut x = x.to_vec();
+                    x[k] += step;
+                    self.image(&x)
+                };
+                let ends = moved(STEP).into_iter().zip(moved(-STEP));
+                *g = ends.zip(&of_image).map(|((a, b), g)| (a - b) * g).sum::<f64>() / (2.0 * STEP);
+            }
+            g[0] += self.problem.flux_slope(x[0].exp());
+            value
+        };
+        minimum(&mut objective, begin, ITERATIONS, go_on)
+    }
+}
+
+/// Size of a source in the field of these settings, µas.
+fn size(file: &StaticImageFile) -> f64 {
+    0.32 * file.image.field_uas
+}
+
+/// Flux in Jy of a shape that is fitted to other data, from where it fits the first ones best; none if `go_on` said no.
+pub(crate) fn refitted_flux(
+    fit: &ShapeFit,
+    problem: &ImageProblem<'_>,
+    (file, grid): (&StaticImageFile, ImageGrid),
+    go_on: &(dyn Fn() -> bool + Sync),
+) -> Option<f64> {
+    let fitting = Fitting { shape: fit.shape, problem, grid, size: size(file) };
+    let mut begin = fit.parameters.clone();
+    begin[0] += (file.image.flux_jy / problem.flux.jy).ln();
+    let found = fitting.solved(&begin, go_on)?;
+    Some(problem.flux.jy * found.parameters[0].exp())
+}
+
 fn best(
     shape: Shape,
     problem: &ImageProblem<'_>,
     (file, grid): (&StaticImageFile, ImageGrid),
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Option<ShapeFit> {
-    let size = 0.32 * file.image.field_uas;
-    let image = |x: &[f64]| -> Vec<f64> {
-        let (flux, sizes) = x.split_first().unwrap_or((&0.0, &[]));
-        let shares = shape.shares(sizes, size, grid);
-        shares.into_iter().map(|share| share * file.image.flux_jy * flux.exp()).collect()
-    };
+    let size = size(file);
+    let fitting = Fitting { shape, problem, grid, size };
     let solved = |start: Vec<f64>| {
-        let mut objective = |x: &[f64], g: &mut [f64]| {
-            let here = image(x);
-            let (value, of_image) = problem.data_and_gradient(&here, x[0].exp());
-            for (k, g) in g.iter_mut().enumerate() {
-                const STEP: f64 = 1e-4;
-                let moved = |step: f64| {
-                    let mut x = x.to_vec();
-                    x[k] += step;
-                    image(&x)
-                };
-                let ends = moved(STEP).into_iter().zip(moved(-STEP));
-                *g = ends.zip(&of_image).map(|((a, b), g)| (a - b) * g).sum::<f64>() / (2.0 * STEP);
-            }
-            g[0] += problem.flux_slope(x[0].exp());
-            value
-        };
         let begin: Vec<f64> = [0.0].into_iter().chain(start).collect();
-        minimum(&mut objective, &begin, ITERATIONS, go_on)
+        fitting.solved(&begin, go_on)
     };
     let all: Option<Vec<_>> = shape.starts(size).into_par_iter().map(solved).collect();
     let found = all?.into_iter().min_by(|a, b| a.loss.total_cmp(&b.loss))?;
-    let here = image(&found.parameters);
+    let here = fitting.image(&found.parameters);
     let chi2 = problem.chi2(&here);
     let is_still = file.data.visibilities.variability.is_none();
     let mut kinds = chi2.iter().zip(problem.counts());
@@ -279,6 +317,7 @@ fn best(
         chi2,
         criterion: total + found.parameters.len() as f64 * count.max(1.0).ln(),
         explains,
+        parameters: found.parameters,
     })
 }
 

@@ -8,7 +8,7 @@ use crate::found::{Calibration, Candidate, Survey};
 use crate::problem::{FluxPrior, ImageProblem};
 use crate::ring::Ring;
 use crate::settings::{EnvelopeSettings, StaticImageFile, StrengthSettings};
-use crate::shapes::{ShapeFit, best_shape, fit_shapes};
+use crate::shapes::{ShapeFit, best_shape, fit_shapes, refitted_flux};
 use crate::solve::solve;
 use crate::start;
 use kerrlight_tomo::fit::linear::Prior;
@@ -335,9 +335,36 @@ impl Search<'_> {
         let image: Vec<f64> = shape.shares.iter().map(|share| share * shape.flux_jy).collect();
         let ring = self.file.ring.as_ref();
         let ring = ring.and_then(|ring| Ring::measure(&image, self.grid, ring));
-        let images = self.draws(measured, (&image, others), frames, count)?;
+        let Some(images) = self.draws(measured, (&image, others), frames, count)? else {
+            return Ok(None);
+        };
+        let one = |k: usize| self.refitted_flux(measured, (shape, &image), frames, k);
+        let fluxes: Result<Option<Vec<f64>>, Error> = match shape.explains {
+            true => (0..2 * count).into_par_iter().map(one).collect(),
+            false => Ok(Some(Vec::new())),
+        };
         let explains = shape.explains;
-        Ok(images.map(|images| Calibration { shape: image, explains, ring, images }))
+        Ok(fluxes?.map(|fluxes| Calibration { shape: image, explains, ring, images, fluxes }))
+    }
+
+    /// The flux that a simple shape has in measurements of itself with other noise, and with the prior of the flux about a drawn value.
+    fn refitted_flux(
+        &self,
+        measured: &FitData,
+        (shape, image): (&ShapeFit, &[f64]),
+        frames: &[usize],
+        k: usize,
+    ) -> Result<Option<f64>, Error> {
+        let seed = self.file.seed.wrapping_add(1 + k as u64);
+        let drawn = data::redrawn(measured, &self.file.loss, image, seed)?;
+        let terms = drawn.visibility_terms(&self.file.loss, self.grid.pixels())?;
+        let mut random = Pcg64::seed_from_u64(seed);
+        let flux = self.flux();
+        let off: f64 = random.sample(StandardNormal);
+        let flux = FluxPrior { jy: (flux.jy + off * flux.sigma_jy).max(0.01 * flux.jy), ..flux };
+        let problem = ImageProblem { terms: &terms, ..self.problem(1.0, frames, flux) };
+        let go_on = || (self.watch)(Stage::Draws, 0);
+        Ok(refitted_flux(shape, &problem, (self.file, self.grid), &go_on))
     }
 }
 
