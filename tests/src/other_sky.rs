@@ -1,6 +1,7 @@
 //! Geometries whose movies another forward model has made: its own rays, pixels that are means over many of them, emission and
 //! motion in closed form.
 
+use crate::fit_start::array;
 use crate::support::{root, succeed};
 use kerrlight_render::dynamics::Velocity;
 use kerrlight_tomo::fit::settings::{FitFile, PriorSettings};
@@ -9,6 +10,7 @@ use kerrlight_validation::sky::{Arc, Screen, Sky, add_noise, shining};
 use kerrlight_vlbi::array::built_in;
 use kerrlight_vlbi::files::images::movie_archive;
 use serde_json::Value;
+use std::f64::consts::TAU;
 use std::path::Path;
 
 /// Frames from time 0 to the last, M.
@@ -181,7 +183,7 @@ fn exact_a_distant_spot_is_where_its_orbit_is() {
         ([mean(0), mean(1)], flux)
     };
     let (upright, flux) = seen(0.0);
-    let bare = core::f64::consts::TAU.powf(1.5) * (1.0 - 3.0 / radius);
+    let bare = TAU.powf(1.5) * (1.0 - 3.0 / radius);
     assert!((flux / bare - 1.0).abs() < 0.02);
     assert!((upright[0].hypot(upright[1]) - radius - 1.0).abs() < 0.1);
     // A position angle of 90 degrees turns north to east, to the left.
@@ -238,6 +240,30 @@ fn code_drawn_geometries_look_alike_through_both_forward_models() {
     }
 }
 
+/// Results of a fit to a film in a folder, as `fit --init` sets it up, in the true geometry.
+fn fitted(folder: &Path, sky: &Sky, sigma: f64, also: &[&str]) -> Value {
+    succeed(folder, &["fit", "--init", "film.npz", "-o", "fit.toml"]);
+    let sets = [
+        format!("hole.spin={}", sky.spin),
+        format!("observer.inclination_deg={}", sky.inclination_deg),
+        format!("observer.position_angle_deg={}", sky.position_angle_deg),
+        format!("screen.width={}", SCREEN.width),
+        "region.r_min=2.0".to_owned(),
+        "region.r_max=13.0".to_owned(),
+        "motion.velocity={keplerian={}}".to_owned(),
+        "motion.axis=[0.0,0.0,1.0]".to_owned(),
+        "data.movie.from=0.0".to_owned(),
+        format!("data.movie.to={LAST}"),
+        format!("loss.0.sigma={sigma}"),
+    ];
+    let mut words = vec!["fit", "fit.toml", "-o", "run"];
+    sets.iter().map(String::as_str).chain(also.iter().copied()).for_each(|set| {
+        words.extend(["--set", set]);
+    });
+    succeed(folder, &words);
+    crate::fit::results(&folder.join("run"))
+}
+
 /// Pixels of another program are means or samples: a fit in a known geometry tells which, and explains its data.
 #[test]
 fn exact_images_of_another_program_tell_their_rays() {
@@ -247,27 +273,8 @@ fn exact_images_of_another_program_tell_their_rays() {
         let folder = folder.path();
         let screen = Screen { pixels: 24, rays, ..SCREEN };
         let sigma = film(&folder.join("film.npz"), screen, &(sky, arcs.clone()), 0.01);
-        succeed(folder, &["fit", "--init", "film.npz", "-o", "fit.toml"]);
-        let sets = [
-            format!("hole.spin={}", sky.spin),
-            format!("observer.inclination_deg={}", sky.inclination_deg),
-            format!("observer.position_angle_deg={}", sky.position_angle_deg),
-            format!("screen.width={}", SCREEN.width),
-            "region.r_min=2.0".to_owned(),
-            "region.r_max=13.0".to_owned(),
-            "motion.velocity={keplerian={}}".to_owned(),
-            "motion.axis=[0.0,0.0,1.0]".to_owned(),
-            "data.movie.from=0.0".to_owned(),
-            format!("data.movie.to={LAST}"),
-            format!("loss.0.sigma={sigma}"),
-            "representation=linear-grid".to_owned(),
-            "output.nodes=24".to_owned(),
-        ];
-        let mut words = vec!["fit", "fit.toml", "-o", "run"];
-        sets.iter().for_each(|set| words.extend(["--set", set]));
-        also.iter().for_each(|set| words.extend(["--set", set]));
-        succeed(folder, &words);
-        let results = crate::fit::results(&folder.join("run"));
+        let linear = ["representation=linear-grid", "output.nodes=24"];
+        let results = fitted(folder, &sky, sigma, &[&linear[..], also].concat());
         (results["rays_per_pixel"].as_u64(), results["chi2_per_datum"]["image"].as_f64().unwrap())
     };
     let (samples, of_samples) = chi2(1, &[]);
@@ -276,6 +283,111 @@ fn exact_images_of_another_program_tell_their_rays() {
     println!("{of_samples} {of_means} {of_single}");
     assert_eq!([samples, means, single], [Some(1), Some(4), Some(1)]);
     assert!(of_samples < 1.1 && of_means < 1.1 && of_single > of_means + 0.1);
+}
+
+/// A grid with more numbers than data explains them after a few steps, and then learns their noise: it stops there, and an
+/// interrupted fit as well.
+#[test]
+fn exact_steps_end_where_they_would_follow_noise() {
+    let (sky, arcs) = spots_and_arc();
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let screen = Screen { pixels: 20, rays: 1, ..SCREEN };
+    let sigma = film(&folder.join("film.npz"), screen, &(sky, arcs), 0.02);
+    let also = ["representation=grid", "output.nodes=16", "training.batch={pixels=512}"];
+    let results = fitted(folder, &sky, sigma, &also);
+    assert_eq!(results["verdict"]["outcome"], "explained", "{results}");
+    let steps = results["steps"].as_u64().unwrap();
+    let chi2 = results["chi2_per_datum"]["image"].as_f64().unwrap();
+    println!("{steps} steps, {chi2}");
+    assert!(steps > 0 && steps < 400 && steps % 25 == 0, "{steps}");
+    assert!(chi2 > 0.8 && chi2 < 1.0 - 2.5 * (2.0f64 / 8000.0).sqrt(), "{chi2}");
+    succeed(folder, &["fit", "--resume", "run"]);
+    assert_eq!(crate::fit::results(&folder.join("run"))["steps"], steps);
+}
+
+/// A number that falls evenly between two limits, another for each index and axis: multiples of an irrational number.
+fn even(k: usize, axis: i32, [least, most]: [f64; 2]) -> f64 {
+    let part = ((k + 1) as f64 * 1.112_775_684_278_705_5f64.powi(-axis)).fract();
+    least + (most - least) * part
+}
+
+/// Two to six arcs, from spots to filaments, about a hole of any spin seen from any side.
+fn random_field(k: usize) -> (Sky, Vec<Arc>) {
+    let cosine = even(k, 2, [0.1, 0.99]);
+    let sky =
+        Sky::new(even(k, 1, [-0.9, 0.9]), cosine.acos().to_degrees(), even(k, 3, [-180.0, 180.0]));
+    let arc = |j: usize| {
+        let j = 6 * k + j;
+        let sigma = even(j, 1, [0.6, 1.1]);
+        Arc {
+            radius: even(j, 2, [4.0, 9.0]),
+            azimuth: even(j, 3, [0.0, TAU]),
+            pitch: even(j, 4, [-0.8, 0.8]),
+            length: sigma * even(j, 5, [1.0, 4.0]),
+            sigma,
+            amplitude: even(j, 6, [0.4, 1.0]),
+        }
+    };
+    (sky, (0..2 + k % 5).map(arc).collect())
+}
+
+/// Correlation of the volume of a run with that of arcs.
+fn alike(run: &Path, arcs: &[Arc]) -> f64 {
+    let path = run.join("volume.npz");
+    let [volume, low, high] =
+        ["emission.npy", "low.npy", "high.npy"].map(|name| array(&path, name));
+    let side = (volume.len() as f64).cbrt().round() as usize;
+    let at =
+        |axis: usize, k: usize| low[axis] + (high[axis] - low[axis]) * k as f64 / (side - 1) as f64;
+    let light = shining(arcs);
+    let truth = |k: usize| {
+        let [x, y, z] = [at(0, k / (side * side)), at(1, k / side % side), at(2, k % side)];
+        light([x.hypot(y), y.atan2(x), z])
+    };
+    let sums = volume.iter().enumerate().fold([0.0; 3], |[both, own, other], (k, found)| {
+        let truth = truth(k);
+        [both + found * truth, own + found * found, other + truth * truth]
+    });
+    sums[0] / (sums[1] * sums[2]).sqrt()
+}
+
+/// Each representation, as `fit --init` sets it up, explains films of random fields, or names the setting to change.
+/// `KERRLIGHT_FIELDS` says how many fields.
+#[test]
+#[ignore = "two hours"]
+fn exact_defaults_explain_random_fields() {
+    let count = std::env::var("KERRLIGHT_FIELDS").map_or(10, |count| count.parse().unwrap());
+    let mut silent = Vec::new();
+    for k in 0..count {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (sky, arcs) = random_field(k);
+        let sigma = film(&folder.path().join("film.npz"), SCREEN, &(sky, arcs.clone()), 0.01);
+        println!(
+            "field {k}: {} arcs, a = {:.2}, i = {:.0}°, {:.0}°",
+            arcs.len(),
+            sky.spin,
+            sky.inclination_deg,
+            sky.position_angle_deg
+        );
+        for kind in ["linear-grid", "grid", "feature-grid", "bhnerf"] {
+            let results = fitted(folder.path(), &sky, sigma, &[&format!("representation={kind}")]);
+            let (outcome, advice) = (&results["verdict"]["outcome"], &results["advice"]);
+            let seconds = results["cpu_seconds"].as_f64().unwrap();
+            let chi2 = results["chi2_per_datum"]["image"].as_f64().unwrap();
+            let alike = alike(&folder.path().join("run"), &arcs);
+            println!("  {kind}: {chi2:.3}, {outcome}, {alike:.3}, {seconds:.0} s, {advice}");
+            std::fs::remove_dir_all(folder.path().join("run")).unwrap();
+            std::fs::remove_file(folder.path().join("fit.toml")).unwrap();
+            if outcome == "unexplained" && advice.as_array().is_none_or(Vec::is_empty) {
+                silent.push(format!("{k} {kind}"));
+            }
+        }
+    }
+    assert!(
+        silent.is_empty(),
+        "data are not explained, and nothing says what to change: {silent:?}"
+    );
 }
 
 /// Voxels and pixels that the search begins with are too coarse for the filaments, and a start of so few evaluations ends

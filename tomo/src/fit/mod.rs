@@ -68,7 +68,7 @@ pub use learning::device::{DeviceError, DeviceRunner, Drawn, StepDevice, Stretch
 pub use learning::state::{Diverged, Outcome, Progress, State};
 pub use learning::steps::Place;
 pub use learning::trainer::Trainer;
-pub use learning::training::{BatchSize, OccupancyPlan, Training};
+pub use learning::training::{BatchSize, COMPARED, OccupancyPlan, Training};
 pub use loss::change_price::{ChangeBuffers, ChangePrice};
 pub use loss::curve_term::{FluxDatum, StokesCurveTerm};
 pub use loss::device_observable::Compared;

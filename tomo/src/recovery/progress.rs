@@ -51,6 +51,8 @@ pub enum Event<'a> {
     Round(usize, &'a SolvedLeakage),
     /// Leakage of the last round, or before a step.
     Leakage(Option<u64>, &'a SolvedLeakage),
+    /// Steps after which the model explains the data and others would follow their noise: the last ones.
+    FollowsNoise(u64),
 }
 
 /// A fit before its first step, or after one.

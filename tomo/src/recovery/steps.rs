@@ -4,12 +4,13 @@ use super::progress::{At, Event, Progress};
 use super::{Fit, Stopped};
 use crate::Error;
 use crate::fit::linear::LinearError;
-use crate::fit::settings::FitFile;
-use crate::fit::{State, Trainer};
+use crate::fit::settings::{FitFile, Loss, LossKind};
+use crate::fit::verdict::Outcome;
+use crate::fit::{COMPARED, State, Trainer};
 use std::time::Instant;
 
 impl Fit<'_, '_> {
-    /// All of them; an error if it was stopped, after its state was kept.
+    /// All of them, or those after which the model follows noise; an error if it was stopped, after its state was kept.
     pub(super) fn steps(
         &mut self,
         state: &mut State<f32>,
@@ -18,6 +19,10 @@ impl Fit<'_, '_> {
         let steps = self.file.training.steps;
         let mut saved = Instant::now();
         while state.now.step < steps {
+            if self.follows_noise(state)? {
+                progress.save(state)?;
+                return progress.found(Event::FollowsNoise(state.now.step));
+            }
             self.solve_leakage(state, progress)?;
             let outcome = match self.trainer.step(state) {
                 Ok(outcome) => outcome,
@@ -40,6 +45,28 @@ impl Fit<'_, '_> {
             }
         }
         Ok(())
+    }
+
+    /// Returns whether the model explains all data, and some of them better than a right one does: the discrepancy principle
+    /// (Morozov 1966, Soviet Mathematics Doklady 7, 414). Nothing tells where gains, leakage or the axis are solved for as well.
+    fn follows_noise(&mut self, state: &State<f32>) -> Result<bool, Error> {
+        let Self { file, measured, .. } = *self;
+        let linear = |loss: &Loss| loss.data == LossKind::Image || loss.data.is_visibilities();
+        let is_known = measured.gains.is_none() && measured.leakage.is_none();
+        let tells =
+            is_known && file.loss.iter().all(linear) && self.trainer.training.axis_rate.is_none();
+        let weights: f64 = file.loss.iter().map(|loss| loss.weight).sum();
+        let step = state.now.step;
+        let may_follow = step > 0 && step.is_multiple_of(COMPARED) && state.now.loss < weights;
+        if !tells || !may_follow {
+            return Ok(false);
+        }
+        let frames: Vec<usize> = (0..measured.times.len()).collect();
+        let seen = self.trainer.images(&state.now, &frames, true)?;
+        let movie = self.pictured(state, &seen)?;
+        let judged = self.judged(state, &seen, &movie)?;
+        let explains = judged.verdict.outcome != Outcome::Unexplained;
+        Ok(explains && judged.terms.iter().any(|(_, tested)| tested.follows_noise()))
     }
 
     /// Solves for the leakage beside the present emission before steps at equal intervals, as often as settings say.

@@ -224,23 +224,31 @@ fn geometries<'a>(
     let is_changing = prepared.settings.change.is_some();
     // Residuals of the best geometry, but no less than the errors that the search assumed.
     let left = geometry.noise_factor.max(geometry.chi2_per_datum.sqrt());
-    let factor = if is_changing { noise_of(folder)? } else { left };
+    let factor = if is_changing { Results::read(folder)?.noise() } else { left };
     let about = (&prepared.settings, &prepared.measured);
     Ok(GeometryPosterior::new(about, unknown, (best, &spread), factor)?)
 }
 
-/// χ² of each kind of data over their number, of all results of a fit.
+/// What draws need of all results of a fit.
 #[derive(Deserialize)]
-struct Explained {
+struct Results {
+    /// χ² of each kind of data over their number.
     chi2_per_datum: BTreeMap<String, Option<f64>>,
+    /// Steps that the fit took.
+    steps: u64,
 }
 
-/// Noise of a draw over the errors of the data: these are too small where the model does not explain them.
-fn noise_of(folder: &Folder) -> anyhow::Result<f64> {
-    let text = output::read_text(&folder.path().join("results.json"))?;
-    let results: Explained = serde_json::from_str(&text).context("results.json is damaged")?;
-    let chi2 = results.chi2_per_datum.values().flatten();
-    Ok(chi2.copied().fold(1.0f64, f64::max).sqrt())
+impl Results {
+    fn read(folder: &Folder) -> anyhow::Result<Self> {
+        let text = output::read_text(&folder.path().join("results.json"))?;
+        serde_json::from_str(&text).context("results.json is damaged")
+    }
+
+    /// Noise of a draw over the errors of the data: these are too small where the model does not explain them.
+    fn noise(&self) -> f64 {
+        let chi2 = self.chi2_per_datum.values().flatten();
+        chi2.copied().fold(1.0f64, f64::max).sqrt()
+    }
 }
 
 /// Parts of which draws are made.
@@ -253,6 +261,8 @@ struct Drawing<'a> {
     rays: RaySampling,
     /// Noise of a draw over the errors of the data.
     factor: f64,
+    /// Steps that the fit took.
+    steps: u64,
 }
 
 impl<'a> Drawing<'a> {
@@ -271,9 +281,10 @@ impl<'a> Drawing<'a> {
             }
             _ => None,
         };
+        let results = Results::read(folder)?;
         let factor = match &geometries {
             Some(geometries) => geometries.factor(),
-            None => noise_of(folder)?,
+            None => results.noise(),
         };
         let file = held_out::settled(&prepared.settings, folder)?;
         let found = geometry.as_ref().map(|geometry| Resolution::from(geometry.resolution));
@@ -282,7 +293,8 @@ impl<'a> Drawing<'a> {
             None => file,
         };
         let rays = found.map(|found| found.rays).unwrap_or_default();
-        Ok(Self { prepared, file, unknown, geometries, rays, factor })
+        let steps = results.steps;
+        Ok(Self { prepared, file, unknown, geometries, rays, factor, steps })
     }
 
     /// A draw of an earlier call, or a new one; none if it was stopped.
@@ -308,6 +320,7 @@ impl<'a> Drawing<'a> {
         told: &dyn Fn(&str),
     ) -> anyhow::Result<Option<(Drawn, Option<PerParameter<f64>>)>> {
         let Problem { instrument, measured, motion, registry, .. } = self.prepared;
+        let steps = self.steps;
         let mut file = self.file.clone();
         file.seed = file.seed.wrapping_add(number);
         let has_prior = file.linear.as_ref().is_some_and(|linear| linear.prior.is_some());
@@ -318,7 +331,7 @@ impl<'a> Drawing<'a> {
         let noise = seed(&file, number);
         let (Some(unknown), Some(geometries)) = (self.unknown, &self.geometries) else {
             let data = measured.perturbed(&file.loss, self.factor, noise)?;
-            let through = Through { file: &file, instrument, motion, registry, measured };
+            let through = Through { file: &file, instrument, motion, registry, measured, steps };
             let drawn = sample::draw(&through, &data, keeper, told)?;
             return Ok(drawn.map(|drawn| (drawn, None)));
         };
@@ -328,8 +341,8 @@ impl<'a> Drawing<'a> {
         let rays = RaySampling { lattice: number, ..self.rays };
         let ResolvedFit { file, instrument, motion, .. } =
             ResolvedFit::in_geometry(self.prepared, &file, &geometry, rays)?;
-        let through =
-            Through { file: &file, instrument: &instrument, motion: &motion, registry, measured };
+        let (instrument, motion) = (&instrument, &motion);
+        let through = Through { file: &file, instrument, motion, registry, measured, steps };
         let drawn = sample::draw(&through, &data, keeper, told)?;
         let values = geometry.values(&unknown.free);
         Ok(drawn.map(|drawn| (drawn, Some(values))))

@@ -30,6 +30,8 @@ pub struct Through<'a> {
     pub registry: &'a Registry,
     /// The data as they were measured.
     pub measured: &'a FitData,
+    /// Steps that the fit took.
+    pub steps: u64,
 }
 
 /// Result of a draw.
@@ -62,8 +64,7 @@ pub fn draw(
     if !begin(file, &mut trainer, &mut state, times, keeper, told)? {
         return Ok(None);
     }
-    let steps = if file.representation.kind == Kind::LinearGrid { 0 } else { file.training.steps };
-    if !learn(&mut trainer, &mut state, steps, keeper, told)? {
+    if !learn(&mut trainer, &mut state, through.steps, keeper, told)? {
         return Ok(None);
     }
     let frames: Vec<usize> = (0..measured.times.len()).collect();

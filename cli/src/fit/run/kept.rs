@@ -184,6 +184,13 @@ impl<'a> Kept<'a> {
                 Ok(())
             }
             Event::Leakage(step, found) => leakage::keep(folder, step, found),
+            Event::FollowsNoise(step) => {
+                let of = self.problem.settings.training.steps;
+                eprintln!(
+                    "step {step} of {of} is the last: more would follow the noise of the data"
+                );
+                Ok(())
+            }
             _ => Ok(()),
         }
     }

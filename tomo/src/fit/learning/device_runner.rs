@@ -3,7 +3,7 @@
 use super::device::{DeviceRunner, Drawn, Stretch, Taken};
 use super::state::{Outcome, State, step_back};
 use super::trainer::Trainer;
-use super::training::BatchSize;
+use super::training::{BatchSize, COMPARED};
 use crate::Error;
 use kerrlight_common::simd::Float;
 use std::time::Instant;
@@ -36,8 +36,8 @@ impl<T: Float> Trainer<'_, T> {
     /// Returns the number of steps to take at once.
     fn stretch(&self, delegate: &DeviceRunner<T>, step: u64) -> u64 {
         let to_multiple = |of: u64| of - step % of;
-        let mut count =
-            to_multiple(delegate.pause).min(to_multiple(self.training.keep_every.max(1)));
+        let pauses = [delegate.pause, self.training.keep_every.max(1), COMPARED];
+        let mut count = pauses.into_iter().map(to_multiple).fold(u64::MAX, u64::min);
         if let Some(plan) = self.training.occupancy {
             let every = plan.every.max(1);
             let next = match step.checked_sub(plan.warm_up) {

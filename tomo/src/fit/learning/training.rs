@@ -9,6 +9,9 @@ use kerrlight_common::simd::Float;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Steps from one comparison of a fit with all of its data to the next.
+pub const COMPARED: u64 = 25;
+
 /// Data of a step: rays, or whole frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub struct Training {
     /// Rule of the steps.
     pub optimiser: Optimiser,
-    /// Number of steps.
+    /// Number of steps, at most.
     pub steps: u64,
     /// Steps over which the rate grows from 0.
     pub ramp: u64,

@@ -21,6 +21,8 @@ pub const CHANCE: f64 = 5.0;
 pub fn is_chance(chi2: f64, count: usize) -> bool {
     chi2 <= 1.0 + CHANCE * (2.0 / count.max(1) as f64).sqrt()
 }
+/// Standard deviations below the χ² of a right model from which on a fit follows noise.
+const FOLLOWED: f64 = 2.5;
 /// Excess of χ² per datum that is tolerated for any number of data: an error of the model of 0.3 σ, smaller than
 /// anything that single data can tell.
 pub const EXCESS: f64 = 0.1;
@@ -102,6 +104,13 @@ impl Tested {
         let taken = statistics.taken.clamp(0.0, 1.0);
         let expected = Expected { chi2: 1.0, spread, mean: 0.0, in_time: 0.0, taken };
         Self { statistics, errors, expected }
+    }
+
+    /// Returns whether χ² is less than a right model has: what the fit learns is noise.
+    pub fn follows_noise(&self) -> bool {
+        let Expected { chi2, spread, .. } = self.expected;
+        let knows_noise = !matches!(self.errors, Errors::Weight | Errors::Shared);
+        knows_noise && self.statistics.chi2().is_some_and(|of| of < chi2 - FOLLOWED * spread)
     }
 
     /// Expects residuals like those of drawn data about the same model; Gaussian if that is no number.

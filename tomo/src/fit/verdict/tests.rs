@@ -118,6 +118,17 @@ fn exact_shared_errors_are_judged_by_size_alone() {
     assert_eq!(of(3.0).outcome, Outcome::Unexplained);
 }
 
+/// χ² of 24,000 data scatters by 0.009: 0.97 is less than a right model has.
+#[test]
+fn exact_less_than_a_right_model_has_is_noise() {
+    let of = |size: f64, errors: Errors| {
+        let residuals = baselines(2000, |_, _, noise| size.sqrt() * noise);
+        Tested::gaussian(residuals, errors).follows_noise()
+    };
+    assert!(!of(1.0, Errors::Known) && of(0.96, Errors::Known) && of(0.96, Errors::Stated));
+    assert!(!of(0.96, Errors::Shared) && !of(0.96, Errors::Weight));
+}
+
 /// A linear grid that has used up half of the data halves χ²; a quarter of it is too little all the same.
 #[test]
 fn exact_what_parameters_take_is_expected() {
