@@ -300,7 +300,7 @@ fn exact_steps_end_where_they_would_follow_noise() {
     let steps = results["steps"].as_u64().unwrap();
     let chi2 = results["chi2_per_datum"]["image"].as_f64().unwrap();
     println!("{steps} steps, {chi2}");
-    assert!(steps > 0 && steps < 400 && steps % 25 == 0, "{steps}");
+    assert!(steps > 0 && steps < 400 && steps.is_multiple_of(25), "{steps}");
     assert!(chi2 > 0.8 && chi2 < 1.0 - 2.5 * (2.0f64 / 8000.0).sqrt(), "{chi2}");
     succeed(folder, &["fit", "--resume", "run"]);
     assert_eq!(crate::fit::results(&folder.join("run"))["steps"], steps);
