@@ -2,6 +2,7 @@
 
 use crate::fit::results;
 use crate::fit_start::array;
+use crate::known_skies::bell;
 use crate::static_sky;
 use crate::support::{binary, fail, kerrlight, root, succeed};
 use kerrlight_vlbi::Complex64;
@@ -238,89 +239,6 @@ fn exact_the_experiment_of_m87_has_its_tables() {
     for words in ["Diameter of the ring", "closures alone", "Static images"] {
         assert!(page.contains(words), "{words}");
     }
-}
-
-/// Skies of 0.6 Jy in a field of 120 µas, brightness at a place to the east and north of the middle, µas, and the least normalised
-/// cross-correlation of their images.
-type Sky = (&'static str, fn(f64, f64) -> f64, f64);
-
-pub fn bell(x: f64, fwhm: f64) -> f64 {
-    (-4.0 * 2f64.ln() * (x / fwhm).powi(2)).exp()
-}
-
-/// A circle of 42 µas, 12 µas wide, brighter at 170° by a part.
-fn circle(east: f64, north: f64, part: f64) -> f64 {
-    let turn = east.atan2(north) - 170f64.to_radians();
-    bell(east.hypot(north) - 21.0, 12.0) * (1.0 + part * turn.cos())
-}
-
-const SKIES: [Sky; 5] = [
-    ("ring", |x, y| circle(x, y, 0.5), 0.985),
-    ("crescent", |x, y| circle(x, y, 0.95), 0.985),
-    ("disc", |x, y| 1.0 / (1.0 + (2.0 * (x.hypot(y) - 30.0)).exp()), 0.97),
-    (
-        "double",
-        |x, y| bell((x + 14.0).hypot(y + 8.0), 14.0) + 0.7 * bell((x - 14.0).hypot(y - 8.0), 14.0),
-        0.98,
-    ),
-    ("Gaussian", |x, y| bell(x.hypot(y), 40.0), 0.985),
-];
-
-/// Convolved with a round Gaussian of 10 µas.
-fn convolved(image: &[f64], side: usize, field: f64) -> Vec<f64> {
-    let pixel = field / side as f64;
-    let along = |value: &dyn Fn(usize) -> f64, at: usize| -> f64 {
-        (0..side).map(|k| bell(pixel * k.abs_diff(at) as f64, 10.0) * value(k)).sum()
-    };
-    let all = 0..side * side;
-    let rows: Vec<f64> =
-        all.clone().map(|k| along(&|j| image[k / side * side + j], k % side)).collect();
-    all.map(|k| along(&|i| rows[i * side + k % side], k / side)).collect()
-}
-
-/// The largest normalised cross-correlation of an image with a sky over shifts of up to 10 µas, both with a beam of 10 µas.
-pub fn correlation(image: &[f64], side: usize, field: f64, sky: &dyn Fn(f64, f64) -> f64) -> f64 {
-    let centred = |image: Vec<f64>| {
-        let mean = image.iter().sum::<f64>() / image.len() as f64;
-        image.into_iter().map(|x| x - mean).collect::<Vec<f64>>()
-    };
-    let found = centred(convolved(image, side, field));
-    let place = |k: usize| field * (0.5 - (k as f64 + 0.5) / side as f64);
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let shifts = || (-10..=10).map(f64::from);
-    let of = |[x, y]: [f64; 2]| {
-        let light = |k: usize| sky(place(k % side) - x, place(k / side) - y);
-        let truth =
-            centred(convolved(&(0..side * side).map(light).collect::<Vec<_>>(), side, field));
-        dot(&found, &truth) / (dot(&found, &found) * dot(&truth, &truth)).sqrt()
-    };
-    shifts().flat_map(|x| shifts().map(move |y| [x, y])).map(of).fold(-1.0, f64::max)
-}
-
-/// Simulated nights of M87* with gains and lost phases, with the settings that `fit --data` assumes: the image is like the sky, and
-/// a ring is claimed where there is one.
-#[test]
-#[ignore = "long"]
-fn exact_images_are_like_the_skies_that_were_observed() {
-    let mut wrong = Vec::new();
-    for (name, sky, least) in SKIES {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path();
-        write_image(path, 120, sky);
-        succeed(path, &SEEN.split(' ').collect::<Vec<_>>());
-        succeed(path, &["fit", "--data", "data.uvfits", "-o", "run"]);
-        let found = results(&path.join("run"));
-        let image = array(&path.join("run/image.npz"), "recovered.npy");
-        let field = array(&path.join("run/image.npz"), "field_uas.npy")[0];
-        let side = (image.len() as f64).sqrt() as usize;
-        let alike = correlation(&image, side, field, &sky);
-        let ring = found["ring_diameter_uas"].as_f64();
-        println!("{name}: correlation {alike:.4}, ring {ring:?}, strength {}", found["strength"]);
-        if alike < least || ring.is_some() != matches!(name, "ring" | "crescent") {
-            wrong.push((name, alike, ring));
-        }
-    }
-    assert!(wrong.is_empty(), "{wrong:?}");
 }
 
 /// Public data: χ² as it is in fits of the image with other noise, and a ring of the published size, bright in the south.
