@@ -18,6 +18,7 @@ pub mod verdict;
 
 pub use kerrlight_tomo::recovery::{recovered, true_volume};
 pub use light_curve::TABLE as LIGHT_CURVE;
+pub use numbers::last_step;
 
 use super::folder::Folder;
 use gains::Gains;

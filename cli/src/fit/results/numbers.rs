@@ -52,7 +52,7 @@ pub fn mask_error(
 #[derive(Serialize)]
 pub struct Results {
     version: &'static str,
-    steps: u64,
+    pub steps: u64,
     seconds: f64,
     cpu_seconds: Option<f64>,
     peak_memory_mib: Option<f64>,
@@ -243,6 +243,11 @@ pub fn last_line(headline: &str, results: &Results) -> String {
         }
         _ => headline,
     }
+}
+
+/// Why steps have ended early.
+pub fn last_step(step: u64, of: u64) -> String {
+    format!("Step {step} of {of} is the last: more would follow the noise of the data.")
 }
 
 /// A line of the table of results.

@@ -4,7 +4,7 @@ use super::bounds::Reached;
 use super::gains::Gains;
 use super::leakage::Leakage;
 use super::medium;
-use super::numbers::{Results, outcomes};
+use super::numbers::{Results, last_step, outcomes};
 use super::over_time::Changes;
 use super::quiescent::Quiescent;
 use super::verdict;
@@ -20,7 +20,7 @@ use kerrlight_common::toml_file::{self, Keys};
 use kerrlight_render::volume::Shown;
 use kerrlight_render::volume::projection::Surroundings;
 use kerrlight_render::volume::slices::Through;
-use kerrlight_tomo::fit::settings::{AxisSearch, DataFiles, FitFile};
+use kerrlight_tomo::fit::settings::{AxisSearch, DataFiles, FitFile, Kind};
 use kerrlight_tomo::fit::setup::PreviewImage;
 
 /// Emission in Jy/pixel a M would mean little: 1 M of emission 1 gives `screen.jy_per_pixel`.
@@ -194,6 +194,9 @@ impl Estimate<'_> {
         lines.extend(results.geometry.iter().flat_map(|of| of.sentences()));
         lines.extend(results.band.iter().flat_map(|of| of.sentences()));
         lines.extend(results.held_out.as_ref().and_then(|of| of.sentence()));
+        let (step, of) = (results.steps, file.training.steps);
+        let is_early = file.representation.kind != Kind::LinearGrid && step < of;
+        lines.extend(is_early.then(|| last_step(step, of)));
         lines.extend(results.advice.iter().cloned());
         lines.extend(results.bounds.iter().map(Reached::sentence));
         lines.extend(

@@ -3,6 +3,7 @@
 use super::folder::{self, Folder};
 use crate::devices::FitDevice;
 use crate::fit::journal::Journal;
+use crate::fit::results::last_step;
 use crate::fit::{
     axis_scan, band_search, closures, device_runner, geometry_search, held_out, leakage, linear,
 };
@@ -186,9 +187,7 @@ impl<'a> Kept<'a> {
             Event::Leakage(step, found) => leakage::keep(folder, step, found),
             Event::FollowsNoise(step) => {
                 let of = self.problem.settings.training.steps;
-                eprintln!(
-                    "step {step} of {of} is the last: more would follow the noise of the data"
-                );
+                eprintln!("{}", last_step(step, of));
                 Ok(())
             }
             _ => Ok(()),
