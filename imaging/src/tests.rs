@@ -181,10 +181,10 @@ fn exact_scattering_and_variability_of_data() {
     }
 }
 
-/// Redrawn data of an image that explains the measured ones are its own with noise, times gains that scatter as their priors say: 20 %
-/// for each station. Their errors are larger by the same, so that χ² is that of a prior about other gains.
+/// Redrawn data of an image are its own with noise, times gains that scatter as their priors say: 20 % for each station. Their errors
+/// are larger by the same.
 #[test]
-fn exact_redrawn_data_shift_the_priors_of_gains() {
+fn exact_redrawn_data_have_gains_of_the_priors() {
     let file = StaticImageFile::parse(SETTINGS).unwrap();
     let grid = file.image.grid().unwrap();
     let mut image = ring(grid, [44.0, 16.0], [0.0, 0.0], [0.5, 170.0]);

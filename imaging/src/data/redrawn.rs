@@ -12,8 +12,8 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
-/// Simulates the measurement of a static image, with the gains that explain the data best beside it, with other noise, and with
-/// gains whose priors are about drawn values. Data without visibilities stay as they are.
+/// Simulates the measurement of a static image with other noise, and with other amplitudes of gains as their priors say. Phases of gains,
+/// where they are solved for, are those that explain the data best beside the image. Data without visibilities stay as they are.
 ///
 /// # Errors
 /// If data make no term.
@@ -43,7 +43,8 @@ pub fn redrawn(
     }
     add_thermal_noise(observation, seed);
     if let Some(priors) = &measured.gains {
-        shift_priors(observation, &drawn(&gains, priors, &names, seed), &names);
+        let others = other_amplitudes(&gains, priors, &names, seed);
+        multiply(observation, &others, &names);
     }
     Ok(copy)
 }
@@ -58,22 +59,26 @@ fn factor(row: &Row, gains: &GainsByStation<'_>, names: &[String]) -> Complex64 
 /// Makes the random numbers of gains other than those of noise.
 const GAINS: u64 = 0x6761_696e;
 
-/// Gains of the same stations and times from their priors.
-fn drawn(gains: &GainTable, priors: &GainPriors, names: &[String], seed: u64) -> GainTable {
-    let mut drawn = gains.clone();
+/// What turns amplitudes of gains into others that their priors say.
+fn other_amplitudes(
+    gains: &GainTable,
+    priors: &GainPriors,
+    names: &[String],
+    seed: u64,
+) -> GainTable {
+    let mut others = gains.clone();
     let mut random = Pcg64::seed_from_u64(seed ^ GAINS);
-    for gain in &mut drawn.gains {
+    for gain in &mut others.gains {
         let station = names.iter().position(|name| *name == gain.station);
         let sigma = station.map_or(0.0, |k| priors.amplitude_sigma[k]);
         let off: f64 = random.sample(StandardNormal);
-        gain.gain = (sigma * off).exp().into();
+        gain.gain = ((sigma * off).exp() / gain.gain.norm()).into();
     }
-    drawn
+    others
 }
 
-/// Makes priors of gains that are about 1 be about the inverse of others: data and their errors times these others have the same χ² with
-/// gains that are larger by them.
-fn shift_priors(observation: &mut Observation, gains: &GainTable, names: &[String]) {
+/// Multiplies data and their errors, so that what noise hides stays hidden.
+fn multiply(observation: &mut Observation, gains: &GainTable, names: &[String]) {
     let gains = gains.by_station();
     for row in &mut observation.rows {
         let factor = factor(row, &gains, names);
