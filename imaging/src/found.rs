@@ -90,6 +90,11 @@ pub fn mean_with_error(values: &[f64]) -> Option<(f64, f64)> {
     (values.len() >= 2).then(|| (mean, (square / (count * (count - 1.0))).sqrt()))
 }
 
+/// Standard deviation of a direction of which nothing is known, degrees.
+const UNKNOWN_DEG: f64 = 180.0 / 1.732_050_807_568_877_2;
+/// Error of a mean direction that says something of it, degrees.
+const SURE_DEG: f64 = 15.0;
+
 /// A number of the pixels of an image, Jy, and of its ring, where it has one.
 type Number<'a> = dyn Fn(&[f64], Option<&Ring>) -> Option<f64> + 'a;
 
@@ -137,6 +142,21 @@ impl Survey {
     /// a blurred ring is smaller. An image that is not at a minimum is taken as it is.
     pub fn ring_diameter(&self) -> Option<(f64, Option<f64>)> {
         self.calibrated(&|_, ring| Some(ring?.diameter_uas))
+    }
+
+    /// Direction in which its ring is brightest, degrees east of north, likewise: bright parts draw light to them that belongs elsewhere.
+    /// Images of an even ring have any direction, and say nothing of that.
+    pub fn ring_direction(&self) -> Option<(f64, Option<f64>)> {
+        let here = self.found().ring.as_ref()?.position_angle_deg;
+        let turned: &Number<'_> =
+            &|_, ring| Some((ring?.position_angle_deg - here + 540.0).rem_euclid(360.0) - 180.0);
+        let is_known = self.calibration().and_then(|known| known.added(turned));
+        let is_known = is_known.is_some_and(|(_, of_mean)| of_mean < SURE_DEG);
+        let (turn, error) = match is_known {
+            true => self.calibrated(turned)?,
+            false => (0.0, self.error(|image| image.number(turned))),
+        };
+        Some(((here + turn).rem_euclid(360.0), error.map(|error| error.min(UNKNOWN_DEG))))
     }
 
     /// Flux in Jy, likewise, if the shape explains the data: brightness that no baseline sees costs an image little, so that it has more
@@ -238,5 +258,51 @@ mod tests {
         let mut stopped = survey(true);
         stopped.starts[0].solution.has_converged = false;
         near(stopped.flux(), [1.1, 0.03]);
+    }
+
+    /// The same image with a ring that is brightest in a direction.
+    fn ring(of: Candidate, position_angle_deg: f64) -> Candidate {
+        Candidate { ring: Some(towards(position_angle_deg)), ..of }
+    }
+
+    fn towards(position_angle_deg: f64) -> Ring {
+        Ring {
+            centre_uas: [0.0; 2],
+            diameter_uas: 42.0,
+            diameter_scatter_uas: 0.0,
+            width_uas: 10.0,
+            position_angle_deg,
+            asymmetry: 0.3,
+            central_brightness: 0.0,
+            coverage: 1.0,
+        }
+    }
+
+    /// An image at 350°, its draws off by 10°, and images of a crescent at 10° which are at 5° and 7°. With images in all directions
+    /// the crescent says nothing.
+    #[test]
+    fn exact_directions_that_the_method_turns_are_turned_back() {
+        let with = |images: [f64; 2]| {
+            let plain = survey(true);
+            let known = plain.known_sky.clone().expect("a sky");
+            let known = Calibration {
+                ring: Some(towards(10.0)),
+                images: images.map(|angle| ring(image(1.0), angle)).to_vec(),
+                ..known
+            };
+            Survey {
+                starts: vec![ring(image(1.0), 350.0)],
+                draws: vec![ring(image(1.0), 340.0), ring(image(1.0), 0.0)],
+                known_sky: Some(known),
+                ..plain
+            }
+        };
+        let near = |images, expected: [f64; 2]| {
+            let (angle, error) = with(images).ring_direction().expect("a direction");
+            let off = [angle - expected[0], error.expect("an error") - expected[1]];
+            assert!(off.iter().all(|off| off.abs() < 1e-9), "{angle} {error:?}");
+        };
+        near([5.0, 7.0], [354.0, 10f64.hypot(1.0)]);
+        near([100.0, 220.0], [350.0, 10.0]);
     }
 }

@@ -14,22 +14,14 @@ pub const RING: [(&str, Number); 5] = [
     ("ring_central_brightness", |ring| ring.central_brightness),
 ];
 
-/// Standard deviation of a direction of which nothing is known, degrees.
-const UNKNOWN_DEG: f64 = 180.0 / 1.732_050_807_568_877_2;
-
-/// A number of the ring with its error. Angles are compared the short way round; the diameter is calibrated.
+/// A number of the ring with its error; diameter and direction are calibrated.
 pub fn of_ring(survey: &Survey, ring: &Ring, name: &str, number: Number) -> (f64, Option<f64>) {
-    let value = number(ring);
-    let error = match name {
-        "ring_diameter_uas" => return survey.ring_diameter().unwrap_or((value, None)),
-        "ring_position_angle_deg" => survey
-            .ring_error(|ring| {
-                value + (ring.position_angle_deg - value + 540.0).rem_euclid(360.0) - 180.0
-            })
-            .map(|error| error.min(UNKNOWN_DEG)),
-        _ => survey.ring_error(number),
+    let calibrated = match name {
+        "ring_diameter_uas" => survey.ring_diameter(),
+        "ring_position_angle_deg" => survey.ring_direction(),
+        _ => None,
     };
-    (value, error)
+    calibrated.unwrap_or_else(|| (number(ring), survey.ring_error(number)))
 }
 
 /// `42.1 ± 0.8`, or the number alone where its error is not known.
