@@ -61,6 +61,7 @@ pub use forward::batch::{Batch, Columns};
 pub use forward::forward_model::{Field, ForwardModel, Motion, Redshift};
 pub use forward::occupancy::{Occupancy, OccupancySettings};
 pub use forward::pixel_rays::RingRays;
+pub use forward::shift::Circles;
 pub use forward::sightlines::{Region, Sampling, SightlineRequest, Sightlines};
 pub use forward::stokes::{Observable, PolarizedView};
 pub use learning::checkpoint;

@@ -29,7 +29,8 @@ impl Box3 {
     }
 }
 
-/// The field at the reference time, zero outside the region.
+/// The field at the reference time, zero outside the region, and where matter would be faster than light: nothing is seen of it, and
+/// a representation has any value there.
 ///
 /// # Errors
 /// If the volume is larger than memory, or out of range.
@@ -39,7 +40,9 @@ pub fn recovered(
     state: &State<f32>,
 ) -> Result<Volume, Error> {
     let region = file.region.limits();
-    on_nodes(file, trainer, None, state, &|x| region.holds(x))
+    let (circles, axis) = (trainer.objective.model.circles().cloned(), state.now.axis);
+    let is_dark = |x| circles.as_ref().is_some_and(|circles| circles.is_dark(axis, x));
+    on_nodes(file, trainer, None, state, &|x| region.holds(x) && !is_dark(x))
 }
 
 /// The field at the reference time at all nodes whose matter passes the region at some time, or next to it: what a

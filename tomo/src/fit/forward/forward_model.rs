@@ -3,7 +3,7 @@
 
 use super::fall::Fall;
 use super::occupancy::Occupancy;
-use super::shift::Shift;
+use super::shift::{Circles, Shift};
 use super::sightlines::Sightlines;
 use super::stokes::{Observable, Planes};
 use crate::Error;
@@ -249,6 +249,11 @@ impl<T: Float> ForwardModel<T> {
 }
 
 impl<T: Float> ForwardModel<T> {
+    /// Circles of which parts are dark; none without redshift, or of matter that falls.
+    pub fn circles(&self) -> Option<&Circles> {
+        self.shift.as_ref()?.circles.as_ref()
+    }
+
     /// Gradient along the sphere of a loss with respect to the axis, by way of the weights alone:
     /// `cotangents` holds dL/dweight of each node, summed over frames. Zero without redshift.
     pub fn weights_vjp(&self, axis: Axis, cotangents: &[f64]) -> [f64; 3] {

@@ -1,6 +1,7 @@
 //! The redshift factor of gas that turns about any axis, and its derivative with respect to the axis.
 
 use super::sightlines::Sightlines;
+use core::f64::consts::TAU;
 use kerrlight_geodesic::vector::norm;
 use kerrlight_geodesic::{Kerr, interrupt};
 use kerrlight_render::dynamics::{AngularVelocity, Axis};
@@ -24,11 +25,36 @@ struct Node {
     ahead: f64,
 }
 
+/// Matter on circles of which no light comes from some places: it would be faster than light there.
+#[derive(Clone, Debug)]
+pub struct Circles {
+    spin: f64,
+    velocity: AngularVelocity,
+}
+
+/// Points of a circle that are looked at.
+const AROUND: usize = 8;
+
+impl Circles {
+    /// Returns whether matter that passes a point (M) is dark on its whole way about the axis.
+    pub fn is_dark(&self, axis: Axis, x: [f64; 3]) -> bool {
+        let is_faster_than_light = |x: [f64; 3]| {
+            let node = Node::new(x, [0.0; 3], self.spin, &self.velocity);
+            node.shift(axis.vector()).is_none()
+        };
+        let period = TAU / self.velocity.rate(norm(x));
+        let at = |k: usize| self.velocity.before(axis, x, period * k as f64 / AROUND as f64);
+        (0..AROUND).map(at).all(is_faster_than_light)
+    }
+}
+
 /// g^power of all nodes for any axis.
 #[derive(Clone, Debug)]
 pub(in crate::fit) struct Shift {
     nodes: Vec<Node>,
     power: f64,
+    /// None of matter that falls, which is elsewhere at other times.
+    pub circles: Option<Circles>,
 }
 
 /// Nodes that one thread takes at a time.
@@ -48,7 +74,9 @@ impl Shift {
             }
             node
         };
-        Self { nodes: (0..lines.points()).map(node).collect(), power }
+        let circles = Circles { spin: hole.spin(), velocity: velocity.clone() };
+        let circles = velocity.falling().is_none().then_some(circles);
+        Self { nodes: (0..lines.points()).map(node).collect(), power, circles }
     }
 
     /// Bytes of its nodes.
@@ -176,6 +204,21 @@ mod tests {
             };
             let difference = (moved(1e-6) - moved(-1e-6)) / 2e-6;
             assert!((difference - slope[c]).abs() < 1e-9, "{difference} {}", slope[c]);
+        }
+    }
+
+    /// Circular geodesics in the equatorial plane end at the circular photon orbit, 2 (1 + cos(2/3 arccos(−a))) (Bardeen, Press &
+    /// Teukolsky 1972, eq. 2.18); far from the hole nothing is dark.
+    #[test]
+    fn exact_circles_are_dark_within_the_photon_orbit() {
+        for spin in [-0.9, -0.74, 0.0, 0.6] {
+            let velocity = AngularVelocity::Keplerian { drag: spin };
+            let circles = Circles { spin, velocity };
+            let photon_orbit = 2.0 * (1.0 + (2.0 / 3.0 * f64::acos(-spin)).cos());
+            let axis = Axis::new([0.0, 0.0, 1.0]).expect("an axis");
+            let is_dark = |r: f64| circles.is_dark(axis, [0.6 * r, 0.8 * r, 0.0]);
+            assert!(is_dark(photon_orbit - 0.01) && !is_dark(photon_orbit + 0.01), "{spin}");
+            assert!(!is_dark(8.0));
         }
     }
 }
