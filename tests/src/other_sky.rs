@@ -332,6 +332,9 @@ fn random_field(k: usize) -> (Sky, Vec<Arc>) {
     (sky, (0..2 + k % 5).map(arc).collect())
 }
 
+/// Least correlation of a volume with the truth.
+const LIKE: f64 = 0.85;
+
 /// Correlation of the volume of a run with that of arcs.
 fn alike(run: &Path, arcs: &[Arc]) -> f64 {
     let path = run.join("volume.npz");
@@ -352,13 +355,13 @@ fn alike(run: &Path, arcs: &[Arc]) -> f64 {
     sums[0] / (sums[1] * sums[2]).sqrt()
 }
 
-/// Each representation, as `fit --init` sets it up, explains films of random fields, or names the setting to change.
+/// Each representation, as `fit --init` sets it up, explains films of random fields by volumes like these, or names the setting to change.
 /// `KERRLIGHT_FIELDS` says how many fields.
 #[test]
 #[ignore = "two hours"]
 fn exact_defaults_explain_random_fields() {
     let count = std::env::var("KERRLIGHT_FIELDS").map_or(10, |count| count.parse().unwrap());
-    let mut silent = Vec::new();
+    let mut wrong = Vec::new();
     for k in 0..count {
         let folder = tempfile::tempdir().expect("a folder");
         let (sky, arcs) = random_field(k);
@@ -379,15 +382,15 @@ fn exact_defaults_explain_random_fields() {
             println!("  {kind}: {chi2:.3}, {outcome}, {alike:.3}, {seconds:.0} s, {advice}");
             std::fs::remove_dir_all(folder.path().join("run")).unwrap();
             std::fs::remove_file(folder.path().join("fit.toml")).unwrap();
-            if outcome == "unexplained" && advice.as_array().is_none_or(Vec::is_empty) {
-                silent.push(format!("{k} {kind}"));
+            let names_none = advice.as_array().is_none_or(Vec::is_empty);
+            match outcome.as_str() {
+                Some("explained") if alike > LIKE => {}
+                Some("unexplained") if !names_none => {}
+                _ => wrong.push(format!("{k} {kind}")),
             }
         }
     }
-    assert!(
-        silent.is_empty(),
-        "data are not explained, and nothing says what to change: {silent:?}"
-    );
+    assert!(wrong.is_empty(), "{wrong:?}");
 }
 
 /// Voxels and pixels that the search begins with are too coarse for the filaments, and a start of so few evaluations ends
