@@ -25,7 +25,7 @@ struct Node {
     ahead: f64,
 }
 
-/// Matter on circles of which no light comes from some places: it would be faster than light there.
+/// Matter on circles, which is dark where it would be faster than light.
 #[derive(Clone, Debug)]
 pub struct Circles {
     spin: f64,
@@ -42,7 +42,9 @@ impl Circles {
             let node = Node::new(x, [0.0; 3], self.spin, &self.velocity);
             node.shift(axis.vector()).is_none()
         };
-        let period = TAU / self.velocity.rate(norm(x));
+        let rate = self.velocity.rate(norm(x));
+        // Matter that rests stays where it is.
+        let period = if rate == 0.0 { 0.0 } else { TAU / rate };
         let at = |k: usize| self.velocity.before(axis, x, period * k as f64 / AROUND as f64);
         (0..AROUND).map(at).all(is_faster_than_light)
     }
@@ -219,6 +221,9 @@ mod tests {
             let is_dark = |r: f64| circles.is_dark(axis, [0.6 * r, 0.8 * r, 0.0]);
             assert!(is_dark(photon_orbit - 0.01) && !is_dark(photon_orbit + 0.01), "{spin}");
             assert!(!is_dark(8.0));
+            let resting = AngularVelocity::PowerLaw { radius: 8.0, rate: 0.0, exponent: 0.0 };
+            let resting = Circles { spin, velocity: resting };
+            assert!(!resting.is_dark(axis, [3.0, 0.0, 0.0]), "matter that rests");
         }
     }
 }
