@@ -218,6 +218,12 @@ impl Search<'_> {
         FluxPrior { jy: self.file.image.flux_jy, sigma_jy: self.file.image.flux_sigma_jy }
     }
 
+    /// The prior about a flux that is off by this, Jy. A flux below 0 is none: far from it for any prior that says something.
+    fn flux_about(&self, off: f64) -> FluxPrior {
+        let FluxPrior { jy, sigma_jy } = self.flux();
+        FluxPrior { jy: (jy + off).max(0.01 * jy), sigma_jy }
+    }
+
     fn problem(&self, strength: f64, frames: &[usize], flux: FluxPrior) -> ImageProblem<'_> {
         let (terms, priors, side) = (self.terms, &self.priors, self.file.image.pixels);
         let envelope = self.envelope.as_ref().map(|(shares, weight)| (&shares[..], *weight));
@@ -298,10 +304,7 @@ impl Search<'_> {
             let terms = drawn.visibility_terms(&self.file.loss, self.grid.pixels())?;
             let mut random = Pcg64::seed_from_u64(seed);
             let [of_flux, of_width]: [f64; 2] = [(); 2].map(|()| random.sample(StandardNormal));
-            let FluxPrior { jy, sigma_jy } = self.flux();
-            // A flux below 0 is none: far from it for any prior that says something.
-            let flux =
-                FluxPrior { jy: (jy + of_flux * others.flux_sigma_jy).max(0.01 * jy), sigma_jy };
+            let flux = self.flux_about(of_flux * others.flux_sigma_jy);
             let envelope = self.expected.map(|(expected, weight)| {
                 let fwhm_uas = expected.fwhm_uas * (ENVELOPE_SPREAD * of_width).exp();
                 (Envelope { fwhm_uas, ..expected }.shares(self.grid), weight)
@@ -313,7 +316,7 @@ impl Search<'_> {
             let start = others.starts[k % others.starts.len()];
             let mut begin = start.solution.parameters.clone();
             if let Some(last) = begin.last_mut() {
-                *last += (jy / flux.jy).ln();
+                *last += (self.flux().jy / flux.jy).ln();
             }
             Ok(self.from(Stage::Draws, &problem, &begin, start.start))
         };
@@ -359,9 +362,8 @@ impl Search<'_> {
         let drawn = data::redrawn(measured, &self.file.loss, image, seed)?;
         let terms = drawn.visibility_terms(&self.file.loss, self.grid.pixels())?;
         let mut random = Pcg64::seed_from_u64(seed);
-        let flux = self.flux();
         let off: f64 = random.sample(StandardNormal);
-        let flux = FluxPrior { jy: (flux.jy + off * flux.sigma_jy).max(0.01 * flux.jy), ..flux };
+        let flux = self.flux_about(off * self.flux().sigma_jy);
         let problem = ImageProblem { terms: &terms, ..self.problem(1.0, frames, flux) };
         let go_on = || (self.watch)(Stage::Draws, 0);
         Ok(refitted_flux(shape, &problem, (self.file, self.grid), &go_on))

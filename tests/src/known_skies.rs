@@ -4,7 +4,7 @@
 use crate::fit::results;
 use crate::fit_start::array;
 use crate::static_sky::data;
-use crate::support::succeed;
+use crate::support::{even, succeed, within};
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::gains::GainTable;
@@ -242,10 +242,6 @@ fn exact_known_skies_through_a_real_night() {
 /// Skies of four shapes whose sizes fall evenly in wide ranges, and whose fluxes are drawn from the prior that `kerrlight fit --data`
 /// has for M87*.
 fn drawn_skies(count: usize) -> Vec<Sky> {
-    // Multiples of powers of the inverse of x⁷ = x + 1 fall evenly in the cube of six sides.
-    let even =
-        |k: usize, axis: i32| ((k + 1) as f64 * 1.112_775_684_278_705_5f64.powi(-axis)).fract();
-    let within = |part: f64, [least, most]: [f64; 2]| least + (most - least) * part;
     (0..count)
         .map(|k| {
             let [a, b, c, d] = [1, 2, 3, 4].map(|axis| even(k, axis));

@@ -2,7 +2,7 @@
 //! motion in closed form.
 
 use crate::fit_start::array;
-use crate::support::{root, succeed};
+use crate::support::{even, root, succeed, within};
 use kerrlight_render::dynamics::Velocity;
 use kerrlight_tomo::fit::settings::{FitFile, PriorSettings};
 use kerrlight_tomo::fit::setup::{Drawn, FitData, Instrument};
@@ -306,27 +306,25 @@ fn exact_steps_end_where_they_would_follow_noise() {
     assert_eq!(crate::fit::results(&folder.join("run"))["steps"], steps);
 }
 
-/// A number that falls evenly between two limits, another for each index and axis: multiples of an irrational number.
-fn even(k: usize, axis: i32, [least, most]: [f64; 2]) -> f64 {
-    let part = ((k + 1) as f64 * 1.112_775_684_278_705_5f64.powi(-axis)).fract();
-    least + (most - least) * part
-}
-
 /// Two to six arcs, from spots to filaments, about a hole of any spin seen from any side.
 fn random_field(k: usize) -> (Sky, Vec<Arc>) {
-    let cosine = even(k, 2, [0.1, 0.99]);
-    let sky =
-        Sky::new(even(k, 1, [-0.9, 0.9]), cosine.acos().to_degrees(), even(k, 3, [-180.0, 180.0]));
+    let between = |k, axis, limits| within(even(k, axis), limits);
+    let cosine = between(k, 2, [0.1, 0.99]);
+    let sky = Sky::new(
+        between(k, 1, [-0.9, 0.9]),
+        cosine.acos().to_degrees(),
+        between(k, 3, [-180.0, 180.0]),
+    );
     let arc = |j: usize| {
         let j = 6 * k + j;
-        let sigma = even(j, 1, [0.6, 1.1]);
+        let sigma = between(j, 1, [0.6, 1.1]);
         Arc {
-            radius: even(j, 2, [4.0, 9.0]),
-            azimuth: even(j, 3, [0.0, TAU]),
-            pitch: even(j, 4, [-0.8, 0.8]),
-            length: sigma * even(j, 5, [1.0, 4.0]),
+            radius: between(j, 2, [4.0, 9.0]),
+            azimuth: between(j, 3, [0.0, TAU]),
+            pitch: between(j, 4, [-0.8, 0.8]),
+            length: sigma * between(j, 5, [1.0, 4.0]),
             sigma,
-            amplitude: even(j, 6, [0.4, 1.0]),
+            amplitude: between(j, 6, [0.4, 1.0]),
         }
     };
     (sky, (0..2 + k % 5).map(arc).collect())

@@ -154,3 +154,14 @@ pub fn fail(folder: &Path, arguments: &[&str]) -> String {
     assert!(!message.contains("panicked"), "{message}");
     message
 }
+
+/// A number of [0, 1) for each index, and another one for each of six axes: multiples of powers of the inverse of x⁷ = x + 1 fall evenly
+/// in the cube of six sides.
+pub fn even(k: usize, axis: i32) -> f64 {
+    ((k + 1) as f64 * 1.112_775_684_278_705_5f64.powi(-axis)).fract()
+}
+
+/// The number that lies this part of the way between two limits.
+pub fn within(part: f64, [least, most]: [f64; 2]) -> f64 {
+    least + (most - least) * part
+}
