@@ -64,8 +64,8 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let terms = self.penalised(&data);
         let mut objective = Objective::new(&operator, &data, &terms);
         let taken: Vec<Vec<f64>> = moved.bent.iter().map(|bent| operator.adjoint(bent)).collect();
-        let absorbed: Vec<Vec<f64>> =
-            taken.iter().map(|b| solved(&mut objective, b, iterations)).collect();
+        let solved = taken.iter().map(|b| solved(&mut objective, b, iterations));
+        let (absorbed, left): (Vec<Vec<f64>>, Vec<Vec<f64>>) = solved.unzip();
         // What a field that is not solved for to the end would still do as numbers move.
         let mut downhill = Vec::new();
         objective.value_and_gradient(&here, &mut downhill);
@@ -77,9 +77,12 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         };
         let bend = |k: usize| {
             let (a, b) = (k / n, k % n);
-            product(&tangents[a], &moved.bent[b]) - dot(&taken[a], &absorbed[b])
+            // The misfit that these fields leave has second derivatives that are never negative, and are off by the square of
+            // what the fields are off by; those of one factor alone are off by as much as the fields.
+            let follows = dot(&taken[a], &absorbed[b]) + dot(&absorbed[a], &left[b]);
+            product(&tangents[a], &moved.bent[b]) - follows
         };
-        let bends = (0..n * n).map(bend).collect();
+        let bends = (0..n * n).map(|k| 0.5 * (bend(k) + bend(k % n * n + k / n))).collect();
         let response = |absorbed: &Vec<f64>| {
             let moved: Vec<f64> = absorbed.iter().map(|x| -x).collect();
             operator.active.expand(&moved)
@@ -125,8 +128,8 @@ fn moved<T: Float>(
     }
 }
 
-/// M⁻¹ b by conjugate gradients with a diagonal preconditioner.
-fn solved(objective: &mut dyn Convex, b: &[f64], iterations: usize) -> Vec<f64> {
+/// M⁻¹ b by conjugate gradients with a diagonal preconditioner, and what M times it leaves of b.
+fn solved(objective: &mut dyn Convex, b: &[f64], iterations: usize) -> (Vec<f64>, Vec<f64>) {
     let diagonal = objective.diagonal();
     let scaled = |r: &[f64]| -> Vec<f64> { r.iter().zip(&diagonal).map(|(r, d)| r / d).collect() };
     let mut x = vec![0.0; b.len()];
@@ -154,5 +157,5 @@ fn solved(objective: &mut dyn Convex, b: &[f64], iterations: usize) -> Vec<f64> 
         p.iter_mut().zip(&z).for_each(|(p, z)| *p = z + keep * *p);
         rz = next;
     }
-    x
+    (x, r)
 }

@@ -133,32 +133,41 @@ fn exact_sparse_operator_is_the_grid_and_sums() {
 
 fn compare_with_the_grid(model: &ForwardModel<f64>, degree: Degree) {
     let voxels = Voxels { nodes: [7, 6, 8], ..Voxels::cube(4, 5.0, degree) };
-    let dark = ImageTerm::new(vec![0.0; FRAMES.len() * model.pixels()], model.pixels(), 1.0);
-    let dark = dark.unwrap();
-    let terms = [Weighted { weight: 1.0, term: &dark as &dyn FrameTerm<f64> }];
-    let data = Data::new(&terms, &FRAMES, model.pixels(), 5).unwrap();
-    let count = (FRAMES.len() * model.pixels()) as f64;
     let all = vec![true; voxels.count()];
     let some: Vec<bool> = random(all.len(), 4).iter().map(|x| *x < 0.4).collect();
     for is_active in [all, some] {
         let operator = operator(model, voxels, &is_active, usize::MAX);
         assert!(operator.entries() > 1000 && operator.bytes() > 12 * operator.entries());
-        let x = random(operator.active.count(), 1);
-        let images = movie(model, &voxels, &operator.active.expand(&x));
-        let square: f64 = images.iter().map(|pixel| pixel * pixel).sum();
-        let (value, gradient) = operator.value_and_gradient(&data, &x, false);
-        assert!((value * count / square - 1.0).abs() < 1e-12);
-        // ⟨y, Aᵀ A x⟩ = ⟨A y, A x⟩.
-        let y = random(x.len(), 2);
-        let others = movie(model, &voxels, &operator.active.expand(&y));
-        let forward: f64 = others.iter().zip(&images).map(|(a, b)| a * b).sum();
-        let back: f64 = gradient.iter().zip(&y).map(|(g, y)| 0.5 * count * g * y).sum();
-        assert!((back / forward - 1.0).abs() < 1e-12, "{back} {forward}");
-        // Over all nodes, without the matrix, it is the same.
-        let (_, everywhere) = operator.value_and_gradient(&data, &x, true);
-        for (a, b) in operator.active.gather(&everywhere).iter().zip(&gradient) {
-            assert!((a - b).abs() < 1e-13);
-        }
+        is_transposed(&operator, model, |emission| movie(model, &voxels, emission));
+    }
+}
+
+/// Compares the square of images and its gradient with those of the images that a field has without a matrix.
+fn is_transposed(
+    operator: &Operator<'_, f64>,
+    model: &ForwardModel<f64>,
+    images: impl Fn(&[f64]) -> Vec<f64>,
+) {
+    let count = FRAMES.len() * model.pixels();
+    let dark = ImageTerm::new(vec![0.0; count], model.pixels(), 1.0).unwrap();
+    let terms = [Weighted { weight: 1.0, term: &dark as &dyn FrameTerm<f64> }];
+    let data = Data::new(&terms, &FRAMES, model.pixels(), 5).unwrap();
+    let count = count as f64;
+    let x = random(operator.active.count(), 1);
+    let seen = images(&operator.active.expand(&x));
+    let square: f64 = seen.iter().map(|pixel| pixel * pixel).sum();
+    let (value, gradient) = operator.value_and_gradient(&data, &x, false);
+    assert!((value * count / square - 1.0).abs() < 1e-12, "{value} {square}");
+    // ⟨y, Aᵀ A x⟩ = ⟨A y, A x⟩.
+    let y = random(x.len(), 2);
+    let others = images(&operator.active.expand(&y));
+    let forward: f64 = others.iter().zip(&seen).map(|(a, b)| a * b).sum();
+    let back: f64 = gradient.iter().zip(&y).map(|(g, y)| 0.5 * count * g * y).sum();
+    assert!((back / forward - 1.0).abs() < 1e-12, "{back} {forward}");
+    // Over all nodes, without the matrix, it is the same.
+    let (_, everywhere) = operator.value_and_gradient(&data, &x, true);
+    for (a, b) in operator.active.gather(&everywhere).iter().zip(&gradient) {
+        assert!((a - b).abs() < 1e-13);
     }
 }
 
@@ -200,18 +209,8 @@ fn exact_solution_and_gap_of_a_dense_problem() {
     pixels.iter_mut().zip(noise).for_each(|(pixel, n)| *pixel += 2.0 * (n - 0.5));
     let (_, least) = reference(&columns, &pixels, upper);
     let term = ImageTerm::new(pixels, model.pixels(), 1.0).unwrap();
-    let problem = LinearProblem {
-        model: &model,
-        axis: axis(),
-        frames: &FRAMES,
-        terms: &[Weighted { weight: 1.0, term: &term }],
-        voxels,
-        upper,
-        flux: None,
-        priors: &[],
-        gaussian: None,
-        change: Change::NONE,
-    };
+    let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
+    let problem = LinearProblem { upper, ..of_images(&model, &terms, voxels) };
     let solve = |iterations, coarse| {
         let settings =
             LinearSettings { coarse, iterations, tolerance: 1e-9, ..LinearSettings::default() };
@@ -249,19 +248,10 @@ fn exact_threads_change_no_bit() {
     let truth: Vec<f64> = random(voxels.count(), 3).iter().map(|x| (x - 0.7).max(0.0)).collect();
     let term = ImageTerm::new(movie(&model, &voxels, &truth), model.pixels(), 0.1).unwrap();
     let prior = Prior { regulariser: Regulariser::Smoothness, weight: 1e-3 };
+    let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
+    let priors = &[prior];
     let run = |threads, memory| {
-        let problem = LinearProblem {
-            model: &model,
-            axis: axis(),
-            frames: &FRAMES,
-            terms: &[Weighted { weight: 1.0, term: &term }],
-            voxels,
-            upper: 2.0,
-            flux: None,
-            priors: &[prior],
-            gaussian: None,
-            change: Change::NONE,
-        };
+        let problem = LinearProblem { upper: 2.0, priors, ..of_images(&model, &terms, voxels) };
         let settings = LinearSettings { coarse: None, memory, ..LinearSettings::default() };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| problem.solve(&settings, &mut |_| ControlFlow::Continue(()))).unwrap()
@@ -278,18 +268,7 @@ fn numbers_out_of_range_are_named_and_a_stop_is_heeded() {
     let pixels = vec![1.0; FRAMES.len() * model.pixels()];
     let term = ImageTerm::new(pixels, model.pixels(), 1.0).unwrap();
     let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
-    let problem = LinearProblem {
-        model: &model,
-        axis: axis(),
-        frames: &FRAMES,
-        terms: &terms,
-        voxels,
-        upper: 1.0,
-        flux: None,
-        priors: &[],
-        gaussian: None,
-        change: Change::NONE,
-    };
+    let problem = LinearProblem { upper: 1.0, ..of_images(&model, &terms, voxels) };
     let fail = |problem: LinearProblem<'_, f64>| {
         let go_on = &mut |_: &LinearProgress<'_>| ControlFlow::Continue(());
         problem.solve(&LinearSettings::default(), go_on).unwrap_err().to_string()

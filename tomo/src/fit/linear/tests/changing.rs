@@ -73,31 +73,13 @@ fn compare_with_images(
     voxels: Voxels,
     knots: Knots,
 ) {
-    let dark = vec![0.0; FRAMES.len() * model.pixels()];
-    let dark = ImageTerm::new(dark, model.pixels(), 1.0).unwrap();
-    let terms = [Weighted { weight: 1.0, term: &dark as &dyn FrameTerm<f64> }];
-    let data = Data::new(&terms, &FRAMES, model.pixels(), 5).unwrap();
-    let count = (FRAMES.len() * model.pixels()) as f64;
     for (share, budget) in [(1.0, usize::MAX), (1.0, 0), (0.4, usize::MAX), (0.4, 0)] {
         let is_active: Vec<bool> =
             random(4 * voxels.count(), 4).iter().map(|x| *x < share).collect();
         let active = Active::new(&is_active, &voxels.corners(), 0);
         let walk = Walk::new(model, axis(), (voxels, knots));
         let operator = Operator::new(walk, active, &FRAMES, budget);
-        let x = random(operator.active.count(), 1);
-        let seen = images(model, field, &operator.active.expand(&x));
-        let square: f64 = seen.iter().map(|pixel| pixel * pixel).sum();
-        let (value, gradient) = operator.value_and_gradient(&data, &x, false);
-        assert!((value * count / square - 1.0).abs() < 1e-12, "{value} {square}");
-        let y = random(x.len(), 2);
-        let others = images(model, field, &operator.active.expand(&y));
-        let forward: f64 = others.iter().zip(&seen).map(|(a, b)| a * b).sum();
-        let back: f64 = gradient.iter().zip(&y).map(|(g, y)| 0.5 * count * g * y).sum();
-        assert!((back / forward - 1.0).abs() < 1e-12, "{back} {forward}");
-        let (_, everywhere) = operator.value_and_gradient(&data, &x, true);
-        for (a, b) in operator.active.gather(&everywhere).iter().zip(&gradient) {
-            assert!((a - b).abs() < 1e-13);
-        }
+        is_transposed(&operator, model, |emission| images(model, field, emission));
     }
 }
 
@@ -107,18 +89,9 @@ fn births() -> Change {
 
 fn solve(model: &ForwardModel<f64>, pixels: Vec<f64>, change: Change) -> LinearSolution<f64> {
     let term = ImageTerm::new(pixels, model.pixels(), 1e-3).unwrap();
-    let problem = LinearProblem {
-        model,
-        axis: axis(),
-        frames: &FRAMES,
-        terms: &[Weighted { weight: 1.0, term: &term }],
-        voxels: Voxels::cube(9, 5.0, Degree::Linear),
-        upper: 2.0,
-        flux: None,
-        priors: &[],
-        gaussian: None,
-        change,
-    };
+    let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
+    let voxels = Voxels::cube(9, 5.0, Degree::Linear);
+    let problem = LinearProblem { upper: 2.0, change, ..of_images(model, &terms, voxels) };
     let settings = LinearSettings {
         coarse: None,
         iterations: 800,

@@ -69,18 +69,8 @@ pub(in crate::fit) fn spot(voxels: &Voxels) -> Vec<f64> {
 
 fn solve(terms: &[Weighted<'_, f64>], flux: Option<f64>) -> Result<LinearSolution<f64>, Error> {
     let model = forward_model();
-    let problem = LinearProblem {
-        model: &model,
-        axis: axis(),
-        frames: &FRAMES,
-        terms,
-        voxels: Voxels::cube(11, 5.0, Degree::Linear),
-        upper: 2.0,
-        flux,
-        priors: &[],
-        gaussian: None,
-        change: Change::NONE,
-    };
+    let voxels = Voxels::cube(11, 5.0, Degree::Linear);
+    let problem = LinearProblem { upper: 2.0, flux, ..of_images(&model, terms, voxels) };
     let settings = LinearSettings { iterations: 60, rounds: 3, ..LinearSettings::default() };
     problem.solve(&settings, &mut |_| ControlFlow::Continue(()))
 }
