@@ -14,7 +14,7 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
 /// Other rays that the best geometry is looked for through.
-const LATTICES: u64 = 3;
+const LATTICES: u64 = 5;
 /// Stream of the random numbers of draws.
 const DRAWS: u64 = 0x6f70_656e_0000_0000;
 /// The number of a draw that has as many voxels as the fit.
@@ -31,7 +31,7 @@ pub(super) fn polished(
 }
 
 /// Voxels of a look over those of the search, along each side, by its number.
-const VOXELS: [f64; 4] = [1.0, 1.3, 1.15, 0.87];
+const VOXELS: [f64; 6] = [1.0, 1.3, 1.15, 0.87, 1.22, 0.93];
 
 /// More voxels or fewer.
 fn other_voxels(effort: Effort, number: u64) -> Effort {

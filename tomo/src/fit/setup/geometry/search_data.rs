@@ -28,7 +28,7 @@ pub(super) struct SearchData {
 const BESIDE_THE_RING: f64 = 0.8;
 
 /// Pixels of a look through others over those of the fit, along each side: finer and wider ones.
-const RESAMPLED: [f64; 3] = [1.15, 0.87, 1.25];
+const RESAMPLED: [f64; 5] = [1.15, 0.87, 1.25, 0.93, 1.08];
 /// Iterations of a round, for each over all voxels.
 const SETTLING: usize = 6;
 
