@@ -9,7 +9,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Rays", &["trace", "critical-curve", "accuracy"]),
     ("Data", &["observe", "uv", "convert"]),
     ("Fits", &["fit", "posterior", "compare"]),
-    ("Other", &["inspect", "devices", "completions", "man"]),
+    ("Other", &["inspect", "devices"]),
 ];
 
 /// The command line, whose help page shows the verbs in groups.

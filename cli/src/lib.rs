@@ -43,7 +43,6 @@ mod changed;
 mod checksum;
 mod columns;
 mod compare;
-mod completions;
 mod convert;
 mod critical_curve;
 mod devices;
@@ -54,7 +53,6 @@ mod inspect;
 mod interferometry;
 mod interrupt;
 mod lock;
-mod man;
 mod memory;
 mod movie;
 mod observe;
@@ -133,10 +131,6 @@ enum Verb {
     Inspect(inspect::Inspect),
     /// List the graphics devices that can trace rays
     Devices(devices::Devices),
-    /// Print a completion script for a shell
-    Completions(completions::Completions),
-    /// Write manual pages
-    Man(man::Man),
 }
 
 /// The exit code of a case that another process runs: EX_TEMPFAIL of sysexits.h, to try again.
@@ -249,8 +243,6 @@ impl Verb {
             Verb::Compare(compare) => compare.run((arguments.threads, arguments.memory), program),
             Verb::Inspect(inspect) => inspect.run(),
             Verb::Devices(devices) => devices.run(),
-            Verb::Completions(completions) => completions.run(),
-            Verb::Man(pages) => pages.run(),
         }
     }
 }

@@ -1,11 +1,10 @@
 //! Output of verbs at their end: two lines for a person, one JSON object for a script, or a file with `-o -`; and the
-//! command line's own help, completions and manual pages.
+//! command line's own help.
 
 use crate::support::{fail, kerrlight, root, succeed};
 use kerrlight_render::image::exr;
 use serde_json::{Value, json};
 use std::path::Path;
-use std::process::Command;
 
 const SIZE: [&str; 4] = ["--set", "screen.width=48", "--set", "screen.height=40"];
 const RAYS: &str = "spin,inclination_deg,alpha,beta\n0.9,60,-6,1\n0,90,0.5,0\n";
@@ -31,37 +30,6 @@ fn regress_help_fits_a_screen_with_verbs_in_groups() {
     let order = ["Pictures:", "render ", "Rays:", "trace ", "Data:", "observe ", "Fits:", "fit "];
     assert!(order.windows(2).all(|pair| at(pair[0]) < at(pair[1])), "{help}");
     assert_eq!(help, succeed(&root(), &["-h"]));
-}
-
-#[test]
-fn regress_completions_know_verbs_and_options() {
-    let folder = tempfile::tempdir().unwrap();
-    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
-        let script = succeed(folder.path(), &["completions", shell]);
-        assert!(script.contains("critical-curve") && script.contains("inclination"), "{shell}");
-    }
-    std::fs::write(
-        folder.path().join("kerrlight.bash"),
-        succeed(folder.path(), &["completions", "bash"]),
-    )
-    .unwrap();
-    let script = "source ./kerrlight.bash; COMP_WORDS=(kerrlight cr); COMP_CWORD=1; \
-                  _kerrlight kerrlight cr kerrlight; echo ${COMPREPLY[@]}";
-    let output = Command::new("bash").current_dir(folder.path()).args(["-c", script]).output();
-    assert_eq!(String::from_utf8_lossy(&output.unwrap().stdout).trim(), "critical-curve");
-}
-
-#[test]
-fn regress_a_manual_page_for_each_verb() {
-    let folder = tempfile::tempdir().unwrap();
-    let told = object(folder.path(), &["man", "pages"]);
-    let files: Vec<&str> =
-        told["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap()).collect();
-    assert!(files.contains(&"pages/kerrlight.1") && files.contains(&"pages/kerrlight-fit.1"));
-    for file in files {
-        let page = std::fs::read_to_string(folder.path().join(file)).unwrap();
-        assert!(page.contains(".TH kerrlight") && page.contains(".SH OPTIONS"), "{file}");
-    }
 }
 
 /// A table and the JSON object hold the same numbers, to the last bit.
