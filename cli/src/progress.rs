@@ -1,6 +1,7 @@
 //! Bars with the time left on a terminal; in a pipe, a line a minute.
 
 use crate::session;
+use crate::threads;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::thread;
@@ -36,7 +37,7 @@ fn tell(
         }
     };
     // Without a thread for it there are no lines.
-    let _ = thread::Builder::new().spawn(lines);
+    let _ = threads::spawn(lines);
 }
 
 /// Writes a line above a bar, or where there is none.

@@ -95,11 +95,6 @@ impl<T: Float> Frames<T> {
         self.pixels
     }
 
-    /// Returns whether they are in memory.
-    pub fn is_in_memory(&self) -> bool {
-        matches!(self.store, Store::Memory(_))
-    }
-
     /// An image.
     ///
     /// # Errors
@@ -240,7 +235,6 @@ mod tests {
     fn assert_same<T: Float>(values: &[f64]) {
         let values: Vec<T> = values.iter().map(|x| T::of(*x)).collect();
         let (here, there) = (Frames::of(values.clone(), 3), in_file(&values, 3));
-        assert!(here.is_in_memory() && !there.is_in_memory());
         assert_eq!((there.count(), there.pixels()), (2, 3));
         let bits = |all: Vec<T>| all.iter().map(|x| x.double().to_bits()).collect::<Vec<u64>>();
         assert_eq!(bits(here.to_vec().unwrap()), bits(there.to_vec().unwrap()));

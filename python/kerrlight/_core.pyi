@@ -17,7 +17,6 @@ def call(
     settings: tuple[str, str] | None,
     listener: Any,
 ) -> tuple[str, str]: ...
-def integrators() -> list[str]: ...
 def trace(
     spin: float,
     place: _Place,

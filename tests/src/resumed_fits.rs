@@ -1,10 +1,8 @@
 //! Fits that are resumed: with the data, settings and state they had, alone, or not at all.
 
 use crate::fit::{results, small, with};
-use crate::support::{binary, fail, kerrlight, root, succeed};
+use crate::support::{fail, holds, kerrlight, killed, root, start, succeed, until};
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
 
 /// A fit of a movie that a simulation has left, stopped after its first checkpoint: its words and its folder `run`.
 fn of_a_movie(at: &Path) {
@@ -44,20 +42,6 @@ fn of_an_array(at: &Path) -> Vec<String> {
     words
 }
 
-/// Ends a fit by SIGKILL once it has a checkpoint.
-fn killed(at: &Path, words: &[&str], run: &str) {
-    let mut command = Command::new(binary());
-    command.current_dir(at).args(words).stdout(Stdio::null()).stderr(Stdio::null());
-    let mut child = command.spawn().unwrap();
-    let (log, clock) = (at.join(run).join("log.jsonl"), Instant::now());
-    while !std::fs::read_to_string(&log).is_ok_and(|text| text.contains("psnr_db")) {
-        assert!(clock.elapsed() < Duration::from_secs(120) && child.try_wait().unwrap().is_none());
-        std::thread::sleep(Duration::from_millis(3));
-    }
-    child.kill().unwrap();
-    child.wait().unwrap();
-}
-
 /// Returns the message of a `fit --resume run` that must be refused and must change nothing. What the kill has cut short
 /// in the middle of writing is no file of the run, and may go.
 fn refused(at: &Path) -> String {
@@ -84,7 +68,8 @@ fn exact_changed_inputs_and_damaged_state_are_refused() {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     succeed(at, &[&words[..], &["-o", "whole"]].concat());
     assert!(results(&at.join("whole"))["inputs"].to_string().contains("array.txt"));
-    killed(at, &[&words[..], &["-o", "run"]].concat(), "run");
+    let logged = || holds(&at.join("run/log.jsonl"), "psnr_db");
+    killed(at, &[&words[..], &["-o", "run"]].concat(), "a logged step", logged);
     // A bit of every file that decides what follows.
     let restored = |name: &str, said: &str| {
         let path = at.join(name);
@@ -159,14 +144,8 @@ fn exact_a_folder_belongs_to_one_process() {
     let words = of_an_array(at);
     let mut words: Vec<&str> = words.iter().map(String::as_str).collect();
     words.extend(["--set", "training.steps=1000000", "-o", "run"]);
-    let mut command = Command::new(binary());
-    command.current_dir(at).args(&words).stdout(Stdio::null()).stderr(Stdio::null());
-    let mut child = command.spawn().unwrap();
-    let clock = Instant::now();
-    while !at.join("run/checkpoint.safetensors").exists() {
-        assert!(clock.elapsed() < Duration::from_secs(120));
-        std::thread::sleep(Duration::from_millis(3));
-    }
+    let mut child = start(at, &words);
+    until("a checkpoint", || at.join("run/checkpoint.safetensors").exists());
     let said = |words: &[&str]| {
         let output = kerrlight(at, words);
         assert_eq!(output.status.code(), Some(2));

@@ -1,10 +1,8 @@
 //! Searches for what a fit does not know: killed, they resume where they were, to the same bytes.
 
-use crate::support::{binary, kerrlight, root, succeed};
+use crate::support::{kerrlight, killed, root, succeed};
 use crate::unknown_geometry::{NEAR, of_unknown_view};
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
 
 /// A fit of few voxels.
 const VOXELS: [&str; 6] = [
@@ -18,17 +16,10 @@ const VOXELS: [&str; 6] = [
 
 /// Kills a fit once its search has so many results, and resumes it: what it says then.
 fn killed_and_resumed(at: &Path, words: &[&str], results: usize) -> String {
-    let mut command = Command::new(binary());
-    let all = [words, &["-o", "killed"]].concat();
-    command.current_dir(at).args(all).stdout(Stdio::null()).stderr(Stdio::null());
-    let mut child = command.spawn().unwrap();
-    let (log, clock) = (at.join("killed/search.log"), Instant::now());
-    while !std::fs::read_to_string(&log).is_ok_and(|text| text.lines().count() > results) {
-        assert!(clock.elapsed() < Duration::from_secs(240) && child.try_wait().unwrap().is_none());
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    child.kill().unwrap();
-    child.wait().unwrap();
+    let log = at.join("killed/search.log");
+    let is_there =
+        || std::fs::read_to_string(&log).is_ok_and(|text| text.lines().count() > results);
+    killed(at, &[words, &["-o", "killed"]].concat(), "results of a search", is_there);
     let resumed = kerrlight(at, &["fit", "--resume", "killed"]);
     let told = String::from_utf8_lossy(&resumed.stderr).into_owned();
     assert!(resumed.status.success(), "{told}");

@@ -2,33 +2,13 @@
 //! parent.
 
 use crate::fit::{small, with};
-use crate::support::{binary, kerrlight, root, succeed};
+use crate::support::{binary, holds, kerrlight, root, start, succeed, until};
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
-
-const PATIENCE: Duration = Duration::from_secs(120);
-
-fn start(folder: &Path, words: &[&str]) -> Child {
-    let mut command = Command::new(binary());
-    command.current_dir(folder).args(words).stdout(Stdio::null()).stderr(Stdio::piped());
-    command.spawn().unwrap()
-}
 
 fn signal(pid: u32, name: &str) {
     assert!(Command::new("kill").args([name, &pid.to_string()]).status().unwrap().success());
-}
-
-fn until(what: &str, mut is_so: impl FnMut() -> bool) {
-    let clock = Instant::now();
-    while !is_so() {
-        assert!(clock.elapsed() < PATIENCE, "{what}");
-        std::thread::sleep(Duration::from_millis(3));
-    }
-}
-
-fn holds(path: &Path, text: &str) -> bool {
-    std::fs::read_to_string(path).is_ok_and(|all| all.contains(text))
 }
 
 fn message(output: &Output) -> String {
@@ -67,6 +47,7 @@ fn exact_fits_that_are_stopped_end_in_the_same_bytes() {
         assert_eq!(ended.status.code(), Some(code), "{said}");
         assert!(said.contains("stopped after step") && said.contains("fit --resume"), "{said}");
         assert!(!run.join("results.json").exists());
+        assert!(run.join("checkpoint.safetensors").is_file());
         let resumed = format!("./{name}");
         succeed(folder.path(), &["fit", "--resume", &resumed]);
         for file in ["volume.npz", "movie.npz", "checkpoint.safetensors"] {

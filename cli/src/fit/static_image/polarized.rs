@@ -8,7 +8,7 @@ use kerrlight_imaging::settings::{StaticImageFile, StaticPolarization};
 use kerrlight_imaging::{LinearPolarization, PolarizedSurvey};
 use kerrlight_tomo::fit::FrameTerm;
 use kerrlight_tomo::fit::settings::LossKind;
-use kerrlight_tomo::fit::setup::{FitData, best_held};
+use kerrlight_tomo::fit::setup::{FitData, Held, best_held};
 use kerrlight_tomo::fit::verdict::{Errors, Statistics, Tested};
 use serde::Serialize;
 
@@ -260,21 +260,27 @@ impl Polarized {
 
     /// The loss of held-out frames against the strength.
     pub fn held_out(&self) -> Option<LinePlot> {
-        let held = &self.survey.held;
-        let best = best_held(held)?;
-        Some(LinePlot {
-            title: "Held-out frames: polarisation".to_owned(),
-            caption: "χ² per data point of polarised frames that were not fitted, against the factor on the penalty; bars are \
-                      standard errors of the difference from the best. The least is taken."
-                .to_owned(),
-            x: Axis { label: "factor on the penalty".to_owned(), unit: String::new(), log: true },
-            y: Axis { label: "χ² of held-out data".to_owned(), unit: String::new(), log: false },
-            series: vec![Series {
-                name: "held out".to_owned(),
-                points: held.iter().map(|held| [held.value, held.mean()]).collect(),
-                errors: held.iter().map(|held| held.error_beside(best)).collect(),
-                marks: Marks::Joined,
-            }],
-        })
+        let labels =
+            ["Held-out frames: polarisation", "factor on the penalty", "χ² of held-out data"];
+        let caption = "χ² per data point of polarised frames that were not fitted, against the factor on the penalty; bars are \
+                       standard errors of the difference from the best. The least is taken.";
+        losses(&self.survey.held, labels, caption)
     }
+}
+
+/// Losses of held-out frames against the factor that they were fitted with; labels are the title and those of both axes.
+pub fn losses(held: &[Held], [title, x, y]: [&str; 3], caption: &str) -> Option<LinePlot> {
+    let best = best_held(held)?;
+    Some(LinePlot {
+        title: title.to_owned(),
+        caption: caption.to_owned(),
+        x: Axis { label: x.to_owned(), unit: String::new(), log: true },
+        y: Axis { label: y.to_owned(), unit: String::new(), log: false },
+        series: vec![Series {
+            name: "held out".to_owned(),
+            points: held.iter().map(|held| [held.value, held.mean()]).collect(),
+            errors: held.iter().map(|held| held.error_beside(best)).collect(),
+            marks: Marks::Joined,
+        }],
+    })
 }

@@ -19,8 +19,6 @@ pub struct Weighed {
     pub by_radius: Vec<f64>,
     /// The most probable combination.
     pub best: Band,
-    /// Its ln.
-    pub ln_best: f64,
     /// Combinations that are nearly as probable, with their ln, radius by radius.
     pub likely: Vec<(Band, f64)>,
 }
@@ -230,7 +228,6 @@ fn weighed(all: &[(usize, Band, f64)], radii: usize) -> Result<Weighed, Error> {
         ln_evidence: ln_sum(all.iter().map(|one| one.2)) - (all.len() as f64).ln(),
         by_radius: (0..radii).map(of).collect(),
         best: *best,
-        ln_best: *ln_best,
         likely: all
             .iter()
             .filter(|one| one.2 > ln_best - UNLIKELY)

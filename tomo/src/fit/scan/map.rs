@@ -151,7 +151,7 @@ mod tests {
             .collect();
         let best = AxisLoss { axis: truth, loss: 1.0 };
         let runner_up = AxisLoss { axis: truth.antipode(), loss: 9.0 };
-        let scan = AxisScan { map, best, runner_up, refinements: 0 };
+        let scan = AxisScan { map, best, runner_up };
         let picture = scan.picture(512, Colormap::Gray).unwrap();
         let [u, v] = projected(truth).map(|x| x * 0.24 * 512.0);
         let at = |x: f64, y: f64| picture.get_pixel((256.0 + x) as u32, (128.0 - y) as u32).0[0];

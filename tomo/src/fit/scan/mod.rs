@@ -91,8 +91,6 @@ pub struct AxisScan {
     pub best: AxisLoss,
     /// The best one of the opposite hemisphere, with the loss of the fine problem.
     pub runner_up: AxisLoss,
-    /// Fine problems that were solved.
-    pub refinements: usize,
 }
 
 /// Told how many problems are solved of about how many, by any thread; says whether to go on.
@@ -247,8 +245,7 @@ fn search<T: Float + Default>(
     let Some(runner_up) = scanner.opposite(best.axis, &found, &map, settings.fine)? else {
         return Ok(None);
     };
-    let solved = scanner.solved.load(Ordering::Relaxed);
-    Ok(Some(AxisScan { refinements: solved - map.len(), map, best, runner_up }))
+    Ok(Some(AxisScan { map, best, runner_up }))
 }
 
 /// Losses that differ by less than this part of them are the same in single precision.

@@ -62,18 +62,6 @@ fn exact_singular_values_of_a_diagonal_follow_the_polynomial() {
 }
 
 #[test]
-fn exact_without_matrices_it_is_adam() {
-    let (mut x, mut y) = (numbers(77, 1), numbers(77, 1));
-    let (mut of_x, mut of_y) = (AdamState::new(77), AdamState::new(77));
-    for step in 0..20 {
-        let gradient = numbers(77, 100 + step);
-        MUON.step(0.01, &gradient, &[], &mut of_x, &mut x);
-        MUON.adam.step(0.01, &gradient, &mut of_y, &mut y);
-    }
-    assert!(x == y && of_x == of_y);
-}
-
-#[test]
 fn exact_beside_matrices_it_is_adam() {
     let matrices = [
         WeightMatrix { offset: 3, rows: 4, columns: 5 },
