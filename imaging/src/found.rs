@@ -64,10 +64,9 @@ impl Calibration {
         self.images.iter().filter(|image| image.solution.has_converged)
     }
 
-    /// Error of the shape's own flux, Jy: the standard deviation of what measurements of it say; 0 with fewer than two.
+    /// Error of the shape's own flux, Jy: the scatter of what measurements of it say; 0 with fewer than two.
     fn flux_error(&self) -> f64 {
-        let of_mean = mean_with_error(&self.fluxes).map_or(0.0, |(_, error)| error);
-        of_mean * (self.fluxes.len() as f64).sqrt()
+        scatter(&self.fluxes).unwrap_or(0.0)
     }
 
     /// What the method adds to a number, with its error, over the images that have it; none if fewer than two do. The error is that of
@@ -88,6 +87,11 @@ pub fn mean_with_error(values: &[f64]) -> Option<(f64, f64)> {
     let mean = values.iter().sum::<f64>() / count;
     let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     (values.len() >= 2).then(|| (mean, (square / (count * (count - 1.0))).sqrt()))
+}
+
+/// Standard deviation of values; none of fewer than two.
+fn scatter(values: &[f64]) -> Option<f64> {
+    mean_with_error(values).map(|(_, error)| error * (values.len() as f64).sqrt())
 }
 
 /// Standard deviation of a direction of which nothing is known, degrees.
@@ -139,7 +143,7 @@ impl Survey {
     }
 
     /// Diameter of the ring in µas, less what the method adds to that of the best simple shape, and its error where that is known:
-    /// a blurred ring is smaller. An image that is not at a minimum is taken as it is.
+    /// a blurred ring is smaller. The error is the scatter of the draws, with what others say that data do not tell from the image. An image that is not at a minimum is taken as it is.
     pub fn ring_diameter(&self) -> Option<(f64, Option<f64>)> {
         self.calibrated(&|_, ring| Some(ring?.diameter_uas))
     }
@@ -178,9 +182,15 @@ impl Survey {
     /// A number less what the method adds to that of the best simple shape, with its error.
     fn calibrated(&self, number: &Number<'_>) -> Option<(f64, Option<f64>)> {
         let here = self.found().number(number)?;
-        let error = self.error(|image| image.number(number));
-        let added = self.calibration().and_then(|known| known.added(number));
-        let (added, of_added) = added.unwrap_or((0.0, 0.0));
+        let of = |image: &Candidate| image.number(number);
+        let Some((added, of_added)) = self.calibration().and_then(|known| known.added(number))
+        else {
+            return Some((here, self.error(of)));
+        };
+        // The method adds to images of the image as well: what is taken off is no error of the rest.
+        let draws: Vec<f64> = self.draws.iter().filter_map(of).collect();
+        let others = self.apart(&mut self.alternatives(), of)?;
+        let error = scatter(&draws).map(|scatter| (scatter.powi(2) + others).sqrt());
         Some((here - added, error.map(|error| error.hypot(of_added))))
     }
 
@@ -197,15 +207,22 @@ impl Survey {
     /// Error of a number of the image: root mean square distance of the draws from it, and of the images that data do not tell
     /// from it, added in quadrature, over those that have the number; none with less than two such draws.
     pub fn error(&self, number: impl Fn(&Candidate) -> Option<f64>) -> Option<f64> {
+        let count = self.draws.iter().filter_map(&number).count();
+        let square = self.apart(&mut self.draws.iter(), &number)?
+            + self.apart(&mut self.alternatives(), &number)?;
+        (count >= 2).then(|| square.sqrt())
+    }
+
+    /// Mean square distance of a number of images from that of the best, over those that have it.
+    fn apart(
+        &self,
+        images: &mut dyn Iterator<Item = &Candidate>,
+        number: impl Fn(&Candidate) -> Option<f64>,
+    ) -> Option<f64> {
         let here = number(self.found())?;
-        let square = |images: &mut dyn Iterator<Item = &Candidate>| -> (f64, usize) {
-            let apart: Vec<f64> =
-                images.filter_map(&number).map(|there| (there - here).powi(2)).collect();
-            (apart.iter().sum::<f64>() / apart.len().max(1) as f64, apart.len())
-        };
-        let (draws, count) = square(&mut self.draws.iter());
-        let (others, _) = square(&mut self.alternatives());
-        (count >= 2).then(|| (draws + others).sqrt())
+        let apart: Vec<f64> =
+            images.filter_map(number).map(|there| (there - here).powi(2)).collect();
+        Some(apart.iter().sum::<f64>() / apart.len().max(1) as f64)
     }
 }
 
@@ -224,11 +241,11 @@ mod tests {
         Candidate { start: 0, strength: 1.0, solution, chi2: Vec::new(), ring: None }
     }
 
-    /// An image of 1.1 Jy, its draws off by 0.03, and images of a shape of 1 Jy which have 1.05 and 1.07. Where it explains the data, its
-    /// own flux scatters by 0.04.
+    /// An image of 1.1 Jy, draws of 1.12 and 1.18 Jy, and images of a shape of 1 Jy which have 1.05 and 1.07. Where it explains the data,
+    /// its own flux scatters by 0.03.
     fn survey(explains: bool) -> Survey {
         let images = vec![image(1.05), image(1.07)];
-        let fluxes = if explains { vec![0.96, 1.0, 1.04] } else { Vec::new() };
+        let fluxes = if explains { vec![0.97, 1.0, 1.03] } else { Vec::new() };
         Survey {
             envelope: None,
             held: Vec::new(),
@@ -236,7 +253,7 @@ mod tests {
             starts: vec![image(1.1)],
             best: 0,
             strengths: Vec::new(),
-            draws: vec![image(1.07), image(1.13)],
+            draws: vec![image(1.12), image(1.18)],
             known_sky: Some(Calibration {
                 shape: vec![0.4, 0.6],
                 explains,
@@ -253,11 +270,17 @@ mod tests {
             let off = [flux - expected[0], error.expect("an error") - expected[1]];
             assert!(off.iter().all(|off| off.abs() < 1e-12), "{flux} {error:?}");
         };
-        near(survey(true).flux(), [1.04, 0.04]);
-        near(survey(false).flux(), [1.1, 0.03f64.hypot(0.06)]);
+        // Draws have 0.05 Jy too much as well: they scatter by 0.06/√2 about their mean.
+        let scatter = 0.06 / 2f64.sqrt();
+        near(survey(true).flux(), [1.04, scatter.hypot(0.01)]);
+        let mut hardly_seen = survey(true);
+        hardly_seen.draws = vec![image(1.12), image(1.12)];
+        near(hardly_seen.flux(), [1.04, 0.03]);
+        let off = (0.02f64.powi(2) + 0.08f64.powi(2)) / 2.0;
+        near(survey(false).flux(), [1.1, off.sqrt().hypot(0.06)]);
         let mut stopped = survey(true);
         stopped.starts[0].solution.has_converged = false;
-        near(stopped.flux(), [1.1, 0.03]);
+        near(stopped.flux(), [1.1, off.sqrt()]);
     }
 
     /// The same image with a ring that is brightest in a direction.
@@ -278,7 +301,7 @@ mod tests {
         }
     }
 
-    /// An image at 350°, its draws off by 10°, and images of a crescent at 10° which are at 5° and 7°. With images in all directions
+    /// An image at 350°, its draws 20° from each other, and images of a crescent at 10° which are at 5° and 7°. With images in all directions
     /// the crescent says nothing.
     #[test]
     fn exact_directions_that_the_method_turns_are_turned_back() {
@@ -302,7 +325,7 @@ mod tests {
             let off = [angle - expected[0], error.expect("an error") - expected[1]];
             assert!(off.iter().all(|off| off.abs() < 1e-9), "{angle} {error:?}");
         };
-        near([5.0, 7.0], [354.0, 10f64.hypot(1.0)]);
+        near([5.0, 7.0], [354.0, 200f64.sqrt().hypot(1.0)]);
         near([100.0, 220.0], [350.0, 10.0]);
     }
 }
