@@ -64,7 +64,11 @@ pub fn load(
         let _ = writeln!(identity.borrow_mut(), "{} bytes, CRC-32 {checksum:08x}", bytes.len());
         anyhow::Ok(bytes)
     };
-    let sky = sky_path(scene, folder).map(|path| load_sky(&path, &read)).transpose()?;
+    let panorama = |path: PathBuf| {
+        let at = ("sky.image.path", &*path);
+        loaded(at, &read, Panorama::decode, Panorama::warnings)
+    };
+    let sky = sky_path(scene, folder).map(panorama).transpose()?;
     let meshes = scene.mesh.iter().enumerate().map(|(k, mesh)| {
         let path = folder.join(&mesh.path);
         let name = || format!("`mesh.{k}.path` {}", path.display());
@@ -86,7 +90,10 @@ pub fn load(
     });
     let volumes = volumes.collect::<anyhow::Result<_>>()?;
     let stars = match &scene.sky {
-        Some(Sky::Catalogue(stars)) => Some(load_stars(&folder.join(&stars.path), &read)?),
+        Some(Sky::Catalogue(stars)) => {
+            let at = ("sky.catalogue.path", &*folder.join(&stars.path));
+            Some(loaded(at, &read, Catalogue::decode, Catalogue::warnings)?)
+        }
         _ => None,
     };
     let decoded = Assets { sky, stars, meshes, volumes };
@@ -106,24 +113,16 @@ fn sky_path(scene: &Scene, folder: &Path) -> Option<PathBuf> {
     }
 }
 
-fn load_stars(
-    path: &Path,
+/// Reads and decodes what a key of the scene names, and tells its warnings.
+fn loaded<T>(
+    (key, path): (&str, &Path),
     read: &dyn Fn(&Path) -> anyhow::Result<Vec<u8>>,
-) -> anyhow::Result<Catalogue> {
-    let bytes = read(path).context("`sky.catalogue.path`")?;
-    let name = format!("`sky.catalogue.path` {}", path.display());
-    let stars = Catalogue::decode(&bytes).with_context(|| name.clone())?;
-    warn(&name, stars.warnings());
-    Ok(stars)
-}
-
-fn load_sky(
-    path: &Path,
-    read: &dyn Fn(&Path) -> anyhow::Result<Vec<u8>>,
-) -> anyhow::Result<Panorama> {
-    let bytes = read(path).context("`sky.image.path`")?;
-    let name = format!("`sky.image.path` {}", path.display());
-    let sky = Panorama::decode(&bytes).with_context(|| name.clone())?;
-    warn(&name, sky.warnings());
-    Ok(sky)
+    decode: fn(&[u8]) -> Result<T, kerrlight_render::Error>,
+    warnings: fn(&T) -> &[String],
+) -> anyhow::Result<T> {
+    let bytes = read(path).with_context(|| format!("`{key}`"))?;
+    let name = format!("`{key}` {}", path.display());
+    let decoded = decode(&bytes).with_context(|| name.clone())?;
+    warn(&name, warnings(&decoded));
+    Ok(decoded)
 }

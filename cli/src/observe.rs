@@ -9,10 +9,7 @@ use crate::output;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use kerrlight_common::toml_file::shown;
-use kerrlight_vlbi::noise::{
-    GainErrors, ScatteringKernel, add_thermal_noise, apply_gains, scatter,
-};
-use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::noise::{Corruptions, GainErrors};
 use kerrlight_vlbi::operator::{Method, Pulse};
 use kerrlight_vlbi::schedule;
 use kerrlight_vlbi::simulate::{self, StokesMovie};
@@ -136,7 +133,7 @@ impl Observe {
         let fill =
             simulate::fill_stokes(&mut observation, &movie, self.pulse(), &frames_h, self.method());
         let transform = fill.with_context(|| self.shown())?;
-        self.spoil(&mut observation, seed)?;
+        self.corruptions().apply(&mut observation, seed)?;
         observation.history = self.history(said, transform);
         output.write(&observation)?;
         let count = observation.rows.len();
@@ -191,13 +188,15 @@ impl Observe {
         Ok((movie, times, "rendered at the time of each scan".to_owned()))
     }
 
-    fn gains(&self) -> GainErrors {
-        GainErrors {
+    fn corruptions(&self) -> Corruptions {
+        let gains = GainErrors {
             constant_amplitude: self.gain_constant,
             scan_amplitude: self.gain_scan,
             random_phases: self.random_phases,
             ..GainErrors::default()
-        }
+        };
+        let thermal = self.noise == Noise::Thermal;
+        Corruptions { scattering: self.scatter_sgra, gains, thermal }
     }
 
     /// The seed, which random numbers do not go without.
@@ -209,7 +208,8 @@ impl Observe {
                 bail!("{name} {value} is not allowed: 0 to 3");
             }
         }
-        let random = self.noise == Noise::Thermal || self.gains() != GainErrors::default();
+        let Corruptions { gains, thermal, .. } = self.corruptions();
+        let random = thermal || gains != GainErrors::default();
         match self.seed {
             Some(seed) => Ok(seed),
             None if random => {
@@ -235,20 +235,6 @@ impl Observe {
         }
     }
 
-    /// Corrupts an observation in the order of light's way.
-    fn spoil(&self, observation: &mut Observation, seed: u64) -> anyhow::Result<()> {
-        if self.scatter_sgra {
-            scatter(observation, &ScatteringKernel::sgr_a())?;
-        }
-        if self.gains() != GainErrors::default() {
-            apply_gains(observation, &self.gains(), seed);
-        }
-        if self.noise == Noise::Thermal {
-            add_thermal_noise(observation, seed);
-        }
-        Ok(())
-    }
-
     /// Every number that decided the data.
     fn history(&self, images: String, transform: String) -> Vec<String> {
         let mut lines = vec![
@@ -263,8 +249,9 @@ impl Observe {
         if self.scatter_sgra {
             lines.push("scattering of Sgr A* (Johnson et al. 2018)".to_owned());
         }
-        if self.gains() != GainErrors::default() {
-            lines.push(format!("{:?}", self.gains()));
+        let Corruptions { gains, .. } = self.corruptions();
+        if gains != GainErrors::default() {
+            lines.push(format!("{gains:?}"));
         }
         lines.push(match (self.noise, self.seed) {
             (Noise::None, None) => "noise none".to_owned(),

@@ -8,9 +8,7 @@ use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::Error;
 use kerrlight_vlbi::array::{Array, BUILT_IN, built_in, parse};
 use kerrlight_vlbi::earth::{Frame, Ut1};
-use kerrlight_vlbi::noise::{
-    GainErrors, ScatteringKernel, add_thermal_noise, apply_gains, scatter,
-};
+use kerrlight_vlbi::noise::{Corruptions, GainErrors};
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::operator::{ImageGrid, Method, Pulse};
 use kerrlight_vlbi::schedule::{Clock, Schedule, Setup, observe_affordable};
@@ -100,18 +98,14 @@ impl Plan {
         };
         let method = self.accuracy.map_or(Method::Direct, Method::Cheaper);
         let transform = fill_stokes(&mut observation, movie, pulse, &hours, method)?;
-        self.spoil(&mut observation)?;
+        self.corruptions().apply(&mut observation, self.seed)?;
         let version = env!("CARGO_PKG_VERSION");
         observation.history = vec![format!("kerrlight {version} observe, from Python"), transform];
         observation.history.push(if self.thermal { "noise thermal" } else { "noise none" }.into());
         Ok(observation)
     }
 
-    /// Corrupts an observation in the order of light's way.
-    fn spoil(&self, observation: &mut Observation) -> Result<(), Error> {
-        if self.scattering {
-            scatter(observation, &ScatteringKernel::sgr_a())?;
-        }
+    fn corruptions(&self) -> Corruptions {
         let (constant_amplitude, scan_amplitude, random_phases) = self.gains;
         let gains = GainErrors {
             constant_amplitude,
@@ -119,13 +113,7 @@ impl Plan {
             random_phases,
             ..GainErrors::default()
         };
-        if gains != GainErrors::default() {
-            apply_gains(observation, &gains, self.seed);
-        }
-        if self.thermal {
-            add_thermal_noise(observation, self.seed);
-        }
-        Ok(())
+        Corruptions { scattering: self.scattering, gains, thermal: self.thermal }
     }
 }
 

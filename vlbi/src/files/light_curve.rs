@@ -1,6 +1,6 @@
 //! Tables of light curves: a time a line, columns separated by commas or blanks and told by a line of names.
 
-use super::{FileError, number, sigma};
+use super::{FileError, cells, number, sigma};
 use crate::Error;
 use crate::light_curve::{Flux, LightCurve, Sample};
 use core::fmt::Write;
@@ -13,8 +13,6 @@ const TIMES: [&str; 10] =
 const DAYS: [&str; 4] = ["mjd", "time_mjd", "jd", "time_jd"];
 /// Days of a Julian date and what is left of it at midnight.
 const JULIAN: f64 = 2_400_000.5;
-/// Columns that are looked at.
-const MOST_COLUMNS: usize = 64;
 
 /// Place of times, and their unit.
 #[derive(Clone, Copy)]
@@ -112,14 +110,6 @@ fn plain(name: &str) -> String {
     let name = name.to_ascii_lowercase();
     let words = name.split(|c: char| c.is_whitespace() || c == '-' || c == '_');
     words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")
-}
-
-/// The cells of a line: between commas, or between blanks where there is none.
-fn cells(line: &str) -> Vec<&str> {
-    match line.contains(',') {
-        true => line.split(',').map(str::trim).take(MOST_COLUMNS).collect(),
-        false => line.split_whitespace().take(MOST_COLUMNS).collect(),
-    }
 }
 
 /// The names in a line, a comment or not, as above tables of numpy, and their units in brackets: `time(hr)` and

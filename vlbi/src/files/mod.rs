@@ -140,6 +140,14 @@ fn check_numbers(observation: &Observation) -> Result<(), FileError> {
     Ok(())
 }
 
+/// The cells of a line: between commas, or between blanks where there is none; 64 at most, no known writer has more.
+fn cells(line: &str) -> Vec<&str> {
+    match line.contains(',') {
+        true => line.split(',').map(str::trim).take(64).collect(),
+        false => line.split_whitespace().take(64).collect(),
+    }
+}
+
 /// A text without the byte order mark that spreadsheets and editors of Windows put before it.
 pub(crate) fn without_mark(text: &str) -> &str {
     text.strip_prefix('\u{feff}').unwrap_or(text)

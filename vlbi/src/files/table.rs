@@ -2,7 +2,7 @@
 //! by a line of names: kerrlight's CSV, and the csv and txt of the EHT's public releases.
 
 use super::{
-    FileError, MOST_HOURS, MOST_WAVELENGTHS, Names, comments, number, number_within, sigma,
+    FileError, MOST_HOURS, MOST_WAVELENGTHS, Names, cells, comments, number, number_within, sigma,
 };
 use crate::Complex64;
 use crate::Error;
@@ -19,16 +19,6 @@ pub const CHANNEL: &str = "channel";
 /// The same in the EHT's releases, with amplitude in Jy and phase in degrees.
 pub(super) const EHT_COLUMNS: [&str; 8] =
     ["time(UTC)", "T1", "T2", "U(lambda)", "V(lambda)", "Iamp(Jy)", "Iphase(d)", "Isigma(Jy)"];
-
-/// Largest number of cells that are read of a line; no known writer has more.
-fn cells(line: &str) -> Vec<&str> {
-    let separate = |c: char| c == ',' || c.is_whitespace();
-    if line.contains(',') {
-        line.split(',').map(str::trim).take(64).collect()
-    } else {
-        line.split(separate).filter(|cell| !cell.is_empty()).take(64).collect()
-    }
-}
 
 /// Places of the eight columns, and whether visibilities are polar.
 struct Heading {

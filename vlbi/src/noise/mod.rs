@@ -14,8 +14,40 @@ pub use leakage::apply_leakage;
 pub use scattering::{ScatteringKernel, scatter, unscatter};
 pub use thermal::add_thermal_noise;
 
+use crate::Error;
+use crate::observation::Observation;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
+
+/// What spoils visibilities on their way and in the array.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Corruptions {
+    /// True if the scattering towards Sgr A* blurs them.
+    pub scattering: bool,
+    /// Station gains; none by default.
+    pub gains: GainErrors,
+    /// True if there is thermal noise.
+    pub thermal: bool,
+}
+
+impl Corruptions {
+    /// Corrupts an observation in the order of light's way.
+    ///
+    /// # Errors
+    /// As [`scatter`].
+    pub fn apply(&self, observation: &mut Observation, seed: u64) -> Result<(), Error> {
+        if self.scattering {
+            scatter(observation, &ScatteringKernel::sgr_a())?;
+        }
+        if self.gains != GainErrors::default() {
+            apply_gains(observation, &self.gains, seed);
+        }
+        if self.thermal {
+            add_thermal_noise(observation, seed);
+        }
+        Ok(())
+    }
+}
 
 /// A generator for a step, independent of that of other steps.
 fn generator(seed: u64, step: u64) -> Pcg64Mcg {
