@@ -143,7 +143,7 @@ impl Survey {
     }
 
     /// Diameter of the ring in µas, less what the method adds to that of the best simple shape, and its error where that is known:
-    /// a blurred ring is smaller. The error is the scatter of the draws, with what others say that data do not tell from the image. An image that is not at a minimum is taken as it is.
+    /// a blurred ring is smaller. An image that is not at a minimum is taken as it is.
     pub fn ring_diameter(&self) -> Option<(f64, Option<f64>)> {
         self.calibrated(&|_, ring| Some(ring?.diameter_uas))
     }
@@ -179,7 +179,8 @@ impl Survey {
         (here, error.map(|error| error.hypot(added)))
     }
 
-    /// A number less what the method adds to that of the best simple shape, with its error.
+    /// A number less what the method adds to that of the best simple shape. Its error is the standard deviation of the draws, the
+    /// distance of images that data do not tell from the best, and the error of what is taken off, in quadrature.
     fn calibrated(&self, number: &Number<'_>) -> Option<(f64, Option<f64>)> {
         let here = self.found().number(number)?;
         let of = |image: &Candidate| image.number(number);

@@ -5,6 +5,7 @@ use crate::checksum::Sealed;
 use crate::report::{Axis, LinePlot, Marks, Series};
 use anyhow::Context;
 use kerrlight_tomo::fit::settings::FitFile;
+use kerrlight_tomo::fit::setup::{Held, best_held};
 use kerrlight_tomo::recovery::Choice;
 use kerrlight_tomo::recovery::results::HeldOutResults;
 
@@ -37,24 +38,38 @@ pub fn settled(file: &FitFile, folder: &Folder) -> anyhow::Result<FitFile> {
 
 /// The loss of held-out frames against the weight.
 pub fn plot(results: &HeldOutResults) -> LinePlot {
-    let points: Vec<[f64; 2]> = results.values.iter().map(|of| [of.value, of.loss]).collect();
+    let caption = format!(
+        "χ² per data point of frames that were not fitted, against the weight: each of {} parts of the frames was \
+         held out once. Too small a weight fits noise, too large a one cannot fit the data; both predict frames badly \
+         that they have not seen. Bars are standard errors of the difference from the best weight.",
+        results.folds
+    );
+    let points = results.values.iter().map(|of| [of.value, of.loss]).collect();
+    let errors = results.values.iter().filter_map(|of| of.error).collect();
+    let labels = ["Held-out frames", results.setting.name(), "χ² of held-out data"];
+    line_plot(labels, &caption, (points, errors))
+}
+
+/// The loss of held-out frames against a factor on penalties; labels are the title and those of both axes.
+pub fn losses(held: &[Held], labels: [&str; 3], caption: &str) -> Option<LinePlot> {
+    let best = best_held(held)?;
+    let points = held.iter().map(|held| [held.value, held.mean()]).collect();
+    let errors = held.iter().map(|held| held.error_beside(best)).collect();
+    Some(line_plot(labels, caption, (points, errors)))
+}
+
+fn line_plot(
+    [title, x, y]: [&str; 3],
+    caption: &str,
+    (points, errors): (Vec<[f64; 2]>, Vec<f64>),
+) -> LinePlot {
     let log = points.iter().all(|[x, _]| *x > 0.0);
     LinePlot {
-        title: "Held-out frames".to_owned(),
-        caption: format!(
-            "χ² per data point of frames that were not fitted, against the weight: each of {} parts of the frames was \
-             held out once. Too small a weight fits noise, too large a one cannot fit the data; both predict frames badly \
-             that they have not seen. Bars are standard errors of the difference from the best weight.",
-            results.folds
-        ),
-        x: Axis { label: results.setting.name().to_owned(), unit: String::new(), log },
-        y: Axis { label: "χ² of held-out data".to_owned(), unit: String::new(), log: false },
-        series: vec![Series {
-            name: "held out".to_owned(),
-            points,
-            errors: results.values.iter().filter_map(|of| of.error).collect(),
-            marks: Marks::Joined,
-        }],
+        title: title.to_owned(),
+        caption: caption.to_owned(),
+        x: Axis { label: x.to_owned(), unit: String::new(), log },
+        y: Axis { label: y.to_owned(), unit: String::new(), log: false },
+        series: vec![Series { name: "held out".to_owned(), points, errors, marks: Marks::Joined }],
     }
 }
 
@@ -62,7 +77,6 @@ pub fn plot(results: &HeldOutResults) -> LinePlot {
 mod tests {
     use super::*;
     use kerrlight_tomo::fit::settings::{HeldOutSettings, Weight};
-    use kerrlight_tomo::fit::setup::Held;
 
     #[test]
     fn exact_every_value_has_its_bar() {

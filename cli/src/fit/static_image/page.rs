@@ -2,8 +2,9 @@
 
 use super::Found;
 use super::numbers::{RING, of_ring, with_error};
-use super::polarized::{Polarized, losses};
+use super::polarized::Polarized;
 use super::results::Results;
+use crate::fit::held_out::losses;
 use crate::fit::results::gains::Gains;
 use crate::fit::results::leakage::Leakage;
 use crate::fit::results::page::settings;

@@ -1,14 +1,15 @@
 //! The linear polarisation of a static image: numbers and sentences.
 
 use super::numbers::with_error;
+use crate::fit::held_out::losses;
 use crate::fit::results::leakage::{Leakage, LeakageResults};
-use crate::report::{Axis, LinePlot, Marks, Outcome, Series};
+use crate::report::{LinePlot, Outcome};
 use anyhow::Context;
 use kerrlight_imaging::settings::{StaticImageFile, StaticPolarization};
 use kerrlight_imaging::{LinearPolarization, PolarizedSurvey};
 use kerrlight_tomo::fit::FrameTerm;
 use kerrlight_tomo::fit::settings::LossKind;
-use kerrlight_tomo::fit::setup::{FitData, Held, best_held};
+use kerrlight_tomo::fit::setup::FitData;
 use kerrlight_tomo::fit::verdict::{Errors, Statistics, Tested};
 use serde::Serialize;
 
@@ -266,21 +267,4 @@ impl Polarized {
                        standard errors of the difference from the best. The least is taken.";
         losses(&self.survey.held, labels, caption)
     }
-}
-
-/// Losses of held-out frames against the factor that they were fitted with; labels are the title and those of both axes.
-pub fn losses(held: &[Held], [title, x, y]: [&str; 3], caption: &str) -> Option<LinePlot> {
-    let best = best_held(held)?;
-    Some(LinePlot {
-        title: title.to_owned(),
-        caption: caption.to_owned(),
-        x: Axis { label: x.to_owned(), unit: String::new(), log: true },
-        y: Axis { label: y.to_owned(), unit: String::new(), log: false },
-        series: vec![Series {
-            name: "held out".to_owned(),
-            points: held.iter().map(|held| [held.value, held.mean()]).collect(),
-            errors: held.iter().map(|held| held.error_beside(best)).collect(),
-            marks: Marks::Joined,
-        }],
-    })
 }

@@ -64,8 +64,8 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let terms = self.penalised(&data);
         let mut objective = Objective::new(&operator, &data, &terms);
         let taken: Vec<Vec<f64>> = moved.bent.iter().map(|bent| operator.adjoint(bent)).collect();
-        let solved = taken.iter().map(|b| solved(&mut objective, b, iterations));
-        let (absorbed, left): (Vec<Vec<f64>>, Vec<Vec<f64>>) = solved.unzip();
+        let following = taken.iter().map(|b| solved(&mut objective, b, iterations));
+        let (absorbed, left): (Vec<Vec<f64>>, Vec<Vec<f64>>) = following.unzip();
         // What a field that is not solved for to the end would still do as numbers move.
         let mut downhill = Vec::new();
         objective.value_and_gradient(&here, &mut downhill);
@@ -77,8 +77,8 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         };
         let bend = |k: usize| {
             let (a, b) = (k / n, k % n);
-            // The misfit that these fields leave has second derivatives that are never negative, and are off by the square of
-            // what the fields are off by; those of one factor alone are off by as much as the fields.
+            // Second derivatives of the misfit that these very fields leave: never negative, and their error is of second order
+            // in that of the fields. Without the residuals it is of first order.
             let follows = dot(&taken[a], &absorbed[b]) + dot(&absorbed[a], &left[b]);
             product(&tangents[a], &moved.bent[b]) - follows
         };

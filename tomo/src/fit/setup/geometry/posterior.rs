@@ -1,7 +1,7 @@
 //! Errors of a geometry: the bowl beneath the ripples, along other rays and with other voxels; and draws of geometries.
 
 use super::detail::Sure;
-use super::search_data::SearchData;
+use super::search_data::{LATTICES, SearchData};
 use crate::fit::geometry::{
     Effort, Envelope, Estimate, Free, Geometry, GeometryModel, GeometryProblem, ModelErrors,
     Polish, Polished, Spread, bounded,
@@ -13,8 +13,6 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
-/// Other rays that the best geometry is looked for through.
-const LATTICES: u64 = 5;
 /// Stream of the random numbers of draws.
 const DRAWS: u64 = 0x6f70_656e_0000_0000;
 /// The number of a draw that has as many voxels as the fit.
@@ -30,12 +28,12 @@ pub(super) fn polished(
     Ok((polished, reduced))
 }
 
-/// Voxels of a look over those of the search, along each side, by its number.
-const VOXELS: [f64; 6] = [1.0, 1.3, 1.15, 0.87, 1.22, 0.93];
+/// Voxels of a look over those of the search, along each side, by its number: 0 is the fit's own lattice.
+const VOXELS: [f64; 1 + LATTICES] = [1.0, 1.3, 1.15, 0.87, 1.22, 0.93];
 
 /// More voxels or fewer.
 fn other_voxels(effort: Effort, number: u64) -> Effort {
-    let nodes = (effort.nodes as f64 * VOXELS[number as usize % VOXELS.len()]).round() as usize;
+    let nodes = (effort.nodes as f64 * VOXELS[number as usize]).round() as usize;
     Effort { nodes: nodes.max(effort.degree.taps()), ..effort }
 }
 
@@ -88,7 +86,7 @@ fn enveloped(
     let other_voxels = |effort: Effort, number: u64| {
         other_voxels(effort, problem.gaussian.map_or(number, |_| SAME))
     };
-    for number in 1..=LATTICES {
+    for number in 1..=LATTICES as u64 {
         let split = problem.model.split;
         let mut look = |problem: &GeometryProblem<'_, f32>| {
             let model = &GeometryModel { split, ..problem.model.seen_along(number) };

@@ -27,8 +27,10 @@ pub(super) struct SearchData {
 /// Pixels do not count where they are nearer to the critical curve, M. Second images of matter at 3 to 9 M are within 0.7 M.
 const BESIDE_THE_RING: f64 = 0.8;
 
+/// Other rays that the best geometry is looked for through.
+pub(super) const LATTICES: usize = 5;
 /// Pixels of a look through others over those of the fit, along each side: finer and wider ones.
-const RESAMPLED: [f64; 5] = [1.15, 0.87, 1.25, 0.93, 1.08];
+const RESAMPLED: [f64; LATTICES] = [1.15, 0.87, 1.25, 0.93, 1.08];
 /// Iterations of a round, for each over all voxels.
 const SETTLING: usize = 6;
 
