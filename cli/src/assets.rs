@@ -65,8 +65,7 @@ pub fn load(
         anyhow::Ok(bytes)
     };
     let panorama = |path: PathBuf| {
-        let at = ("sky.image.path", &*path);
-        loaded(at, &read, Panorama::decode, Panorama::warnings)
+        loaded("sky.image.path", &path, &read, Panorama::decode, Panorama::warnings)
     };
     let sky = sky_path(scene, folder).map(panorama).transpose()?;
     let meshes = scene.mesh.iter().enumerate().map(|(k, mesh)| {
@@ -91,8 +90,8 @@ pub fn load(
     let volumes = volumes.collect::<anyhow::Result<_>>()?;
     let stars = match &scene.sky {
         Some(Sky::Catalogue(stars)) => {
-            let at = ("sky.catalogue.path", &*folder.join(&stars.path));
-            Some(loaded(at, &read, Catalogue::decode, Catalogue::warnings)?)
+            let (key, path) = ("sky.catalogue.path", folder.join(&stars.path));
+            Some(loaded(key, &path, &read, Catalogue::decode, Catalogue::warnings)?)
         }
         _ => None,
     };
@@ -115,7 +114,8 @@ fn sky_path(scene: &Scene, folder: &Path) -> Option<PathBuf> {
 
 /// Reads and decodes what a key of the scene names, and tells its warnings.
 fn loaded<T>(
-    (key, path): (&str, &Path),
+    key: &str,
+    path: &Path,
     read: &dyn Fn(&Path) -> anyhow::Result<Vec<u8>>,
     decode: fn(&[u8]) -> Result<T, kerrlight_render::Error>,
     warnings: fn(&T) -> &[String],

@@ -57,7 +57,8 @@ impl<T: Float> Frames<T> {
     /// # Panics
     /// If `make` hands over another number of images, or of pixels.
     pub fn made<E: From<Error>>(
-        (count, pixels): (usize, usize),
+        count: usize,
+        pixels: usize,
         make: impl FnOnce(&mut Sink<'_, T>) -> Result<(), E>,
     ) -> Result<Self, E> {
         let bytes = count as f64 * pixels as f64 * size_of::<T>() as f64;
@@ -170,7 +171,7 @@ impl<T: Float> Frames<T> {
         pixels: usize,
         mut map: impl FnMut(&[T]) -> Vec<U>,
     ) -> Result<Frames<U>, Error> {
-        Frames::made((self.count, pixels), |sink| {
+        Frames::made(self.count, pixels, |sink| {
             self.images().try_for_each(|image| sink(&map(&image?)))
         })
     }

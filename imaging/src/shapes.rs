@@ -226,7 +226,7 @@ pub fn fit_shapes(
         flux: FluxPrior { jy: file.image.flux_jy, sigma_jy: file.image.flux_sigma_jy },
         side: file.image.pixels,
     };
-    let one = |shape: &Shape| best(*shape, &problem, (file, grid), go_on);
+    let one = |shape: &Shape| best(*shape, &problem, file, grid, go_on);
     Ok(Shape::ALL.par_iter().map(one).collect())
 }
 
@@ -279,7 +279,8 @@ fn size(file: &StaticImageFile) -> f64 {
 pub(crate) fn refitted_flux(
     fit: &ShapeFit,
     problem: &ImageProblem<'_>,
-    (file, grid): (&StaticImageFile, ImageGrid),
+    file: &StaticImageFile,
+    grid: ImageGrid,
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Option<f64> {
     let fitting = Fitting { shape: fit.shape, problem, grid, size: size(file) };
@@ -292,7 +293,8 @@ pub(crate) fn refitted_flux(
 fn best(
     shape: Shape,
     problem: &ImageProblem<'_>,
-    (file, grid): (&StaticImageFile, ImageGrid),
+    file: &StaticImageFile,
+    grid: ImageGrid,
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Option<ShapeFit> {
     let size = size(file);

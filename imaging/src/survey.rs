@@ -74,7 +74,7 @@ pub fn survey(
     let Some(starts) = starts else { return Ok(None) };
     let best = least(&starts);
     let others: Vec<f64> = allowed.iter().copied().filter(|value| *value != strength).collect();
-    let of = |value: &f64| search.solved(Stage::Strengths, (best, *value), &frames, search.flux());
+    let of = |value: &f64| search.solved(Stage::Strengths, best, *value, &frames, search.flux());
     let Some(strengths) = others.par_iter().map(of).collect() else { return Ok(None) };
     let least = starts[best].solution.loss;
     let good = starts.iter().filter(|start| start.solution.loss <= 1.01 * least).collect();
@@ -90,13 +90,11 @@ pub fn survey(
     let others = Others { starts: good, strengths: chosen, flux_sigma_jy };
     let image = &starts[best].solution.image;
     let count = file.image.draws.unwrap_or(0);
-    let Some(draws) = search.draws(measured, (image, &others), &frames, count)? else {
+    let Some(draws) = search.draws(measured, image, &others, &frames, count)? else {
         return Ok(None);
     };
     let known_sky = match shape {
-        Some(shape) => {
-            search.calibration(measured, (shape, &others), &frames, count.div_ceil(2))?
-        }
+        Some(shape) => search.calibration(measured, shape, &others, &frames, count.div_ceil(2))?,
         None => None,
     };
     let envelope = expected.map(|(envelope, _)| envelope);
@@ -234,7 +232,8 @@ impl Search<'_> {
     fn solved(
         &self,
         stage: Stage,
-        (start, strength): (usize, f64),
+        start: usize,
+        strength: f64,
         frames: &[usize],
         flux: FluxPrior,
     ) -> Option<Candidate> {
@@ -264,7 +263,7 @@ impl Search<'_> {
     }
 
     fn starts(&self, strength: f64, frames: &[usize]) -> Option<Vec<Candidate>> {
-        let of = |k: usize| self.solved(Stage::Starts, (k, strength), frames, self.flux());
+        let of = |k: usize| self.solved(Stage::Starts, k, strength, frames, self.flux());
         (0..self.begin.len()).into_par_iter().map(of).collect()
     }
 
@@ -279,7 +278,7 @@ impl Search<'_> {
         };
         held(settings, |strength, fold| {
             let found =
-                self.solved(Stage::HeldOut, (start, strength), &part(fold, true), self.flux())?;
+                self.solved(Stage::HeldOut, start, strength, &part(fold, true), self.flux())?;
             if !found.solution.has_converged {
                 return Some(f64::NAN);
             }
@@ -294,7 +293,8 @@ impl Search<'_> {
     fn draws(
         &self,
         measured: &FitData,
-        (image, others): (&[f64], &Others<'_>),
+        image: &[f64],
+        others: &Others<'_>,
         frames: &[usize],
         count: usize,
     ) -> Result<Option<Vec<Candidate>>, Error> {
@@ -331,17 +331,18 @@ impl Search<'_> {
     fn calibration(
         &self,
         measured: &FitData,
-        (shape, others): (&ShapeFit, &Others<'_>),
+        shape: &ShapeFit,
+        others: &Others<'_>,
         frames: &[usize],
         count: usize,
     ) -> Result<Option<Calibration>, Error> {
         let image: Vec<f64> = shape.shares.iter().map(|share| share * shape.flux_jy).collect();
         let ring = self.file.ring.as_ref();
         let ring = ring.and_then(|ring| Ring::measure(&image, self.grid, ring));
-        let Some(images) = self.draws(measured, (&image, others), frames, count)? else {
+        let Some(images) = self.draws(measured, &image, others, frames, count)? else {
             return Ok(None);
         };
-        let one = |k: usize| self.refitted_flux(measured, (shape, &image), frames, k);
+        let one = |k: usize| self.refitted_flux(measured, shape, &image, frames, k);
         let fluxes: Result<Option<Vec<f64>>, Error> = match shape.explains {
             true => (0..2 * count).into_par_iter().map(one).collect(),
             false => Ok(Some(Vec::new())),
@@ -354,7 +355,8 @@ impl Search<'_> {
     fn refitted_flux(
         &self,
         measured: &FitData,
-        (shape, image): (&ShapeFit, &[f64]),
+        shape: &ShapeFit,
+        image: &[f64],
         frames: &[usize],
         k: usize,
     ) -> Result<Option<f64>, Error> {
@@ -366,7 +368,7 @@ impl Search<'_> {
         let flux = self.flux_about(off * self.flux().sigma_jy);
         let problem = ImageProblem { terms: &terms, ..self.problem(1.0, frames, flux) };
         let go_on = || (self.watch)(Stage::Draws, 0);
-        Ok(refitted_flux(shape, &problem, (self.file, self.grid), &go_on))
+        Ok(refitted_flux(shape, &problem, self.file, self.grid, &go_on))
     }
 }
 

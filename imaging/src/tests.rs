@@ -354,7 +354,7 @@ fn exact_the_search_can_be_stopped() {
     let text = format!("{SETTINGS}[strength]\nvalues = [0.5, 1.0]\nfolds = 9\n");
     let file = StaticImageFile::parse(&text).unwrap();
     let data = data::total_intensity(&file, observed(4), "data").unwrap();
-    let joined = data::joined(vec![("data".to_owned(), data)], ("", file.strength.as_ref()));
+    let joined = data::joined(vec![("data".to_owned(), data)], "", file.strength.as_ref());
     let error = joined.err().unwrap().to_string();
     assert!(error.contains("strength.folds = 9 is not allowed: 8 at most"), "{error}");
 }

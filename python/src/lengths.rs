@@ -41,7 +41,7 @@ fn path_lengths<'py>(
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let rule = gauss_legendre(NODES);
     let fill = |hole: &Kerr, observer: &Observer, path: &Path, row: &mut [f64]| {
-        fill(hole, path, spacing, (observer.inverse_radius(), &rule), row);
+        fill(hole, path, spacing, observer.inverse_radius(), &rule, row);
     };
     let rays = Rays { spin, place, quantities: Quantities::POLAR, width: spacing.0 };
     rays.each(py, screen, fill)
@@ -113,7 +113,8 @@ fn fill(
     hole: &Kerr,
     path: &Path,
     spacing: Spacing,
-    (near, rule): (f64, &[(f64, f64)]),
+    near: f64,
+    rule: &[(f64, f64)],
     row: &mut [f64],
 ) {
     let (turning, (total, step)) = (path.turning_point(), spacing.of(path));

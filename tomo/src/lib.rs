@@ -10,7 +10,7 @@
 //! let spot = Spot { center: [6.0, 0.0, 0.0], sigma: 1.5, amplitude: 1.0, ..Spot::default() };
 //! let truth = Truth { spot: vec![spot], ..Truth::default() };
 //! let mut settings = FitFile::new(Hole::new(0.5), 40.0, [3.0, 10.0], Kind::LinearGrid)
-//!     .simulating(truth, (8, 0.0, 60.0), 1e-2);
+//!     .simulating(truth, 8, 0.0, 60.0, 1e-2);
 //! settings.screen.pixels = 16;
 //! settings.representation.linear_grid.nodes = 14;
 //! settings.output.nodes = 20;

@@ -80,8 +80,8 @@ pub fn fill_from(
     for first in (0..movie.count()).step_by(AT_A_TIME) {
         let range = first..(first + AT_A_TIME).min(movie.count());
         let some = || some_of(movie, range.clone());
-        let how = (grid, pulse, Method::Direct);
-        visibilities.extend(seen(observation, &shares[range.clone()], how, some)?.1);
+        let shares = &shares[range.clone()];
+        visibilities.extend(seen(observation, shares, grid, pulse, Method::Direct, some)?.1);
     }
     let seen = summed(observation.rows.len(), &shares, visibilities)?;
     set(observation, &seen);
@@ -118,7 +118,9 @@ fn shares(observation: &Observation, frames: usize, times_h: &[f64]) -> Result<V
 fn seen<'p>(
     observation: &Observation,
     shares: &[Shares],
-    (grid, pulse, method): (ImageGrid, Pulse, Method),
+    grid: ImageGrid,
+    pulse: Pulse,
+    method: Method,
     pixels: impl FnOnce() -> Result<Cow<'p, [f64]>, Error>,
 ) -> Result<(Transform<f64>, Vec<Complex64>), Error> {
     let uv_of = |shares: &Shares| shares.iter().map(|(row, _)| observation.rows[*row].uv).collect();
@@ -141,7 +143,7 @@ fn all_seen(
 ) -> Result<(String, Vec<Complex64>), Error> {
     let shares = shares(observation, pixels.len() / grid.pixels().max(1), times_h)?;
     let all = || Ok(Cow::Borrowed(pixels));
-    let (operator, visibilities) = seen(observation, &shares, (grid, pulse, method), all)?;
+    let (operator, visibilities) = seen(observation, &shares, grid, pulse, method, all)?;
     Ok((operator.describe(), summed(observation.rows.len(), &shares, visibilities)?))
 }
 

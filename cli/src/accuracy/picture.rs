@@ -29,7 +29,8 @@ const COLORS: [&str; 5] = ["#999999", "#E69F00", "#009E73", "#0072B2", "#D55E00"
 pub fn figure(rows: &[Row]) -> anyhow::Result<Picture> {
     // Next to the critical curve one ray in a hundred has no digits left in any arithmetic.
     let panels = [(Class::Generic, 1, "99 % of rays"), (Class::NearCritical, 0, "the median ray")];
-    let (plots, layouts) = panels.iter().map(|panel| self::panel(rows, *panel)).unzip();
+    let drawn = panels.map(|(class, quantile, of)| panel(rows, class, quantile, of));
+    let (plots, layouts) = drawn.into_iter().unzip();
     let figure = Figure::new(1, 2)
         .with_plots(plots)
         .with_layouts(layouts)
@@ -43,7 +44,7 @@ pub fn figure(rows: &[Row]) -> anyhow::Result<Picture> {
 }
 
 /// Correct digits at a quantile of one class against time, a line an integrator.
-fn panel(rows: &[Row], (class, quantile, of): (Class, usize, &str)) -> (Vec<Plot>, Layout) {
+fn panel(rows: &[Row], class: Class, quantile: usize, of: &str) -> (Vec<Plot>, Layout) {
     let digits = |error: f64| -error.clamp(1e-17, 1.0).log10();
     let mut plots = Vec::new();
     let mut all = Vec::new();

@@ -95,14 +95,15 @@ impl Compare {
     /// Runs an experiment.
     pub fn run(
         &self,
-        (threads, memory): (Option<u16>, Option<u64>),
+        threads: Option<u16>,
+        memory: Option<u64>,
         program: &Program,
     ) -> anyhow::Result<Answer> {
         let Some(name) = &self.experiment else { return Ok(listing::experiments()) };
         let mut asked = self.asked(name, program)?;
         let folder = asked.folder.clone();
         if let Some(id) = &self.case {
-            return self.one(id, &asked, (threads, memory), program);
+            return self.one(id, &asked, threads, memory, program);
         }
         let chosen = cases::expand(&asked.experiment, &asked.source, &asked.choice)?;
         if self.status {
@@ -126,7 +127,7 @@ impl Compare {
         let recorder = Recorder::of_process();
         let lock = self.enter(&asked)?;
         let draws = experiment.samples(choice.quick);
-        let runner = Runner::new(&folder, (threads, memory), (program, draws), lock)?;
+        let runner = Runner::new(&folder, threads, memory, program, draws, lock)?;
         let cases = if choice.is_restricted() {
             let all = cases::expand(experiment, source, &choice.unrestricted())?;
             with_known(chosen, all, &runner)
@@ -144,7 +145,7 @@ impl Compare {
             .map_or(Status::Open, Status::Failed),
             status => status,
         };
-        let summary = page::results((experiment, choice.quick), &cases, status, &folder)?;
+        let summary = page::results(experiment, choice.quick, &cases, status, &folder)?;
         let page = Page { experiment, choice, summary: &summary };
         let tables = page.write(&runner, &folder)?;
         recorder.write_into(&folder)?;
@@ -156,7 +157,8 @@ impl Compare {
         &self,
         id: &str,
         asked: &Asked,
-        limits: (Option<u16>, Option<u64>),
+        threads: Option<u16>,
+        memory: Option<u64>,
         program: &Program,
     ) -> anyhow::Result<Answer> {
         let Asked { plan, text, experiment, source, choice, folder } = asked;
@@ -164,7 +166,7 @@ impl Compare {
         ran::check_data(std::slice::from_ref(&case))?;
         let lock = plan::join(plan, text, folder)?;
         let draws = experiment.samples(choice.quick);
-        let runner = Runner::new(folder, limits, (program, draws), Some(lock))?;
+        let runner = Runner::new(folder, threads, memory, program, draws, Some(lock))?;
         one::run(&case, &runner, folder)
     }
 

@@ -33,17 +33,18 @@ pub struct Page<'a> {
 
 /// Reads what was found, and writes all of it, results.json.
 pub fn results<'a>(
-    (experiment, quick): (&Experiment, bool),
+    experiment: &Experiment,
+    quick: bool,
     cases: &'a [Case],
     status: impl Fn(&Case) -> Status + Sync,
     folder: &Path,
 ) -> anyhow::Result<Summary<'a>> {
     let file = Output::new(&folder.join("results.json"), "")?;
     if !quick {
-        return Summary::written(cases, status, (&experiment.title, quick), &file);
+        return Summary::written(cases, status, &experiment.title, quick, &file);
     }
     let (look, _) = quick::look(experiment);
-    Summary::written(cases, status, (&look.title, quick), &file)
+    Summary::written(cases, status, &look.title, quick, &file)
 }
 
 impl Page<'_> {

@@ -38,8 +38,10 @@ impl<'a> Runner<'a> {
     /// Runs in `cases` of this folder, whose lock is held by those who run any.
     pub fn new(
         folder: &Path,
-        (threads, memory): (Option<u16>, Option<u64>),
-        (program, samples): (&'a Program, Option<u32>),
+        threads: Option<u16>,
+        memory: Option<u64>,
+        program: &'a Program,
+        samples: Option<u32>,
         lock: Option<Lock>,
     ) -> anyhow::Result<Self> {
         let folder = folder.join(CASES);

@@ -98,7 +98,8 @@ impl<'a> Summary<'a> {
     pub fn written(
         cases: &'a [Case],
         status: impl Fn(&Case) -> Status + Sync,
-        (title, quick): (&str, bool),
+        title: &str,
+        quick: bool,
         output: &Output,
     ) -> anyhow::Result<Self> {
         let read = |case: &Case| {

@@ -36,8 +36,8 @@ pub fn measure(
         }
         Some(DataFiles::Movie { path, .. }) => {
             let path = base_dir.join(path);
-            let movie = images(file, &path)?;
-            Ok(FitData::of_movie(file, movie, &path.display().to_string())?)
+            let (movie, size) = images(file, &path)?;
+            Ok(FitData::of_movie(file, movie, size, &path.display().to_string())?)
         }
         Some(DataFiles::LightCurve(settings)) => {
             let path = paths::of_data(&settings.path, base_dir)?;
@@ -127,7 +127,7 @@ fn sequence(file: &FitFile, files: &[PathBuf]) -> anyhow::Result<WithSize> {
     let first = movie(file, &files[0])?.grid;
     let size = [first.width, first.height];
     let mut refused = None;
-    let frames = Frames::made((files.len(), first.pixels()), |sink| {
+    let frames = Frames::made(files.len(), first.pixels(), |sink| {
         files.iter().try_for_each(|path| match one(file, path, size) {
             Ok(pixels) => sink(&pixels),
             Err(error) => {
@@ -182,10 +182,10 @@ pub fn of_static(
     }
     let of = file.polarization.as_ref().map(|polarization| &polarization.strength);
     let joined = |strength: &Option<StrengthSettings>| {
-        imaging::joined(all_polarized, ("polarization.", strength.as_ref()))
+        imaging::joined(all_polarized, "polarization.", strength.as_ref())
     };
     let polarized = of.map(joined).transpose()?;
-    Ok((imaging::joined(all, ("", file.strength.as_ref()))?, polarized))
+    Ok((imaging::joined(all, "", file.strength.as_ref())?, polarized))
 }
 
 fn visibilities<R>(

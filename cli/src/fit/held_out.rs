@@ -47,7 +47,7 @@ pub fn plot(results: &HeldOutResults) -> LinePlot {
     let points = results.values.iter().map(|of| [of.value, of.loss]).collect();
     let errors = results.values.iter().filter_map(|of| of.error).collect();
     let labels = ["Held-out frames", results.setting.name(), "χ² of held-out data"];
-    line_plot(labels, &caption, (points, errors))
+    line_plot(labels, &caption, points, errors)
 }
 
 /// The loss of held-out frames against a factor on penalties; labels are the title and those of both axes.
@@ -55,13 +55,14 @@ pub fn losses(held: &[Held], labels: [&str; 3], caption: &str) -> Option<LinePlo
     let best = best_held(held)?;
     let points = held.iter().map(|held| [held.value, held.mean()]).collect();
     let errors = held.iter().map(|held| held.error_beside(best)).collect();
-    Some(line_plot(labels, caption, (points, errors)))
+    Some(line_plot(labels, caption, points, errors))
 }
 
 fn line_plot(
     [title, x, y]: [&str; 3],
     caption: &str,
-    (points, errors): (Vec<[f64; 2]>, Vec<f64>),
+    points: Vec<[f64; 2]>,
+    errors: Vec<f64>,
 ) -> LinePlot {
     let log = points.iter().all(|[x, _]| *x > 0.0);
     LinePlot {

@@ -189,7 +189,7 @@ impl Fit {
                 return Ok(answer);
             }
         };
-        let answer = run::run(prepared, text, (folder, resume), device)?;
+        let answer = run::run(prepared, text, folder, resume, device)?;
         recorder.write_into(folder.path())?;
         let Some(samples) = self.samples else { return Ok(answer) };
         Ok(answer.and("posterior", posterior::draw(prepared, folder, samples)?))

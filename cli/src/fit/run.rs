@@ -48,21 +48,23 @@ pub fn check_device(problem: &Problem, check: CheckSteps) -> anyhow::Result<()> 
 pub fn run(
     problem: &Problem,
     text: &str,
-    (folder, resume): (&Folder, bool),
+    folder: &Folder,
+    resume: bool,
     device: Option<FitDevice>,
 ) -> anyhow::Result<Answer> {
     let begun = Instant::now();
-    let mut kept = Kept::new(problem, text, (folder, resume), device);
+    let mut kept = Kept::new(problem, text, folder, resume, device);
     let results = fit_with(problem, &mut kept, |fit, state| {
         Estimate::new(fit, folder).write(fit, state, begun)
     });
     let results = results.map_err(|error| failed::told(error, folder));
     drop(kept);
-    Ok(answer(folder, results?))
+    let (worth, results) = results?;
+    Ok(answer(folder, worth, results))
 }
 
 /// The verdict and where to read it; the results for a script.
-fn answer(folder: &Folder, (worth, results): (String, Value)) -> Answer {
+fn answer(folder: &Folder, worth: String, results: Value) -> Answer {
     let path = folder.path();
     let files = [REPORT, "results.json", "volume.npz", "movie.npz"].map(|name| path.join(name));
     Answer::lines(&worth, &files[0].display().to_string())

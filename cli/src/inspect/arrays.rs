@@ -61,11 +61,7 @@ pub struct Line {
 
 impl Line {
     /// Describes an array of this name, shape and type; `rest` is what else there is to say of it.
-    pub fn new(
-        (name, shape, kind): (&str, &[u64], &str),
-        found: Option<&Survey>,
-        rest: &str,
-    ) -> Self {
+    pub fn new(name: &str, shape: &[u64], kind: &str, found: Option<&Survey>, rest: &str) -> Self {
         let lengths: Vec<String> = shape.iter().map(u64::to_string).collect();
         let lengths = format!("({})", lengths.join(", "));
         let counted = found.map_or("    no numbers".to_owned(), numbers);
@@ -140,7 +136,7 @@ fn array(name: &str, file: impl Read) -> anyhow::Result<Line> {
         if file.order() == Order::Fortran && shape.len() > 1 { ", Fortran order" } else { "" };
     let kind = file.dtype().descr().replace(['\'', ' '], "");
     let found = survey(file)?;
-    Ok(Line::new((name, &shape, &kind), found.as_ref(), order))
+    Ok(Line::new(name, &shape, &kind, found.as_ref(), order))
 }
 
 fn numbers(found: &Survey) -> String {

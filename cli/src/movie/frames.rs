@@ -211,7 +211,8 @@ impl Sequence {
     pub fn write(
         &mut self,
         film: &Film,
-        (options, per_second): (&ExrOptions, u16),
+        options: &ExrOptions,
+        per_second: u16,
         batch: &[usize],
         frames: Vec<Frame>,
     ) -> anyhow::Result<()> {

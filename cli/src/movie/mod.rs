@@ -103,8 +103,9 @@ impl Movie {
             devices::announce(device, &film.beside_device());
         }
         let start = Instant::now();
-        let style = (&self.exr, self.viewing.frames_per_second());
-        let rendering = Rendering::new(&mut film, &mut sequence, &self.output, style);
+        let per_second = self.viewing.frames_per_second();
+        let rendering =
+            Rendering::new(&mut film, &mut sequence, &self.output, &self.exr, per_second);
         let rendered = rendering.run().with_context(|| source.name.clone())?;
         animations.write(&sequence, self.look.look(&scene))?;
         Ok(self.answer(&sequence, rendered, start.elapsed().as_secs_f64(), &animations.files()))

@@ -16,8 +16,9 @@ pub struct Rendering<'a> {
     film: &'a mut Film,
     sequence: &'a mut Sequence,
     folder: &'a Path,
-    /// Style of the files, and frames a second.
-    style: (&'a ExrOptions, u16),
+    options: &'a ExrOptions,
+    /// Frames a second.
+    per_second: u16,
     bar: ProgressBar,
 }
 
@@ -27,11 +28,12 @@ impl<'a> Rendering<'a> {
         film: &'a mut Film,
         sequence: &'a mut Sequence,
         folder: &'a Path,
-        style: (&'a ExrOptions, u16),
+        options: &'a ExrOptions,
+        per_second: u16,
     ) -> Self {
         let batches = sequence.missing().len().div_ceil(film.batch());
         let bar = progress::bar((batches * sequence.height()) as u64);
-        Self { film, sequence, folder, style, bar }
+        Self { film, sequence, folder, options, per_second, bar }
     }
 
     /// Renders what is missing and counts it.
@@ -59,7 +61,7 @@ impl<'a> Rendering<'a> {
         let keeper = SignalGuard::brief(self.there());
         let times: Vec<f64> = batch.iter().map(|k| self.sequence.time(*k)).collect();
         let frames = self.frames(&times, &keeper)?;
-        self.sequence.write(self.film, self.style, batch, frames)
+        self.sequence.write(self.film, self.options, self.per_second, batch, frames)
     }
 
     fn frames(&mut self, times: &[f64], keeper: &SignalGuard) -> anyhow::Result<Vec<Frame>> {

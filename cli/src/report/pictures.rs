@@ -72,7 +72,7 @@ pub fn slices_with(
     );
     let alt = format!("Three orthogonal slices of the emission: {all}.");
     Ok(Figure {
-        png: encode(slices::sheet(shown, (point, hole_radius), outlines, unit))?,
+        png: encode(slices::sheet(shown, point, hole_radius, outlines, unit))?,
         caption,
         alt,
     })
@@ -116,14 +116,15 @@ impl Sheet {
     /// Brightness from 0 to `most`.
     fn new(cells: [usize; 2], n: usize, zoom: usize, most: f32) -> Self {
         let ends = [0.0, most.max(f32::MIN_POSITIVE)];
-        Self::colored(cells, n, zoom, (ends, Colormap::Inferno))
+        Self::colored(cells, n, zoom, ends, Colormap::Inferno)
     }
 
     fn colored(
         [columns, rows]: [usize; 2],
         n: usize,
         zoom: usize,
-        (ends, colors): ([f32; 2], Colormap),
+        ends: [f32; 2],
+        colors: Colormap,
     ) -> Self {
         let side = n * zoom + GAP;
         let [width, height] = [columns, rows].map(|count| (side * count) as u32);
@@ -210,8 +211,8 @@ pub fn residuals(maps: &[(&str, &Vec<f32>)], n: usize, what: &str) -> anyhow::Re
     let (worst, most) = all.fold((0.0f32, FAINTEST), |(worst, most), x| {
         (if x.abs() > worst.abs() { *x } else { worst }, most.max(x.abs()))
     });
-    let colors = ([-most, most], Colormap::RedBlue);
-    let mut sheet = Sheet::colored([maps.len(), 1], n, (320 / n).max(1), colors);
+    let (cells, zoom) = ([maps.len(), 1], (320 / n).max(1));
+    let mut sheet = Sheet::colored(cells, n, zoom, [-most, most], Colormap::RedBlue);
     maps.iter().enumerate().for_each(|(k, (_, map))| sheet.put([k, 0], map));
     let names = maps.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", right of it ");
     let worst = format!("{worst:.1}").replace('-', "−");

@@ -36,7 +36,8 @@ const LEAST_LIGHT: f64 = 0.1;
 /// If they cannot be drawn.
 pub fn sky(
     panels: &[SkyPanel<'_>],
-    (n, field_uas): (usize, f64),
+    n: usize,
+    field_uas: f64,
     what: &str,
 ) -> anyhow::Result<Figure> {
     let side = n * (DRAWN / n).max(1);
@@ -86,7 +87,7 @@ impl Drawn<'_> {
         self.axes(canvas);
         self.marks(canvas);
         if let Some(stokes) = &self.panel.polarized {
-            self.ticks(canvas, stokes, (&fine, most))?;
+            self.ticks(canvas, stokes, &fine, most)?;
         }
         let pixel = self.field_uas / self.n as f64;
         self.bar(
@@ -172,7 +173,8 @@ impl Drawn<'_> {
         &self,
         canvas: &mut Canvas,
         [q, u]: &[Vec<f64>; 2],
-        (light, most): (&[f32], f32),
+        light: &[f32],
+        most: f32,
     ) -> anyhow::Result<()> {
         let side = self.side;
         let channel =
@@ -248,7 +250,7 @@ mod tests {
             beam_uas,
         };
         let drawn = |panel| {
-            let figure = sky(&[panel], (n, 100.0), "A sky.").unwrap();
+            let figure = sky(&[panel], n, 100.0, "A sky.").unwrap();
             image::load_from_memory(&figure.png).unwrap().to_rgb8()
         };
         let plain = drawn(panel(None, None));

@@ -22,7 +22,8 @@ const SAME_FREQUENCY: f64 = 0.05;
 /// If there are none, files contradict each other, or there are too few frames for the strength.
 pub fn joined(
     parts: Vec<(String, FitData)>,
-    (table, strength): (&str, Option<&StrengthSettings>),
+    table: &str,
+    strength: Option<&StrengthSettings>,
 ) -> Result<FitData, Error> {
     let mut parts = parts.into_iter();
     let Some((first, mut all)) = parts.next() else {
@@ -162,7 +163,7 @@ mod tests {
     fn exact_files_share_neither_closures_nor_gains() {
         let of = |hz, sigma| file(hz, SourcePosition::M87, sigma);
         let parts = vec![("lo".to_owned(), of(227e9, 0.1)), ("hi".to_owned(), of(229e9, 0.2))];
-        let all = joined(parts, ("", None)).unwrap();
+        let all = joined(parts, "", None).unwrap();
         assert_eq!(
             (&all.times[..], &all.files[..]),
             (&[1.0, 1.0, 2.0, 2.0][..], &[0, 1, 0, 1][..])
@@ -192,7 +193,7 @@ mod tests {
             (file(229e9, SourcePosition::SGR_A, 0.1), "a and b cannot be one image: they observe"),
             (file(86e9, SourcePosition::M87, 0.1), "they are of 229.0 and 86.0 GHz"),
         ] {
-            let error = joined(vec![m87(), ("b".to_owned(), other)], ("", None));
+            let error = joined(vec![m87(), ("b".to_owned(), other)], "", None);
             let error = error.err().unwrap().to_string();
             assert!(error.contains(says), "{error}");
         }

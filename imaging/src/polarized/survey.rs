@@ -90,7 +90,7 @@ pub fn survey_polarized(
     };
     let best = best_held(&losses).map_or(1.0, |best| best.value);
     let strength = |value: f64| {
-        let problem = search.problem(&*term.term, (light, value), frames.clone());
+        let problem = search.problem(&*term.term, light, value, frames.clone());
         search.solved(Stage::Strengths, &problem, value, survey)
     };
     let mut found = strength(best);
@@ -130,7 +130,8 @@ impl Search<'_> {
     fn problem<'a>(
         &self,
         term: &'a dyn FrameTerm<f64>,
-        (light, strength): (&'a [f64], f64),
+        light: &'a [f64],
+        strength: f64,
         frames: Vec<usize>,
     ) -> PolarizedProblem<'a> {
         let smoothness = self.settings.smoothness * strength;
@@ -182,9 +183,9 @@ impl Search<'_> {
             frames.iter().copied().filter(|frame| (of(*frame) != fold) == seen).collect()
         };
         held(settings, |value, fold| {
-            let seen = self.problem(term, (light, value), part(fold, true));
+            let seen = self.problem(term, light, value, part(fold, true));
             let found = self.solved(Stage::HeldOut, &seen, value, survey)?;
-            Some(self.problem(term, (light, value), part(fold, false)).chi2(&found.images))
+            Some(self.problem(term, light, value, part(fold, false)).chi2(&found.images))
         })
     }
 
@@ -201,7 +202,7 @@ impl Search<'_> {
             let drawn = measured.perturbed(&[self.settings.loss()], 1.0, seed)?;
             let term = self.term(&drawn)?;
             let light = &survey.draws[k].solution.image;
-            let problem = self.problem(&*term.term, (light, strength), frames.clone());
+            let problem = self.problem(&*term.term, light, strength, frames.clone());
             Ok(self.solved(Stage::Draws, &problem, strength, survey))
         };
         let all: Result<Vec<Option<PolarizedCandidate>>, Error> =

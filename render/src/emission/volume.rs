@@ -45,7 +45,8 @@ impl VolumeModel {
         source: &VolumeSource,
         file: &VolumeFile,
         hole: &Kerr,
-        (spectral_index, slow_light): (Option<f64>, bool),
+        spectral_index: Option<f64>,
+        slow_light: bool,
     ) -> Result<Self, Error> {
         let range = |field, value, allowed| Error::out_of_range(field, value, allowed);
         let axis = match (source.axis.or(file.axis), &source.rotation) {

@@ -98,9 +98,9 @@ impl Raster {
             Some(tolerance) => {
                 let rings = self.rings.as_ref();
                 let refined = Adaptive { prepared, grid, rings, tolerance };
-                vec![Pixels::plain(refined.pixels((rows, columns), work)?)]
+                vec![Pixels::plain(refined.pixels(rows, columns, work)?)]
             }
-            None => uniform((prepared, self.rings.as_ref()), grid, (rows, columns), times, work)?,
+            None => uniform(prepared, self.rings.as_ref(), grid, rows, columns, times, work)?,
         };
         Ok(pixels)
     }

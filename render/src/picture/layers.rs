@@ -9,7 +9,8 @@ use crate::transport::{Layers, PreparedScene, Scratch};
 pub(super) fn add_central(
     prepared: &PreparedScene,
     grid: &Grid,
-    (alpha, beta): (&[f64], &[f64]),
+    alpha: &[f64],
+    beta: &[f64],
     scratch: &mut Scratch,
     layers: &mut [Layers],
 ) -> Result<(), Error> {
@@ -19,7 +20,7 @@ pub(super) fn add_central(
     let (rays, samples) = (alpha.len(), grid.side * grid.side);
     for (k, layers) in layers.iter_mut().enumerate() {
         if k % samples == central(grid.side) {
-            prepared.add_central((alpha[k % rays], beta[k % rays]), grid.size, scratch, layers)?;
+            prepared.add_central(alpha[k % rays], beta[k % rays], grid.size, scratch, layers)?;
             layers.motion = within(grid.width.max(grid.height) as f64, layers.motion);
         }
     }

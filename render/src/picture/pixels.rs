@@ -58,9 +58,11 @@ impl Pixels {
 /// The pixels of a rectangle at each of `times`, row by row, with `side`² rays each, which are
 /// traced once for all times, and more where `rings` says so.
 pub(super) fn uniform(
-    (prepared, rings): (&PreparedScene, Option<&Resolver>),
+    prepared: &PreparedScene,
+    rings: Option<&Resolver>,
     grid: &Grid,
-    (rows, columns): (Range<usize>, Range<usize>),
+    rows: Range<usize>,
+    columns: Range<usize>,
     times: &[f64],
     work: &mut Workspace,
 ) -> Result<Vec<Pixels>, Error> {
@@ -81,14 +83,13 @@ pub(super) fn uniform(
         let rays = some.len() * side * side;
         work.observe_at(prepared, times)?;
         let Workspace { alpha, beta, scratch, layers, .. } = &mut *work;
-        layers::add_central(prepared, grid, (alpha, beta), scratch, layers)?;
+        layers::add_central(prepared, grid, alpha, beta, scratch, layers)?;
         let mut seen = std::mem::take(&mut work.seen);
         let mut layers = std::mem::take(&mut work.layers);
         let counted = match rings {
             Some(rings) => {
                 let squares = std::mem::take(&mut work.squares);
-                let lights = (&mut seen[..], &mut layers[..]);
-                rings.resolve(prepared, &squares, times, lights, work)?
+                rings.resolve(prepared, &squares, times, &mut seen, &mut layers, work)?
             }
             None => Vec::new(),
         };

@@ -23,7 +23,8 @@ impl PreparedScene {
     /// Adds what is wanted of the ray at (x, y), the centre of a pixel of some size, both in units of the view.
     pub(crate) fn add_central(
         &self,
-        (x, y): (f64, f64),
+        x: f64,
+        y: f64,
         pixel: f64,
         scratch: &mut super::Scratch,
         layers: &mut Layers,

@@ -216,7 +216,7 @@ impl RayVisitor for Sum<'_> {
         for (j, time) in self.block.times.iter().enumerate() {
             let mut light = still.clone();
             let source = self.scene.optics.numbering.media;
-            self.scene.media.add((number, j), source, &self.sources.media, &mut light);
+            self.scene.media.add(number, j, source, &self.sources.media, &mut light);
             if let Some(path) = path {
                 self.add_spots(number, j, *time, ray, path, &mut light);
             }
@@ -324,7 +324,7 @@ impl<'a> Sum<'a> {
             );
         }
         if let (Some(meshes), Some(path), true) = (meshes, path, ray.stepped) {
-            meshes.add(optics, (path.path, ray.last_time()), &self.sources.meshes, light);
+            meshes.add(optics, path.path, ray.last_time(), &self.sources.meshes, light);
         }
     }
 
@@ -367,7 +367,7 @@ impl<'a> Sum<'a> {
             boost = seen.receive(shift, index);
         }
         if let (Some(layers), Some(record)) = (self.layers.get_mut(place), &light.record) {
-            *layers = Layers::of(ray, record, (light.intensity, light.through()));
+            *layers = Layers::of(ray, record, light.intensity, light.through());
             layers.mixed.boost(boost as f32);
         }
     }

@@ -120,7 +120,8 @@ impl Line {
         &self,
         sphere: f64,
         until: f64,
-        (rule, split): (&PanelRule, u32),
+        rule: &PanelRule,
+        split: u32,
         columns: &mut NodeColumns,
     ) {
         columns.clear();
@@ -189,8 +190,8 @@ impl Sum<'_> {
             for (number, times) in times.chunks(together).enumerate() {
                 let mut split = 1;
                 loop {
-                    let rule = (self.sources.media.rule(), split);
-                    line.nodes(medium.sphere(), ray.last_time(), rule, columns);
+                    let rule = self.sources.media.rule();
+                    line.nodes(medium.sphere(), ray.last_time(), rule, split, columns);
                     let done =
                         self.radiate(m, k, (ray, crossings), (times, number * together), columns);
                     if done || split >= finest(medium) {

@@ -94,7 +94,8 @@ const OUTLINES: [Rgb; 2] = [[235, 235, 235], [90, 170, 255]];
 /// outline where a plane cuts it; `unit` is that of the emission. `None` if there is nothing to draw.
 pub fn sheet(
     shown: &[Shown],
-    (point, hole_radius): ([f64; 3], f64),
+    point: [f64; 3],
+    hole_radius: f64,
     outlines: Option<Outlines<'_>>,
     unit: &str,
 ) -> Option<RgbImage> {
@@ -230,10 +231,10 @@ mod tests {
     fn exact_size_of_the_sheet() {
         let scene = paper::scene_1(16);
         let shown = [Shown { name: "truth", volume: &scene }; 2];
-        let at = (Through::Maximum.point(&scene), 2.0);
-        let drawn = sheet(&shown, at, None, "unit").unwrap();
+        let at = Through::Maximum.point(&scene);
+        let drawn = sheet(&shown, at, 2.0, None, "unit").unwrap();
         assert_eq!(drawn.dimensions(), (3 * (58 + 300 + 14) + 14, 2 * (30 + 28 + 300 + 46) + 74));
-        assert!(sheet(&[], ([0.0; 3], 2.0), None, "unit").is_none());
+        assert!(sheet(&[], [0.0; 3], 2.0, None, "unit").is_none());
     }
 
     #[test]
@@ -249,14 +250,14 @@ mod tests {
     fn exact_outlines_are_drawn_in_their_colours() {
         let scene = paper::scene_1(33);
         let shown = [Shown { name: "truth", volume: &scene }];
-        let at = (Through::Maximum.point(&scene), 0.0);
+        let at = Through::Maximum.point(&scene);
         let lines = Outlines { volume: &scene, levels: [0.3, 0.6] };
-        let drawn = sheet(&shown, at, Some(lines), "unit").unwrap();
+        let drawn = sheet(&shown, at, 0.0, Some(lines), "unit").unwrap();
         let count = |color: Rgb| drawn.pixels().filter(|pixel| pixel.0 == color).count();
         // The line around the brighter part is the shorter one.
         let [outer, inner] = OUTLINES.map(count);
         assert!(inner > 30 && outer > inner, "{outer} {inner}");
-        let plain = sheet(&shown, at, None, "unit").unwrap();
+        let plain = sheet(&shown, at, 0.0, None, "unit").unwrap();
         assert!(plain.pixels().all(|pixel| pixel.0 != OUTLINES[1]));
     }
 }

@@ -117,8 +117,7 @@ pub fn fit_with<R, E: From<Error>>(
     let mut objective = problem.objective(instrument, motion, measured)?;
     let times = setup::emission_times(instrument, motion);
     let (axis, axis_rate) = setup::axis(file)?;
-    let about = (axis, times);
-    let file = &search::weighed_before_steps(file, &mut objective, about, progress)?;
+    let file = &search::weighed_before_steps(file, &mut objective, axis, times, progress)?;
     let representation = setup::representation(file, &problem.registry, times)?;
     let training = setup::training(file, axis_rate, times)?;
     let mut state = State::new(&*representation, axis, &training);
@@ -136,7 +135,7 @@ pub fn fit_with<R, E: From<Error>>(
         }
         None => {
             progress.starts()?;
-            fit.start(&mut state, (motion, times), progress)?;
+            fit.start(&mut state, motion, times, progress)?;
             progress.save(&state)?;
         }
     }

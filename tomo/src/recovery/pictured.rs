@@ -23,7 +23,7 @@ impl Fit<'_, '_> {
         let (mut batch, mut workspace) = (Batch::default(), Workspace::new());
         let mut image = vec![0.0; model.pixels()];
         let quiescent = self.quiescent_light(state);
-        let frames = Frames::made((model.frames(), model.pixels()), |sink| {
+        let frames = Frames::made(model.frames(), model.pixels(), |sink| {
             (0..model.frames()).try_for_each(|frame| {
                 model.movie(field, &[frame], &mut batch, &mut workspace, &mut image);
                 image.iter_mut().zip(&quiescent).for_each(|(pixel, light)| *pixel += light);

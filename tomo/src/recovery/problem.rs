@@ -57,7 +57,7 @@ impl Problem {
         let measure = |settings: &FitFile, _: &Instrument| {
             let Movie { grid, pixels } = movie;
             let frames = kerrlight_common::frames::Frames::of(pixels, grid.pixels());
-            FitData::of_movie(settings, (frames, [grid.width, grid.height]), "the movie")
+            FitData::of_movie(settings, frames, [grid.width, grid.height], "the movie")
         };
         Self::new(settings, Registry::new(), measure)
     }

@@ -121,7 +121,8 @@ fn band(problem: &Problem, progress: &mut dyn Progress) -> Result<BandScan, Erro
 pub(super) fn weighed(
     file: &FitFile,
     objective: &mut Objective<f32>,
-    about: (Axis, [f64; 2]),
+    axis: Axis,
+    times: [f64; 2],
     progress: &mut dyn Progress,
 ) -> Result<FitFile, Error> {
     let Some(settings) = &file.held_out else { return Ok(file.clone()) };
@@ -130,7 +131,8 @@ pub(super) fn weighed(
         None => {
             let journal = progress.journal()?;
             let mut watch = |value: usize, fold: usize| progress.goes_on(At::HeldOut(value, fold));
-            let held = setup::hold_out(file, settings, objective, about, &*journal, &mut watch)
+            let journal = &*journal;
+            let held = setup::hold_out(file, settings, objective, axis, times, journal, &mut watch)
                 .map_err(|error| error.while_in("held_out"))?;
             progress.keep(&Found::Weight(file, &held.ok_or(Stopped::Kept)?))?
         }
@@ -146,12 +148,13 @@ pub(super) fn weighed(
 pub(super) fn weighed_before_steps(
     file: &FitFile,
     objective: &mut Objective<f32>,
-    about: (Axis, [f64; 2]),
+    axis: Axis,
+    times: [f64; 2],
     progress: &mut dyn Progress,
 ) -> Result<FitFile, Error> {
     match file.representation.kind {
         Kind::LinearGrid => Ok(file.clone()),
-        _ => weighed(file, objective, about, progress),
+        _ => weighed(file, objective, axis, times, progress),
     }
 }
 

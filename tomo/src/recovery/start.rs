@@ -8,7 +8,7 @@ use crate::Error;
 use crate::fit::linear::{Change, Ending, LinearProgress, LinearSolution, Voxels};
 use crate::fit::scan::{AxisLoss, AxisProblem, AxisSettings, Effort, refine_axis, scan_axis};
 use crate::fit::settings::{AxisScan as AxisScanSettings, AxisSearch, FitFile, Kind, Start};
-use crate::fit::setup::{self, CoarseView, FitData, SolvedLeakage, WarmStart};
+use crate::fit::setup::{self, CoarseGrid, CoarseView, FitData, SolvedLeakage, WarmStart};
 use crate::fit::{Batch, Field, Motion, State, Trainer, WithStaticImage};
 use crate::representation::{Representation, Workspace};
 use core::ops::ControlFlow;
@@ -26,7 +26,8 @@ fn fine(nodes: usize) -> Effort {
 
 /// The loss over the whole sphere of axes, and the best one.
 fn scan(
-    (file, settings): (&FitFile, &AxisScanSettings),
+    file: &FitFile,
+    settings: &AxisScanSettings,
     measured: &FitData,
     motion: &Motion,
     progress: &mut dyn Progress,
@@ -44,9 +45,8 @@ fn scan(
     let scan = view.search(motion, frames, whole)?.ok_or_else(stopped)?;
     let refined = refine.map(|nodes| -> Result<AxisLoss, Error> {
         let view = CoarseView::new(file, measured, file.screen.pixels)?;
-        let effort = (fine(nodes), HALVINGS);
         let near = |problem: &AxisProblem<'_, f32>| {
-            refine_axis(problem, scan.best.axis, STEP, effort, &watch)
+            refine_axis(problem, scan.best.axis, STEP, fine(nodes), HALVINGS, &watch)
         };
         view.search(motion, frames, near)?.ok_or_else(stopped)
     });
@@ -58,12 +58,13 @@ impl Fit<'_, '_> {
     pub(super) fn start(
         &mut self,
         state: &mut State<f32>,
-        (motion, times): (&Motion, [f64; 2]),
+        motion: &Motion,
+        times: [f64; 2],
         progress: &mut dyn Progress,
     ) -> Result<(), Error> {
         let file = self.file;
         if let AxisSearch::Scan(settings) = &file.axis {
-            let found = scan((file, settings), self.measured, motion, progress)
+            let found = scan(file, settings, self.measured, motion, progress)
                 .map_err(|error| error.while_in("axis.scan"))?;
             state.now.axis = found.axis();
             progress.found(Event::Axis(&found))?;
@@ -73,15 +74,15 @@ impl Fit<'_, '_> {
         let trainer = &mut self.trainer;
         if file.representation.kind == Kind::LinearGrid {
             let nodes = file.representation.linear_grid.nodes;
-            let file = weighed(file, &mut trainer.objective, (axis, times), progress)?;
+            let file = weighed(file, &mut trainer.objective, axis, times, progress)?;
             let change = setup::change(&file, times)?;
-            let of = (&file, measured, (axis, change), (nodes, 1));
-            let solution = solve_linear(of, trainer, progress)?;
+            let grid = CoarseGrid { nodes, stride: 1, seed: None };
+            let solution = solve_linear(&file, measured, axis, change, grid, trainer, progress)?;
             state.now.parameters = solution.parameters();
         } else if let Start::Linear { nodes, stride, steps, .. } = file.training.start {
             let change = setup::change(file, times)?;
-            let of = (file, measured, (axis, change), (nodes, stride));
-            let solution = solve_linear(of, trainer, progress)?;
+            let grid = CoarseGrid { nodes, stride, seed: None };
+            let solution = solve_linear(file, measured, axis, change, grid, trainer, progress)?;
             let given = WarmStart { solution: &solution, nodes, knots: change.knots };
             let imprinted = setup::warm_start(file, trainer.representation, &given, steps, state)?;
             progress.found(Event::WarmStarted(&imprinted))?;
@@ -90,21 +91,23 @@ impl Fit<'_, '_> {
     }
 }
 
-/// Settings, data, axis and change, nodes and stride of a linear problem.
-type Linear<'a> = (&'a FitFile, &'a FitData, (Axis, Change), (usize, usize));
-
 /// The grid that fits every so many frames best; where leakage is solved for, both in turn.
 fn solve_linear(
-    (file, measured, about, nodes): Linear<'_>,
+    file: &FitFile,
+    measured: &FitData,
+    axis: Axis,
+    change: Change,
+    grid: CoarseGrid,
     trainer: &mut Trainer<'_, f32>,
     progress: &mut dyn Progress,
 ) -> Result<LinearSolution<f32>, Error> {
-    let voxels = Voxels::cube(nodes.0, file.region.r_max, setup::linear(file)?.degree).field()?;
+    let voxels =
+        Voxels::cube(grid.nodes, file.region.r_max, setup::linear(file)?.degree).field()?;
     let voxels: Box<dyn Representation<f32>> = match trainer.objective.model.quiescent() {
         Some(image) => Box::new(WithStaticImage::new(Box::new(voxels), image)),
         None => Box::new(voxels),
     };
-    let grid = match file.representation.kind {
+    let representation = match file.representation.kind {
         Kind::LinearGrid => trainer.representation,
         _ => &*voxels,
     };
@@ -120,13 +123,13 @@ fn solve_linear(
                 false => ControlFlow::Break(()),
             }
         };
-        let found = setup::solve_linear(file, objective, about, nodes, &mut watch)
+        let found = setup::solve_linear(file, objective, axis, change, grid, &mut watch)
             .map_err(|error| error.while_in("linear"))?;
         if found.ending == Ending::Cancelled {
             return Err(Stopped::Lost("the linear grid was being solved").into());
         }
         let parameters = &found.parameters();
-        let field = Field { representation: grid, parameters, axis: about.0, occupancy: None };
+        let field = Field { representation, parameters, axis, occupancy: None };
         let frames: Vec<usize> = match measured.leakage {
             Some(_) => (0..measured.times.len()).collect(),
             None => Vec::new(),

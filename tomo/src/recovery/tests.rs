@@ -12,7 +12,7 @@ fn settings(kind: Kind) -> FitFile {
     let truth = Truth { spot: vec![spot], ..Truth::default() };
     let hole = crate::fit::settings::Hole::new(0.5);
     let mut settings =
-        FitFile::new(hole, 40.0, [3.0, 9.0], kind).simulating(truth, (6, 0.0, 50.0), 1e-2);
+        FitFile::new(hole, 40.0, [3.0, 9.0], kind).simulating(truth, 6, 0.0, 50.0, 1e-2);
     settings.screen.pixels = 10;
     settings.representation.linear_grid.nodes = 10;
     settings.output.nodes = 12;

@@ -177,8 +177,8 @@ impl<T: Float> Changing<T> {
             let place = [x[k], y[k], z[k]];
             match &self.carrier {
                 Some(carrier) => {
-                    let event = (place.map(Float::double), t.double() - label);
-                    part.push((k, share), event, carrier);
+                    let (place, elapsed) = (place.map(Float::double), t.double() - label);
+                    part.push(k, share, place, elapsed, carrier);
                 }
                 None => part.push_carried(k, share, place),
             }
@@ -243,8 +243,10 @@ impl<T: Float> Part<T> {
     /// A point with its share, place and time since the label time, if its matter shines.
     fn push(
         &mut self,
-        (point, share): (usize, (T, T)),
-        (place, elapsed): ([f64; 3], f64),
+        point: usize,
+        share: (T, T),
+        place: [f64; 3],
+        elapsed: f64,
         carrier: &Carrier,
     ) {
         let r = norm(place);

@@ -23,8 +23,10 @@ struct Both<'a> {
 impl<'a> Both<'a> {
     fn new(
         representation: &'a dyn Representation<f32>,
-        (kind, draw): (Kind, Drawn),
-        (masked, most): (bool, Option<usize>),
+        kind: Kind,
+        draw: Drawn,
+        masked: bool,
+        most: Option<usize>,
         learns_axis: bool,
     ) -> Option<Self> {
         let batch = match &draw {
@@ -41,7 +43,7 @@ impl<'a> Both<'a> {
         assert!(graphics.makes_residuals() == (kind != Kind::ImagesAndFlux));
         let mut occupancy = now.occupancy.clone();
         if let Some(mask) = &mut occupancy {
-            mask.refresh(representation, &now.parameters, (3, &[]), &mut Workspace::new());
+            mask.refresh(representation, &now.parameters, 3, &[], &mut Workspace::new());
             assert!(mask.fraction() > 0.05 && mask.fraction() < 0.95, "{}", mask.fraction());
         }
         Some(Self { graphics, objective, representation, training, occupancy, draw })
@@ -141,9 +143,9 @@ fn code_networks_have_the_gradients_of_the_processor() {
         ("small, plunging", &small, (Kind::Plunging, frames()), (false, None)),
         ("mlp4d, falling", &mlp4d, (Kind::Falling, frames()), (false, None)),
     ];
-    for (name, representation, data, how) in cases {
+    for (name, representation, (kind, draw), (masked, most)) in cases {
         for learns_axis in [false, true] {
-            let both = Both::new(representation, data.clone(), how, learns_axis);
+            let both = Both::new(representation, kind, draw.clone(), masked, most, learns_axis);
             let Some(mut both) = both else { return };
             agree(name, &mut both);
         }
@@ -163,9 +165,9 @@ fn code_grids_have_the_gradients_of_the_processor() {
         ("feature grid, visibilities", &features, (Kind::Visibilities, frames()), (false, None)),
         ("feature grid, fluxes", &features, (Kind::ImagesAndFlux, frames()), (false, Some(128))),
     ];
-    for (name, representation, data, how) in cases {
+    for (name, representation, (kind, draw), (masked, most)) in cases {
         for learns_axis in [false, true] {
-            let both = Both::new(representation, data.clone(), how, learns_axis);
+            let both = Both::new(representation, kind, draw.clone(), masked, most, learns_axis);
             let Some(mut both) = both else { return };
             agree(name, &mut both);
         }
@@ -176,7 +178,7 @@ fn code_grids_have_the_gradients_of_the_processor() {
 #[test]
 fn code_a_dark_field_has_the_gradient_of_the_processor() {
     let (dark, draw) = (problem::dark(), Drawn::Frames(vec![2, 0, 3]));
-    let both = Both::new(&dark, (Kind::Closures, draw), (false, None), false);
+    let both = Both::new(&dark, Kind::Closures, draw, false, None, false);
     if let Some(mut both) = both {
         agree("dark grid, closures", &mut both);
     }
@@ -196,7 +198,7 @@ fn exact_gradients_are_slopes_of_the_loss() {
     ];
     for (name, representation, kind, step) in cases {
         let draw = Drawn::Frames(vec![1, 3]);
-        let Some(mut both) = Both::new(representation, (kind, draw), (false, None), true) else {
+        let Some(mut both) = Both::new(representation, kind, draw, false, None, true) else {
             return;
         };
         let parameters = both.now().parameters;

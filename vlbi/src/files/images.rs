@@ -209,7 +209,7 @@ pub fn frames_with(
         pixels.ok_or_else(|| NumpyError::content(format!("shape {shape:?}: no pixels")))?;
     let what = || format!("an image of {width} x {height} pixels");
     memory::afford(what, memory::movie(1.0, pixels as f64))?;
-    let frames = Frames::made((count, pixels), |sink| {
+    let frames = Frames::made(count, pixels, |sink| {
         make(pixels, &mut |image: &[f64]| {
             all_finite(image, [width, height])?;
             Ok(sink(image)?)

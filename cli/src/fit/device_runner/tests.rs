@@ -68,7 +68,7 @@ fn exact_a_lost_device_leaves_a_checkpoint_that_the_processor_takes_up() {
         Folder::create(&at.path().join("run"), &text, Inputs::new(&text, Vec::new())).unwrap();
     let device: crate::devices::FitDevice =
         (|_, _, _| Ok(()), Box::new(|_, _, _| Ok(Box::new(Unplugged { left: 7 }))));
-    let error = run::run(&prepared, &text, (&folder, false), Some(device)).err().unwrap();
+    let error = run::run(&prepared, &text, &folder, false, Some(device)).err().unwrap();
     let told = error.to_string();
     assert!(
         told.contains("lost: unplugged; step 7 is kept") && told.contains("--resume"),
@@ -78,7 +78,7 @@ fn exact_a_lost_device_leaves_a_checkpoint_that_the_processor_takes_up() {
     assert!(!error.is::<Failed>());
     let bytes = folder.checkpoint().unwrap().unwrap();
     assert_eq!(checkpoint::header(&bytes).unwrap().step, 7);
-    run::run(&prepared, &text, (&folder, true), None).unwrap();
+    run::run(&prepared, &text, &folder, true, None).unwrap();
     let bytes = folder.checkpoint().unwrap().unwrap();
     assert_eq!(checkpoint::header(&bytes).unwrap().step, 12);
     let results = std::fs::read_to_string(folder.path().join("results.json")).unwrap();

@@ -52,7 +52,8 @@ struct Fitted {
 /// If it has no fluxes to speak of.
 pub fn of_light_curve(
     curve: &LightCurve,
-    (path, name): (&str, &str),
+    path: &str,
+    name: &str,
     source: Option<&Source>,
 ) -> anyhow::Result<String> {
     let fitted = Fitted::of(curve)?;
@@ -311,7 +312,7 @@ mod tests {
         let after = fitted.validate_after_min() / 60.0;
         let later = fitted.curve.samples.iter().filter(|sample| sample.time_h - 9.0 > after);
         assert_eq!((fitted.curve.samples.len(), fitted.held(), later.count()), (76, 15, 15));
-        let text = of_light_curve(&curve, ("\"a.csv\"", "a.csv"), None).unwrap();
+        let text = of_light_curve(&curve, "\"a.csv\"", "a.csv", None).unwrap();
         assert!(text.contains("#! the last 15 of 76 samples, a fifth, judge the fit"), "{text}");
     }
 }

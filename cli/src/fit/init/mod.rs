@@ -160,7 +160,7 @@ fn of_files(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Resu
     };
     let paths = data.iter().map(|path| seen_from(toml, path).map(toml::Value::String));
     let paths = toml::Value::Array(paths.collect::<anyhow::Result<_>>()?).to_string();
-    let text = static_image::of_visibilities(first, source, name, (&paths, &file(&data[0])))?;
+    let text = static_image::of_visibilities(first, source, name, &paths, &file(&data[0]))?;
     let others = observations.iter().zip(data).skip(1);
     let said: String = others
         .map(|(seen, path)| {
@@ -194,7 +194,7 @@ fn of_data(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Resul
     {
         let curve = files::parse_light_curve(&text).with_context(|| data.display().to_string())?;
         let source = sources::named_in(name).or_else(|| sources::named_above(&text));
-        return light_curve::of_light_curve(&curve, (&path, name), source);
+        return light_curve::of_light_curve(&curve, &path, name, source);
     }
     read_movie(data).map_or(Err(first), |movie| of_movie(&movie, &path))
 }
@@ -258,7 +258,7 @@ fn of_observation(
     let file = data.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let source = known(observation);
     let name = &called(observation, source);
-    let image = || static_image::of_visibilities(observation, source, name, (&path, file));
+    let image = || static_image::of_visibilities(observation, source, name, &path, file);
     let volume = || of_visibilities(observation, &path, file);
     match (model, source) {
         (Some(Model::Image), _) => image(),

@@ -12,7 +12,8 @@ pub fn of_visibilities(
     observation: &Observation,
     source: Option<&Source>,
     name: &str,
-    (path, file): (&str, &str),
+    path: &str,
+    file: &str,
 ) -> anyhow::Result<String> {
     let longest = observation.stokes_i().map(|(row, _)| row.uv[0].hypot(row.uv[1]));
     let longest = longest.fold(0.0, f64::max);

@@ -86,7 +86,7 @@ impl Posterior {
         let path = folder.path().join(FOLDER);
         std::fs::create_dir_all(&path)
             .with_context(|| format!("cannot make {}", path.display()))?;
-        let drawing = Drawing::new(&prepared, &folder, (unknown.as_ref(), *numbers.end()), &path)?;
+        let drawing = Drawing::new(&prepared, &folder, unknown.as_ref(), *numbers.end(), &path)?;
         let bar = progress::samples(numbers.clone().count() as u64);
         let keeper = SignalGuard::brief("stopping; the same command continues");
         for number in numbers.clone() {
@@ -164,7 +164,7 @@ pub fn draw(prepared: &Problem, folder: &Folder, samples: u32) -> anyhow::Result
     let path = folder.path().join(FOLDER);
     std::fs::create_dir_all(&path).with_context(|| format!("cannot make {}", path.display()))?;
     let unknown = prepared.settings.unknown_geometry()?;
-    let drawing = Drawing::new(prepared, folder, (unknown.as_ref(), samples), &path)?;
+    let drawing = Drawing::new(prepared, folder, unknown.as_ref(), samples, &path)?;
     let bar = progress::samples(u64::from(samples));
     let keeper = SignalGuard::brief(format!("stopping; resume with: {}", again(folder, samples)));
     let mut all = Vec::new();
@@ -225,8 +225,8 @@ fn geometries<'a>(
     // Residuals of the best geometry, but no less than the errors that the search assumed.
     let left = geometry.noise_factor.max(geometry.chi2_per_datum.sqrt());
     let factor = if is_changing { Results::read(folder)?.noise() } else { left };
-    let about = (&prepared.settings, &prepared.measured);
-    Ok(GeometryPosterior::new(about, unknown, (best, &spread), factor)?)
+    let Problem { settings, measured, .. } = prepared;
+    Ok(GeometryPosterior::new(settings, measured, unknown, best, &spread, factor)?)
 }
 
 /// What draws need of all results of a fit.
@@ -270,7 +270,8 @@ impl<'a> Drawing<'a> {
     fn new(
         prepared: &'a Problem,
         folder: &Folder,
-        (unknown, samples): (Option<&'a UnknownGeometry>, u32),
+        unknown: Option<&'a UnknownGeometry>,
+        samples: u32,
         path: &Path,
     ) -> anyhow::Result<Self> {
         let geometry = geometry_search::found(folder)?;
@@ -309,8 +310,8 @@ impl<'a> Drawing<'a> {
             return Ok(Some(kept));
         }
         let told = |text: &str| bar.set_message(text.to_owned());
-        let Some(drawn) = self.one(number, keeper, &told)? else { return Ok(None) };
-        keep(path, number, self.factor, drawn).map(Some)
+        let Some((drawn, geometry)) = self.one(number, keeper, &told)? else { return Ok(None) };
+        keep(path, number, self.factor, drawn, geometry).map(Some)
     }
 
     fn one(
@@ -382,7 +383,8 @@ fn keep(
     folder: &Path,
     number: u64,
     factor: f64,
-    (drawn, geometry): (Drawn, Option<PerParameter<f64>>),
+    drawn: Drawn,
+    geometry: Option<PerParameter<f64>>,
 ) -> anyhow::Result<Kept> {
     let [volume, numbers] = names(folder, number);
     let file = VolumeFile { volume: drawn.volume.clone(), axis: None };

@@ -122,9 +122,9 @@ fn begin(
         told(&format!("linear grid, round {}, loss {:.4e}", now.round, now.value));
         if keeper.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let grid = (nodes, stride, Some(prior_seed(file)));
-    let about = (state.now.axis, change);
-    let solution = setup::draw_linear(file, &mut trainer.objective, about, grid, &mut watch);
+    let grid = setup::CoarseGrid { nodes, stride, seed: Some(prior_seed(file)) };
+    let (objective, axis) = (&mut trainer.objective, state.now.axis);
+    let solution = setup::solve_linear(file, objective, axis, change, grid, &mut watch);
     let solution = solution.map_err(failed::failed).context("linear")?;
     if keeper.stopped() {
         return Ok(false);

@@ -63,7 +63,8 @@ impl<'a> Kept<'a> {
     pub fn new(
         problem: &'a Problem,
         text: &'a str,
-        (folder, resume): (&'a Folder, bool),
+        folder: &'a Folder,
+        resume: bool,
         device: Option<FitDevice>,
     ) -> Self {
         Self { problem, text, folder, resume, device, begun: Instant::now(), work: None }

@@ -33,7 +33,8 @@ impl Found<'_> {
             all.push(panel("standard deviation of the draws", scatter, None));
         }
         let what = "The static image, linear between the centres of its pixels as in the fit.";
-        sky(&all, self.size(), what)
+        let (n, field_uas) = self.size();
+        sky(&all, n, field_uas, what)
     }
 
     /// The image with ticks along its polarisation, and as the beam sees it.
@@ -53,7 +54,8 @@ impl Found<'_> {
             panel("the image", &<[f64]>::to_vec, None),
             panel(&name, &|image| self.seen(image, beam), Some(beam)),
         ];
-        sky(&all, self.size(), "Total intensity with linear polarisation.").map(Some)
+        let (n, field_uas) = self.size();
+        sky(&all, n, field_uas, "Total intensity with linear polarisation.").map(Some)
     }
 
     /// The image as FITS, with Q and U where they were found.

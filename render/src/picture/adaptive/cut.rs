@@ -37,7 +37,8 @@ impl Cut {
     pub(super) fn whole(
         pixel: usize,
         [column, row]: [usize; 2],
-        ([bright, disc], edge): ([f64; 2], bool),
+        [bright, disc]: [f64; 2],
+        edge: bool,
         around: [Light; 9],
     ) -> Self {
         let (cells, contrast) = (Vec::new(), 0.0);

@@ -50,10 +50,11 @@ impl Adaptive<'_> {
     /// The pixels of a rectangle, row by row.
     pub fn pixels(
         &self,
-        rectangle: (Range<usize>, Range<usize>),
+        rows: Range<usize>,
+        columns: Range<usize>,
         work: &mut Workspace,
     ) -> Result<Vec<Pixel>, Error> {
-        let (mut pixels, mut cuts) = self.first(rectangle, work)?;
+        let (mut pixels, mut cuts) = self.first(rows, columns, work)?;
         let middles = self.middles(&pixels, &mut cuts, work)?;
         work.clear();
         for cut in &cuts {
@@ -112,7 +113,7 @@ impl Adaptive<'_> {
         work: &mut Workspace,
     ) -> Result<Vec<Counted>, Error> {
         let Some(rings) = self.rings else { return Ok(vec![Counted::default(); seen.len()]) };
-        rings.resolve(self.prepared, squares, &[self.prepared.time()], (seen, &mut []), work)
+        rings.resolve(self.prepared, squares, &[self.prepared.time()], seen, &mut [], work)
     }
 
     /// Traces the quarters of the quarters of `parents`.
@@ -147,7 +148,8 @@ impl Adaptive<'_> {
     /// One ray a pixel, and which pixels are to be cut.
     fn first(
         &self,
-        (rows, columns): (Range<usize>, Range<usize>),
+        rows: Range<usize>,
+        columns: Range<usize>,
         work: &mut Workspace,
     ) -> Result<(Vec<Pixel>, Vec<Cut>), Error> {
         let Self { grid, rings, tolerance, .. } = *self;
@@ -191,8 +193,8 @@ impl Adaptive<'_> {
                     rings.is_some_and(|rings| rings.count(square) > 0)
                 };
                 if contrast.is_some() || error > tolerance || ring() {
-                    let light = ([bright, disc], contrast.is_some());
-                    cuts.push(Cut::whole(pixels.len(), [column, row], light, around));
+                    let (place, edge) = ([column, row], contrast.is_some());
+                    cuts.push(Cut::whole(pixels.len(), place, [bright, disc], edge, around));
                 }
                 pixels.push(Pixel { missed, ..of_one_ray(center, error) });
             }

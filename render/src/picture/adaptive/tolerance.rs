@@ -32,7 +32,7 @@ pub(in crate::picture) fn tolerance(
     };
     let uncut = Adaptive { prepared, grid: &coarse, rings: None, tolerance: f64::INFINITY };
     let lines = (0..coarse.height).into_par_iter().map_init(Workspace::default, |work, row| {
-        let (pixels, cuts) = uncut.first((row..row + 1, 0..coarse.width), work)?;
+        let (pixels, cuts) = uncut.first(row..row + 1, 0..coarse.width, work)?;
         let mut errors: Vec<(f64, f64)> = Vec::with_capacity(pixels.len());
         let k = cut as f64;
         errors.extend(pixels.iter().map(|pixel| (pixel.error / (k * k), k * k)));

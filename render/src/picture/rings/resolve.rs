@@ -110,7 +110,8 @@ impl Resolver {
         prepared: &PreparedScene,
         squares: &[Square],
         times: &[f64],
-        (seen, layers): (&mut [RayResult], &mut [Layers]),
+        seen: &mut [RayResult],
+        layers: &mut [Layers],
         work: &mut Workspace,
     ) -> Result<Vec<Counted>, Error> {
         let mut counted = vec![Counted::default(); seen.len()];

@@ -260,7 +260,8 @@ impl Meshes {
     pub fn add(
         &self,
         optics: &Optics,
-        (path, end): (&Path, f64),
+        path: &Path,
+        end: f64,
         scratch: &MeshScratch,
         light: &mut Accumulator,
     ) {

@@ -123,7 +123,7 @@ impl View {
         let mut all = Vec::new();
         for power in prior.powers.iter().map(|power| power * unit) {
             let Some(lower) = Lower::new(&covariance, power) else { continue };
-            let weighed = lower.weigh((&columns, field.total), &self.sets, &prior.means);
+            let weighed = lower.weigh(&columns, field.total, &self.sets, &prior.means);
             all.extend(weighed.into_iter().map(|(set, mean, ln)| {
                 let band = Band { power, mean, background: self.background, ..band };
                 (set, band, ln - 0.5 * self.whitening.ln_determinant)
@@ -169,7 +169,8 @@ impl Lower {
     /// more.
     fn weigh(
         &self,
-        (columns, total): (&DMatrix<f64>, [f64; 2]),
+        columns: &DMatrix<f64>,
+        total: [f64; 2],
         sets: &DMatrix<f64>,
         means: &[f64],
     ) -> Vec<(usize, f64, f64)> {

@@ -62,7 +62,7 @@ pub fn places(curve: &CurveRows, data: &[f64], bands: &[(Band, f64)]) -> Result<
         let field = curve.seen(&bands[0].0).ok_or_else(none)?;
         for bands in bands.chunk_by(|a, b| a.0.background == b.0.background) {
             let whitening = Whitening::new(curve, &bands[0].0.background, &used)?;
-            let seen = Used::new(&field, (&used, &values), &whitening);
+            let seen = Used::new(&field, &used, &values, &whitening);
             for bands in bands.chunk_by(|a, b| a.0.power == b.0.power) {
                 let lower = Lower::new(&seen.covariance, bands[0].0.power).ok_or_else(none)?;
                 let columns = lower.solved(&seen.columns);
@@ -84,7 +84,8 @@ struct Used {
 impl Used {
     fn new(
         seen: &BandCovariance,
-        (used, values): (&[usize], &DVector<f64>),
+        used: &[usize],
+        values: &DVector<f64>,
         whitening: &Whitening,
     ) -> Self {
         let moments = part(&seen.moments, used, &[0, 1, 2, 3]);

@@ -107,7 +107,8 @@ impl CurveRows {
         model: &ForwardModel<T>,
         axis: Axis,
         grid: PolarGrid,
-        (sampling, used): (Sampling, Vec<bool>),
+        sampling: Sampling,
+        used: Vec<bool>,
     ) -> Self {
         let (count, mut batch) = (model.pixels(), Batch::default());
         let scales = &sampling.scales;

@@ -84,7 +84,8 @@ impl Occupancy {
         &mut self,
         representation: &dyn Representation<T>,
         parameters: &[T],
-        (seed, times): (u64, &[f64]),
+        seed: u64,
+        times: &[f64],
         workspace: &mut Workspace,
     ) {
         let mut random = Pcg64::seed_from_u64(seed);
@@ -185,7 +186,7 @@ mod tests {
         let mut mask =
             Occupancy::new(OccupancySettings { cells: 10, threshold: 1e-4, memory: 0.9 }, region);
         assert!(mask.holds([-4.0, 4.0, 4.0]) && !mask.holds([5.1, 0.0, 0.0]));
-        mask.refresh(&grid, &parameters, (7, &[]), &mut Workspace::new());
+        mask.refresh(&grid, &parameters, 7, &[], &mut Workspace::new());
         // Two cells along each axis shine, four are kept.
         assert!((mask.fraction() - 0.064).abs() < 1e-12, "{}", mask.fraction());
         assert!(mask.holds([3.0, 0.0, -3.0]) && mask.holds([4.9, 1.9, -1.1]));

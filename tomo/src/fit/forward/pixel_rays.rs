@@ -56,13 +56,14 @@ impl PixelRays {
     /// place on the screen.
     pub fn new(
         ring: RingRays,
-        (hole, observer): (&Kerr, &Observer),
+        hole: &Kerr,
+        observer: &Observer,
         [x, y]: [&[f64]; 2],
         screen: impl Fn([f64; 2]) -> [f64; 2],
     ) -> Self {
         let width = distance(screen([0.0, 0.0]), screen([ring.spacing, 0.0]));
         let places: Vec<[f64; 2]> = x.iter().zip(y).map(|(x, y)| screen([*x, *y])).collect();
-        let near = near_the_ring((hole, observer), &places, HALF_DIAGONAL * width + BEYOND);
+        let near = near_the_ring(hole, observer, &places, HALF_DIAGONAL * width + BEYOND);
         let mut all = Self { places: Vec::new(), starts: vec![0] };
         for ((x, y), near) in x.iter().zip(y).zip(near) {
             if near {
@@ -78,7 +79,7 @@ impl PixelRays {
     }
 
     /// Puts a ray in the middle of each of n × n parts of the pixels (M wide) that have one ray.
-    pub fn divided(self, (spacing, n): (f64, usize)) -> Self {
+    pub fn divided(self, spacing: f64, n: usize) -> Self {
         let place = |k: usize| ((k as f64 + 0.5) / n as f64 - 0.5) * spacing;
         let mut all = Self { places: Vec::new(), starts: vec![0] };
         for range in self.starts.windows(2) {
@@ -107,7 +108,8 @@ impl PixelRays {
 
 /// Returns the places on the screen that are nearer to the critical curve than a limit, M.
 pub(in crate::fit) fn near_the_ring(
-    (hole, observer): (&Kerr, &Observer),
+    hole: &Kerr,
+    observer: &Observer,
     places: &[[f64; 2]],
     limit: f64,
 ) -> Vec<bool> {
@@ -142,7 +144,8 @@ mod tests {
         let (x, y) = ([5.3, 0.0, 8.0, -3.6], [0.0, 0.0, 0.0, 3.6]);
         PixelRays::new(
             RingRays { count, spacing: 0.5, shift: [0.0; 2] },
-            (&hole, &observer),
+            &hole,
+            &observer,
             [&x, &y],
             |place| place,
         )
@@ -161,7 +164,7 @@ mod tests {
 
     #[test]
     fn exact_divided_pixels_are_those_with_one_ray() {
-        let rays = rays(8).divided((0.5, 2));
+        let rays = rays(8).divided(0.5, 2);
         assert_eq!(rays.starts, [0, 8, 12, 16, 24]);
         assert_eq!(rays.places[8..12], [[-0.125; 2], [-0.125, 0.125], [0.125, -0.125], [0.125; 2]]);
     }

@@ -166,7 +166,8 @@ impl Sightlines {
     /// # Errors
     /// As those of [`trace`](Self::trace).
     pub(in crate::fit) fn of_pixels(
-        (hole, observer): (&Kerr, &Observer),
+        hole: &Kerr,
+        observer: &Observer,
         rays: &PixelRays,
         screen: impl Fn([f64; 2]) -> [f64; 2],
         request: &SightlineRequest,

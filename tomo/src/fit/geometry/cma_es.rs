@@ -71,7 +71,8 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     /// If a number is out of its range, or a χ² is not finite.
     pub fn explore(
         &self,
-        (start, volume): (Geometry, Option<&[f64]>),
+        start: Geometry,
+        volume: Option<&[f64]>,
         how: &Exploration,
         watch: &mut TrialWatch<'_>,
     ) -> Result<Option<Explored>, Error> {

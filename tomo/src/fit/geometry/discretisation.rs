@@ -75,7 +75,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     /// If a number is out of its range.
     pub fn gain(&self, at: &Estimate, other: &Self) -> Result<f64, Error> {
         let residuals = |problem: &Self| -> Result<Vec<f64>, Error> {
-            let images = problem.images(at.geometry, (&self.voxels(), &at.x))?;
+            let images = problem.images(at.geometry, &self.voxels(), &at.x)?;
             Ok(problem.residuals(&images))
         };
         let (mut along, mut square) = (0.0, 0.0);

@@ -201,7 +201,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
             let [back, on] = [part(-1.0), part(1.0)];
             let image = |part: f64| {
                 let geometry = self.moved(&at.geometry, (part * &step).as_slice());
-                self.images(geometry, (&self.voxels(), &at.x))
+                self.images(geometry, &self.voxels(), &at.x)
             };
             let (before, after) = (image(back)?, image(on)?);
             // Between bounds that touch it nothing changes.
@@ -215,11 +215,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     ///
     /// # Errors
     /// If a number is out of its range.
-    pub fn images(
-        &self,
-        geometry: Geometry,
-        (voxels, x): (&Voxels, &[f64]),
-    ) -> Result<Vec<T>, Error> {
+    pub fn images(&self, geometry: Geometry, voxels: &Voxels, x: &[f64]) -> Result<Vec<T>, Error> {
         let forward: ForwardModel<T> = self.model.forward(&geometry)?;
         let representation = voxels.field()?;
         let parameters: Vec<T> = x.iter().map(|x| T::of(*x)).collect();

@@ -104,8 +104,8 @@ impl GeometryModel {
             delay: self.slow_light,
             momentum: self.redshift.is_some() || self.polarization.is_some(),
         };
-        let (rays, turn) = (self.rays(geometry, (&hole, &observer)), turn(geometry));
-        let mut lines = Sightlines::of_pixels((&hole, &observer), &rays, turn, &request)?;
+        let (rays, turn) = (self.rays(geometry, &hole, &observer), turn(geometry));
+        let mut lines = Sightlines::of_pixels(&hole, &observer, &rays, turn, &request)?;
         lines.weight.iter_mut().for_each(|weight| *weight *= self.jy);
         Ok(lines)
     }
@@ -175,17 +175,17 @@ impl GeometryModel {
         let turn = turn(geometry);
         let pairs = self.x.iter().zip(&self.y);
         let places: Vec<[f64; 2]> = pairs.map(|(x, y)| turn([*x, *y])).collect();
-        Ok(near_the_ring((&hole, &observer), &places, limit))
+        Ok(near_the_ring(&hole, &observer, &places, limit))
     }
 
     /// The rays of all pixels of a geometry.
-    fn rays(&self, geometry: &Geometry, seen: (&Kerr, &Observer)) -> PixelRays {
+    fn rays(&self, geometry: &Geometry, hole: &Kerr, observer: &Observer) -> PixelRays {
         let rays = match self.ring {
-            Some(ring) => PixelRays::new(ring, seen, [&self.x, &self.y], turn(geometry)),
+            Some(ring) => PixelRays::new(ring, hole, observer, [&self.x, &self.y], turn(geometry)),
             None => PixelRays::single(&self.x, &self.y),
         };
         match self.parts {
-            Some(parts) => rays.divided(parts),
+            Some((spacing, n)) => rays.divided(spacing, n),
             None => rays,
         }
     }

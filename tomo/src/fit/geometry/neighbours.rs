@@ -36,7 +36,7 @@ impl Surroundings<'_> {
         let n = reach.columns.ncols();
         let places = [ends(n), diagonals(n)].concat();
         let mut there = Evaluations::default();
-        other.look_at(&start, &responses?, (&reach.columns, places), &mut there)?;
+        other.look_at(&start, &responses?, &reach.columns, places, &mut there)?;
         self.seen.push(there);
         Ok(())
     }
@@ -52,8 +52,8 @@ impl Surroundings<'_> {
         let form = fitted(seen, problem.free.len()).unwrap_or_else(|| reach.form());
         let trials = seen.iter().map(|seen| seen.values.len()).sum();
         let about = polished.best.geometry;
-        let (seen, scatter) = ((&form, &reach.columns), scatter.as_ref());
-        let found = problem.middle(about, seen, scatter, inflation, reach.is_wide);
+        let (columns, scatter) = (&reach.columns, scatter.as_ref());
+        let found = problem.middle(about, &form, columns, scatter, inflation, reach.is_wide);
         let ripple = form.ripple;
         found.map(|(geometry, covariance)| Envelope { geometry, covariance, ripple, trials })
     }
@@ -68,8 +68,8 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     pub fn around<'a>(&self, polished: &'a Polished) -> Result<Option<Surroundings<'a>>, Error> {
         let Some(reach) = self.reach(polished)? else { return Ok(None) };
         let mut seen = reach.seen();
-        let places = (&reach.columns, diagonals(self.free.len()));
-        self.look_at(&polished.best, &polished.responses, places, &mut seen)?;
+        let (best, responses) = (&polished.best, &polished.responses);
+        self.look_at(best, responses, &reach.columns, diagonals(self.free.len()), &mut seen)?;
         let scatter = match self.gaussian {
             None => Some(self.scatter_of_slopes(&polished.best, &reach.columns)?),
             Some(_) => None,

@@ -71,7 +71,8 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         &self,
         from: &Estimate,
         responses: &[Vec<f64>],
-        (columns, places): (&DMatrix<f64>, Vec<DVector<f64>>),
+        columns: &DMatrix<f64>,
+        places: Vec<DVector<f64>>,
         seen: &mut Evaluations,
     ) -> Result<(), Error> {
         for place in places {
@@ -88,7 +89,8 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     pub(super) fn middle(
         &self,
         about: Geometry,
-        (form, columns): (&Form, &DMatrix<f64>),
+        form: &Form,
+        columns: &DMatrix<f64>,
         scatter: Option<&DMatrix<f64>>,
         inflation: f64,
         is_wide: bool,

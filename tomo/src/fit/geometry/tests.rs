@@ -123,7 +123,7 @@ fn exact_pixels_of_the_ring_are_means_over_rays() {
             kerrlight_geodesic::Inclination::from_radians(0.9).unwrap(),
         ),
     );
-    let rays = PixelRays::new(ring, (&hole, &observer), [&model.x, &model.y], |place| place);
+    let rays = PixelRays::new(ring, &hole, &observer, [&model.x, &model.y], |place| place);
     assert_eq!(rays.starts, [0, 8, 16, 17]);
     let (x, y) = rays.places.iter().map(|[x, y]| (*x, *y)).unzip();
     let single = GeometryModel { x, y, ..model.clone() };
@@ -174,14 +174,14 @@ fn exact_residuals_point_to_the_model_that_made_the_data() {
     let volume: Vec<f64> = (0..12usize.pow(3)).map(|k| (0.37 * k as f64).sin().powi(2)).collect();
     let none: [Weighted<'_, f32>; 0] = [];
     let maker = GeometryProblem { effort, ..of_hot_spot(&means, &[], &none) };
-    let data = maker.images(geometry, (&maker.voxels(), &volume)).unwrap();
+    let data = maker.images(geometry, &maker.voxels(), &volume).unwrap();
     let sigma = 1e-2 * f64::from(data.iter().fold(0.0f32, |most, x| most.max(*x)));
     let term = ImageTerm::new(data, side * side, sigma).unwrap();
     let terms = [Weighted { weight: 4800.0, term: &term as &dyn FrameTerm<f32> }];
     let single = GeometryProblem { effort, ..of_hot_spot(&model, &[], &terms) };
     let right = GeometryProblem { effort, ..of_hot_spot(&means, &[], &terms) };
     let chi2 = |problem: &GeometryProblem<'_, f32>| {
-        let images = problem.images(geometry, (&problem.voxels(), &volume)).unwrap();
+        let images = problem.images(geometry, &problem.voxels(), &volume).unwrap();
         let of = |(frame, image): (usize, &[f32])| {
             let residuals = term.residuals(frame, image);
             residuals.iter().map(|r| r.value.powi(2)).sum::<f64>()
@@ -283,11 +283,11 @@ fn exact_geometry_of_a_hot_spot_is_found_from_everywhere() {
     let mut ends = Vec::new();
     for (k, start) in problem.starts(3).into_iter().enumerate() {
         let how = Exploration { width: 1.5, trials: 400, seed: k as u64 };
-        let found = problem.explore((start, None), &how, &mut |_, _| true).unwrap().unwrap();
+        let found = problem.explore(start, None, &how, &mut |_, _| true).unwrap().unwrap();
         let [_, inclination, angle] = apart(&found.best.geometry);
         assert!(inclination < 0.2 && angle < 0.2, "{k}: {:?}", found.best.geometry);
         if k == 0 {
-            let again = problem.explore((start, None), &how, &mut |_, _| true).unwrap().unwrap();
+            let again = problem.explore(start, None, &how, &mut |_, _| true).unwrap().unwrap();
             assert_eq!(found.best.geometry, again.best.geometry);
         }
         ends.push(found.best);
@@ -296,7 +296,8 @@ fn exact_geometry_of_a_hot_spot_is_found_from_everywhere() {
     let best = ends.iter().min_by(|a, b| a.value.total_cmp(&b.value)).unwrap();
     assert!(apart(&best.geometry).iter().all(|apart| *apart < 0.1), "{:?}", best.geometry);
     let none = problem.explore(
-        (truth, None),
+        truth,
+        None,
         &Exploration { width: 1.0, trials: 99, seed: 1 },
         &mut |_, _| false,
     );

@@ -23,9 +23,11 @@ impl AxisSlope {
     /// If the device has no room, or fails.
     pub fn new(
         device: &Compute,
-        (text, bindings): (&str, &[Buffer]),
+        text: &str,
+        bindings: &[Buffer],
         of_places: &Buffer,
-        (pairs, nodes): (usize, Option<usize>),
+        pairs: usize,
+        nodes: Option<usize>,
     ) -> Result<Self, GpuError> {
         let kernels = compiled(device, &[text, SHADER].join("\n"), &ENTRIES)?;
         let of_pairs = device.storage(16 * pairs as u64)?;

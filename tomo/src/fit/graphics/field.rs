@@ -32,24 +32,31 @@ impl Field {
     pub fn new(
         device: &Compute,
         representation: &dyn Representation<f32>,
-        (points, learning): (&Points, &Learning),
-        (most, of_places): (Option<usize>, bool),
+        points: &Points,
+        learning: &Learning,
+        most: Option<usize>,
+        of_places: bool,
     ) -> Result<Self, Error> {
-        let buffers = (&learning.parameters, &learning.gradient);
+        let Learning { parameters, gradient, .. } = learning;
         Ok(match representation.built_in() {
             Some(BuiltIn::Network(network)) => {
                 let shape = shape(network.settings());
-                Self::Network(Network::new(device, &shape, points, buffers, (most, of_places))?)
+                Self::Network(Network::new(
+                    device, &shape, points, parameters, gradient, most, of_places,
+                )?)
             }
             Some(BuiltIn::Grid(grid)) => {
                 let levels = voxels(grid.settings());
-                Self::Voxels(Voxels::new(device, &levels, points, buffers, of_places)?)
+                Self::Voxels(Voxels::new(device, &levels, points, parameters, gradient, of_places)?)
             }
             Some(BuiltIn::FeatureGrid(grid)) => {
                 let levels = levels(grid.settings());
                 let shape = behind(grid.settings(), &levels);
-                let network = Network::new(device, &shape, points, buffers, (most, of_places))?;
-                Self::Features(Features::new(device, &levels, network, points, buffers, of_places)?)
+                let network =
+                    Network::new(device, &shape, points, parameters, gradient, most, of_places)?;
+                Self::Features(Features::new(
+                    device, &levels, network, points, parameters, gradient, of_places,
+                )?)
             }
             None => {
                 return Err(DeviceError("representation.kind: no kernels".to_owned()).into());

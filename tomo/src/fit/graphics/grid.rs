@@ -157,7 +157,8 @@ impl Voxels {
         device: &Compute,
         levels: &Levels,
         points: &Points,
-        (parameters, gradient): (&Buffer, &Buffer),
+        parameters: &Buffer,
+        gradient: &Buffer,
         of_places: bool,
     ) -> Result<Self, GpuError> {
         let source = [ACTIVATIONS, SHADER].join("\n");
@@ -223,7 +224,8 @@ impl Features {
         levels: &Levels,
         network: Network,
         points: &Points,
-        (parameters, gradient): (&Buffer, &Buffer),
+        parameters: &Buffer,
+        gradient: &Buffer,
         of_places: bool,
     ) -> Result<Self, GpuError> {
         let source = [ACTIVATIONS, SHADER].join("\n");

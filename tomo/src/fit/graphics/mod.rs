@@ -108,7 +108,7 @@ impl GraphicsFit {
         // What is not carried does not fall.
         let fall = model.fall.as_ref().filter(|_| !events).map(FallTable::new);
         let axis = training.learns_axis(representation).then(|| model.is_shifted());
-        let room = pieces.room((model.points(), cells, STEPS), axis);
+        let room = pieces.room(model.points(), cells, STEPS, axis);
         let pixels = Pixels::new(&device, room, fall)?;
         let positive = field::is_positive(representation);
         let matrices = training.muon.map(|_| representation.matrices()).unwrap_or_default();
@@ -116,16 +116,16 @@ impl GraphicsFit {
         let learning = Learning::new(&device, count, positive, &matrices)?;
         let turning = training.muon.map(|muon| Turning::new(&device, muon, &matrices, &learning));
         let turning = turning.transpose()?.flatten();
-        let (buffers, how) = ((&pixels.points, &learning), (most, axis.is_some()));
-        let field = Field::new(&device, representation, buffers, how)?;
+        let points = &pixels.points;
+        let field = Field::new(&device, representation, points, &learning, most, axis.is_some())?;
         let mut lit = vec![false; model.pixels()];
         model.pixel().iter().for_each(|pixel| lit[*pixel as usize] = true);
         let dark = (0..lit.len()).filter(|pixel| !lit[*pixel]).collect();
         let only_images = objective.data.others.is_empty() && !model.is_flux;
-        let others = (!only_images).then_some((pieces.frames, STEPS));
-        let visibilities =
-            others.map(|size| Visibilities::new(&device, objective, &pixels, size)).transpose()?;
-        let visibilities = visibilities.flatten();
+        let visibilities = match only_images {
+            true => None,
+            false => Visibilities::new(&device, objective, &pixels, pieces.frames, STEPS)?,
+        };
         Ok(Self {
             device,
             pixels,

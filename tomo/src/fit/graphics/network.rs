@@ -88,8 +88,10 @@ impl Network {
         device: &Compute,
         shape: &Shape,
         points: &Points,
-        (parameters, gradient): (&Buffer, &Buffer),
-        (most, of_places): (Option<usize>, bool),
+        parameters: &Buffer,
+        gradient: &Buffer,
+        most: Option<usize>,
+        of_places: bool,
     ) -> Result<Self, GpuError> {
         let fits = device.largest_buffer() as usize / (4 * shape.columns()) / GRAIN * GRAIN;
         if fits == 0 {

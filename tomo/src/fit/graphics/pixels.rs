@@ -131,8 +131,8 @@ impl Pixels {
         let bends = device.storage(4 * room.points as u64)?;
         let of_places = device.storage(room.axis.map_or(0, |_| 16 * room.points as u64))?;
         let axis = room.axis.map(|is_shifted| {
-            let size = (room.pairs, is_shifted.then_some(room.nodes));
-            AxisSlope::new(device, (&source, &all), &of_places, size)
+            let nodes = is_shifted.then_some(room.nodes);
+            AxisSlope::new(device, &source, &all, &of_places, room.pairs, nodes)
         });
         let axis = axis.transpose()?;
         let [task, nodes, pairs, mask, _, _, places, _, values, fluxes, _, slopes, rest @ ..] = all;

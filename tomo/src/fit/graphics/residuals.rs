@@ -55,7 +55,7 @@ impl GraphicsFit {
             let pixel = model.pixel[ray as usize] as usize;
             image.as_ref().map_or(0.0, |image| image.term.pixel(frame as usize, pixel))
         };
-        let points = self.set(stretch, pairs, &datum, (slope, record))?;
+        let points = self.set(stretch, pairs, &datum, slope, record)?;
         device.run(|commands| {
             self.light(commands, pairs.len(), points, ends);
             if let Some(visibilities) = self.visibilities.as_ref().filter(|_| frames > 0) {
@@ -109,7 +109,7 @@ impl GraphicsFit {
         let mut loss = objective.empty_loss();
         for (some, ends) in pieces(frames, self.pieces.frames, learns) {
             let pairs = pairs_of(stretch, some);
-            let points = self.set(stretch, &pairs, &|_, _| 0.0, (0.0, record))?;
+            let points = self.set(stretch, &pairs, &|_, _| 0.0, 0.0, record)?;
             device.run(|commands| self.light(commands, pairs.len(), points, ends))?;
             let fluxes = pixels.fluxes(device, pairs.len())?;
             let slopes = objective.of_frames(some, frames.len(), &fluxes, &mut loss);
@@ -152,7 +152,8 @@ impl GraphicsFit {
         stretch: &Stretch<'_, f32>,
         pairs: &[(u32, u32)],
         datum: &dyn Fn(u32, u32) -> f32,
-        (slope, record): (f32, usize),
+        slope: f32,
+        record: usize,
     ) -> Result<usize, GpuError> {
         let model = &stretch.objective.model;
         let pair = |(ray, frame): &(u32, u32)| Pair {

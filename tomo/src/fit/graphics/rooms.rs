@@ -36,7 +36,7 @@ impl Pieces {
     }
 
     /// The room that they take.
-    pub fn room(&self, (nodes, cells, records): (usize, usize, usize), axis: Option<bool>) -> Room {
+    pub fn room(&self, nodes: usize, cells: usize, records: usize, axis: Option<bool>) -> Room {
         Room { nodes, pairs: self.pairs, points: self.points, cells, records, axis }
     }
 }

@@ -38,7 +38,8 @@ impl Visibilities {
         device: &Compute,
         objective: &Objective<f32>,
         pixels: &Pixels,
-        (frames, records): (usize, usize),
+        frames: usize,
+        records: usize,
     ) -> Result<Option<Self>, GpuError> {
         let Some(all) = Comparisons::new(objective) else { return Ok(None) };
         let ([seen, closures], rays) = (all.most(), objective.model.rays());

@@ -44,7 +44,7 @@ macro_rules! in_precision {
                 frames: &[usize],
                 masked: bool,
             ) -> Result<Frames<$number>, Error> {
-                Frames::made((frames.len(), self.objective.model.pixels()), |sink| {
+                Frames::made(frames.len(), self.objective.model.pixels(), |sink| {
                     frames.iter().try_for_each(|frame| sink(&self.predict(now, &[*frame], masked)))
                 })
                 .map_err(Error::Common)

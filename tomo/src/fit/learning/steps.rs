@@ -61,7 +61,7 @@ impl<T: Float> Trainer<'_, T> {
             let seed = mix(self.training.seed, now.step, 1);
             let (representation, parameters) = (self.representation, &now.parameters);
             let times = self.training.change.map_or(Vec::new(), |change| change.knots.times());
-            mask.refresh(representation, parameters, (seed, &times), self.buffers.workspace());
+            mask.refresh(representation, parameters, seed, &times, self.buffers.workspace());
         }
     }
 

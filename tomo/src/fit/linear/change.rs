@@ -101,7 +101,8 @@ impl Change {
     pub(in crate::fit) fn penalty(
         &self,
         x: &[f64],
-        (cell, upper): (f64, f64),
+        cell: f64,
+        upper: f64,
         prices: &[f64],
         gradient: &mut [f64],
     ) -> f64 {
@@ -166,12 +167,12 @@ mod tests {
         for allowed in [Allowed::Births, Allowed::Any] {
             let change = change(allowed);
             let mut slopes = [0.0; 6];
-            change.penalty(&x, (0.1, 1.0), &[], &mut slopes);
+            change.penalty(&x, 0.1, 1.0, &[], &mut slopes);
             for k in 0..6 {
                 let at = |step: f64| {
                     let mut x = x;
                     x[k] += step;
-                    change.penalty(&x, (0.1, 1.0), &[], &mut [0.0; 6])
+                    change.penalty(&x, 0.1, 1.0, &[], &mut [0.0; 6])
                 };
                 let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
                 assert!((difference - slopes[k]).abs() < 1e-8, "{allowed:?} {k}");
@@ -193,7 +194,7 @@ mod tests {
         assert!((prices[0] - 0.5 / (0.5 + 4.0 / 64.0)).abs() < 1e-15);
         assert!(prices[27..].iter().all(|price| *price == 1.0));
         let mut slopes = vec![0.0; 81];
-        let value = change.penalty(&x, (2.0, 1.0), &prices, &mut slopes);
+        let value = change.penalty(&x, 2.0, 1.0, &prices, &mut slopes);
         assert!((value - 0.7 * 2.0 * 4.0 * 0.5).abs() < 1e-14);
         assert!(slopes[..27].iter().all(|slope| *slope == 0.0) && (slopes[40] - 0.7).abs() < 1e-14);
         assert!(Change { sharpen: None, ..change }.prices(&x, shape).is_empty());
@@ -203,10 +204,10 @@ mod tests {
     #[test]
     fn exact_penalties_are_total_variations_in_time() {
         let field = [1.0, 1.0, 2.0];
-        let found = change(Allowed::Any).penalty(&field, (3.0, 1e-9), &[], &mut [0.0; 3]);
+        let found = change(Allowed::Any).penalty(&field, 3.0, 1e-9, &[], &mut [0.0; 3]);
         assert!((found - 0.7 * 3.0).abs() < 1e-9);
         let births =
-            change(Allowed::Births).penalty(&[1.0, 0.0, 1.0], (3.0, 1.0), &[], &mut [0.0; 3]);
+            change(Allowed::Births).penalty(&[1.0, 0.0, 1.0], 3.0, 1.0, &[], &mut [0.0; 3]);
         assert!((births - 0.7 * 3.0).abs() < 1e-12);
     }
 }

@@ -72,7 +72,7 @@ impl Penalised<'_> {
         let fields = self.shape.count() * self.change.knots.count;
         let (x, slopes) = (&x[..fields], &mut slopes[..fields]);
         let mut value =
-            of_image + self.change.penalty(x, (self.shape.cell(), self.upper), self.prices, slopes);
+            of_image + self.change.penalty(x, self.shape.cell(), self.upper, self.prices, slopes);
         if let Some((gaussian, share)) = self.gaussian {
             value += gaussian.value_and_gradient(x, share, slopes);
         }

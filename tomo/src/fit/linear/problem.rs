@@ -53,7 +53,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
     }
 
     pub(super) fn walk(&self) -> Walk<'_, T> {
-        Walk::new(self.model, self.axis, (self.voxels, self.change.knots))
+        Walk::new(self.model, self.axis, self.voxels, self.change.knots)
     }
 
     /// All nodes at all knots where emission may be.

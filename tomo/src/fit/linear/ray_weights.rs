@@ -156,7 +156,7 @@ const BLOCK: usize = 4096;
 
 impl<'a, T: Float> Walk<'a, T> {
     /// Takes rays with the weights that they have for the axis.
-    pub fn new(model: &'a ForwardModel<T>, axis: Axis, (voxels, knots): (Voxels, Knots)) -> Self {
+    pub fn new(model: &'a ForwardModel<T>, axis: Axis, voxels: Voxels, knots: Knots) -> Self {
         let delays = &model.delay;
         let bound = |of: fn(T, T) -> T| delays.iter().copied().reduce(of).unwrap_or(T::zero());
         let delays = [bound(T::min), bound(T::max)];
@@ -296,7 +296,7 @@ impl<'a, T: Float> Walk<'a, T> {
 
     /// The share of a knot in a node's emission in a frame.
     #[inline(always)]
-    fn share(&self, node: usize, (frame, knot): (usize, usize)) -> T {
+    fn share(&self, node: usize, frame: usize, knot: usize) -> T {
         match self.knots.count {
             1 => T::one(),
             _ => self.knots.share(knot, self.time(node, frame)).0,
@@ -324,7 +324,7 @@ impl<'a, T: Float> Walk<'a, T> {
             };
             let is_wanted = wanted.is_none_or(|mask| mask[corner]);
             if is_wanted && self.shines(node, frame) {
-                let share = self.share(node, (frame, knot));
+                let share = self.share(node, frame, knot);
                 let weight = share * self.model.weight[node];
                 if share > T::zero() {
                     let corner = nodes_before + corner as u32;

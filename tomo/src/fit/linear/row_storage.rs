@@ -83,7 +83,7 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         let mut place = vec![NONE; self.active.count()];
         let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
         self.walk.frame(frame, wanted, &mut Buffers::default(), |pixel, places| {
-            rows.push(pixel, places, &self.active, (&self.corners, degree), &mut place);
+            rows.push(pixel, places, &self.active, &self.corners, degree, &mut place);
         });
         rows.columns.shrink_to_fit();
         rows.entries.shrink_to_fit();
@@ -100,7 +100,7 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
         self.walk.frame(frame, wanted, buffers, |pixel, places| {
             row.clear();
-            row.push(pixel, places, &self.active, (&self.corners, degree), &mut place);
+            row.push(pixel, places, &self.active, &self.corners, degree, &mut place);
             take(&row);
         });
     }

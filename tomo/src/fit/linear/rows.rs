@@ -36,7 +36,8 @@ impl<T: Float> Rows<T> {
         pixel: u32,
         places: &[Place<T>],
         active: &Active,
-        (corners, degree): (&[usize], Degree),
+        corners: &[usize],
+        degree: Degree,
         place: &mut [u32],
     ) {
         let start = self.columns.len();

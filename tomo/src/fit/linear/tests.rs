@@ -117,7 +117,7 @@ fn operator<'a>(
     budget: usize,
 ) -> Operator<'a, f64> {
     let active = Active::new(is_active, &voxels.corners(), 0);
-    Operator::new(Walk::new(model, axis(), (voxels, Knots::STEADY)), active, &FRAMES, budget)
+    Operator::new(Walk::new(model, axis(), voxels, Knots::STEADY), active, &FRAMES, budget)
 }
 
 /// ‖A x‖² and Aᵀ of twice the images, where the data are dark and all nodes or some count.

@@ -270,7 +270,8 @@ pub fn refine_axis(
     problem: &AxisProblem<'_, f32>,
     from: Axis,
     step: f64,
-    (effort, halvings): (Effort, usize),
+    effort: Effort,
+    halvings: usize,
     watch: &ScanWatch<'_>,
 ) -> Result<Option<AxisLoss>, Error> {
     let settings = AxisSettings { fine: effort, halvings, ..AxisSettings::default() }.checked()?;

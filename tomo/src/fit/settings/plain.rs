@@ -103,12 +103,7 @@ impl FitFile {
     /// The same, compared with the images that `truth` gives at times from `from` to `to` (M), whose pixels have errors
     /// of `sigma` (Jy).
     #[must_use]
-    pub fn simulating(
-        self,
-        truth: Truth,
-        (frames, from, to): (usize, f64, f64),
-        sigma: f64,
-    ) -> Self {
+    pub fn simulating(self, truth: Truth, frames: usize, from: f64, to: f64, sigma: f64) -> Self {
         let loss = vec![Loss { sigma: Some(sigma), ..Loss::new(LossKind::Image) }];
         let simulation = Some(Simulation::movie(truth, Movie { frames, from, to }));
         Self { simulation, data: None, loss, ..self }

@@ -75,24 +75,24 @@ pub fn scan_band(
     watch: &BandWatch<'_>,
 ) -> Result<Option<BandScan>> {
     let curve = check_band(file, measured, settings)?;
-    let geometries = geometries(settings);
+    let flows = flows(settings);
     let done = std::sync::atomic::AtomicUsize::new(0);
-    let one = |geometry: &(f64, f64)| -> Result<Option<Vec<BandGeometry>>> {
+    let one = |flow: &Flow| -> Result<Option<Vec<BandGeometry>>> {
         let count = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         if !watch(count) {
             return Ok(None);
         }
-        let key = journal::key(("band", geometry.0.to_bits(), geometry.1.to_bits()));
+        let Flow { inclination_deg, rotation_factor } = *flow;
+        let key = journal::key(("band", inclination_deg.to_bits(), rotation_factor.to_bits()));
         let kept = journal.recall(key).and_then(|numbers| BandGeometry::of_numbers(&numbers));
         if kept.is_some() {
             return Ok(kept);
         }
-        let found = weighed(file, measured, settings, curve, *geometry)?;
+        let found = weighed(file, measured, settings, curve, *flow)?;
         journal.keep(key, &BandGeometry::numbers(&found));
         Ok(Some(found))
     };
-    let all: Vec<Option<Vec<BandGeometry>>> =
-        geometries.par_iter().map(one).collect::<Result<_>>()?;
+    let all: Vec<Option<Vec<BandGeometry>>> = flows.par_iter().map(one).collect::<Result<_>>()?;
     let Some(all) = all.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
     let geometries: Vec<BandGeometry> = all.into_iter().flatten().collect();
     let better =
@@ -178,8 +178,9 @@ fn placed(
 
 impl BandGeometry {
     /// Inclination and angular velocity.
-    fn flow(&self) -> (f64, f64) {
-        (self.inclination_deg, self.rotation_factor)
+    fn flow(&self) -> Flow {
+        let Self { inclination_deg, rotation_factor, .. } = *self;
+        Flow { inclination_deg, rotation_factor }
     }
 }
 
@@ -254,9 +255,20 @@ fn prior(settings: &BandSettings) -> BandPrior {
     BandPrior { backgrounds: backgrounds(settings), ..usual }
 }
 
-fn geometries(settings: &BandSettings) -> Vec<(f64, f64)> {
+/// A flow as it is seen.
+#[derive(Clone, Copy)]
+struct Flow {
+    inclination_deg: f64,
+    /// Velocity of the matter over that of the law of motion.
+    rotation_factor: f64,
+}
+
+fn flows(settings: &BandSettings) -> Vec<Flow> {
     let inclinations = settings.inclinations_deg.values();
-    let of = |factor: &f64| inclinations.iter().map(|i| (*i, *factor)).collect::<Vec<_>>();
+    let of = |factor: &f64| -> Vec<Flow> {
+        let of = |i: &f64| Flow { inclination_deg: *i, rotation_factor: *factor };
+        inclinations.iter().map(of).collect()
+    };
     settings.rotation_factors.iter().flat_map(of).collect()
 }
 
@@ -266,13 +278,13 @@ fn weighed(
     measured: &FitData,
     settings: &BandSettings,
     curve: &Curve,
-    geometry: (f64, f64),
+    flow: Flow,
 ) -> Result<Vec<BandGeometry>> {
-    let rows = rows(file, measured, settings, curve, geometry)?;
+    let rows = rows(file, measured, settings, curve, flow)?;
     let data: Vec<Vec<f64>> =
         settings.position_angles_deg.iter().map(|angle| turned(curve, *angle)).collect();
     let weighed = evidence(&rows, &data, &prior(settings))?;
-    let (inclination_deg, rotation_factor) = geometry;
+    let Flow { inclination_deg, rotation_factor } = flow;
     let one = |(angle, weighed): (&f64, Weighed)| BandGeometry {
         inclination_deg,
         rotation_factor,
@@ -312,11 +324,12 @@ fn rows(
     measured: &FitData,
     settings: &BandSettings,
     curve: &Curve,
-    (inclination_deg, factor): (f64, f64),
+    flow: Flow,
 ) -> Result<CurveRows> {
-    let file = in_band_geometry(file, inclination_deg);
+    let file = in_band_geometry(file, flow.inclination_deg);
     let instrument = Instrument::new(&file)?;
-    let mut model = forward_model(&instrument, &band_motion(&file, measured, factor)?)?;
+    let mut model =
+        forward_model(&instrument, &band_motion(&file, measured, flow.rotation_factor)?)?;
     let axis = axis(&file)?.0;
     model.weigh(axis);
     let scale = |datum: &Option<[f64; 2]>| datum.map_or(0.0, |[_, sigma]| 1.0 / sigma);
@@ -326,7 +339,7 @@ fn rows(
     let count = curve.parameters.len();
     let used = |k: usize| curve.fitted[k / count] || curve.data[k].is_none();
     let used = (0..curve.data.len()).map(used).collect();
-    Ok(CurveRows::of(&model, axis, grid(&file, settings), (sampling, used)))
+    Ok(CurveRows::of(&model, axis, grid(&file, settings), sampling, used))
 }
 
 /// Three times as many nodes round the axis as away from it, and layers twice as far apart.

@@ -70,7 +70,7 @@ impl FitData {
             };
             let model: Vec<Complex64> = scan.iter().map(|(.., v)| *v).collect();
             let (gains, errors) = term.gains(&model);
-            add(&mut table, (term.stations(), gains, errors), &part);
+            add(&mut table, term.stations(), gains, errors, &part);
         }
         Ok(Some(table))
     }
@@ -83,8 +83,10 @@ impl FitData {
     pub fn polarized_gains(&self, movie: &[f32]) -> Result<Option<GainTable>> {
         let mut table = GainTable::default();
         for scan in self.beside(movie)? {
-            let Some(found) = scan.term.gains(&scan.model) else { return Ok(None) };
-            add(&mut table, found, &self.part(scan.frame)?.0);
+            let Some((stations, gains, errors)) = scan.term.gains(&scan.model) else {
+                return Ok(None);
+            };
+            add(&mut table, stations, gains, errors, &self.part(scan.frame)?.0);
         }
         Ok(Some(table))
     }
@@ -93,7 +95,9 @@ impl FitData {
 /// The gains of the stations of a scan, with their errors.
 fn add(
     table: &mut GainTable,
-    (stations, gains, errors): (&[u16], ScanGains, ScanGains),
+    stations: &[u16],
+    gains: ScanGains,
+    errors: ScanGains,
     part: &Observation,
 ) {
     let span_s = part.rows.iter().fold(0.0f64, |most, row| most.max(row.integration_s));

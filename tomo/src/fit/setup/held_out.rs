@@ -53,7 +53,8 @@ pub fn hold_out(
     file: &FitFile,
     held_out: &HeldOutSettings,
     objective: &mut Objective<f32>,
-    (axis, times): (Axis, [f64; 2]),
+    axis: Axis,
+    times: [f64; 2],
     journal: &dyn Journal,
     watch: &mut HeldWatch<'_>,
 ) -> Result<Option<Vec<Held>>> {
@@ -77,8 +78,8 @@ pub fn hold_out(
                 true => ControlFlow::Continue(()),
                 false => ControlFlow::Break(()),
             };
-            let how = (axis, change(&file, times)?);
-            let of = Of { file: &file, objective, how, nodes: file.voxel_nodes(), seed: None };
+            let (change, nodes) = (change(&file, times)?, file.voxel_nodes());
+            let of = Of { file: &file, objective, axis, change, nodes, seed: None };
             let Some(loss) = loss(&of, &parts, &mut told)? else { return Ok(None) };
             journal.keep(key, &[loss]);
             held.losses.push(loss);

@@ -45,7 +45,8 @@ impl FitData {
     /// If it has other pixels than the settings, or its times are not those of images.
     pub fn of_movie(
         file: &FitFile,
-        (movie, [width, height]): (Frames<f64>, [usize; 2]),
+        movie: Frames<f64>,
+        [width, height]: [usize; 2],
         name: &str,
     ) -> Result<Self> {
         let (times, n) = (times_of_images(file, movie.count())?, file.screen.pixels);

@@ -95,13 +95,13 @@ impl Instrument {
         let turned = upright(file);
         let rays = match ring(file)? {
             None => PixelRays::single(&alpha, &beta),
-            Some(ring) => PixelRays::new(ring, (&hole, &observer), [&alpha, &beta], &turned),
+            Some(ring) => PixelRays::new(ring, &hole, &observer, [&alpha, &beta], &turned),
         };
         let rays = match samples(file)? {
             1 => rays,
-            side => rays.divided((spacing(&file.screen)?, side)),
+            side => rays.divided(spacing(&file.screen)?, side),
         };
-        let mut lines = Sightlines::of_pixels((&hole, &observer), &rays, &turned, &request)
+        let mut lines = Sightlines::of_pixels(&hole, &observer, &rays, &turned, &request)
             .within("region and screen")?;
         if lines.rays() == 0 {
             refuse!(

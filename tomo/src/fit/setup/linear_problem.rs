@@ -32,43 +32,41 @@ pub(super) fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
     image.chain(others).map(|(weight, term)| Weighted { weight, term }).collect()
 }
 
-/// The grid of `nodes` along each axis that fits every `stride`-th frame best.
+/// Voxels and frames of a linear problem.
+#[derive(Clone, Copy, Debug)]
+pub struct CoarseGrid {
+    /// Nodes along each axis.
+    pub nodes: usize,
+    /// Every so many frames are fitted.
+    pub stride: usize,
+    /// Seed of a field that the prior of the voxels gives in place of its mean, if any: with data that have noise once more,
+    /// the solution is a draw of the posterior (randomise, then optimise: Bardsley et al. 2014).
+    pub seed: Option<u64>,
+}
+
+/// The grid that fits its frames best.
 ///
 /// # Errors
 /// If a setting is missing or out of range, or the problem has no solution.
 pub fn solve_linear(
     file: &FitFile,
     objective: &mut Objective<f32>,
-    (axis, change): (Axis, Change),
-    (nodes, stride): (usize, usize),
+    axis: Axis,
+    change: Change,
+    CoarseGrid { nodes, stride, seed }: CoarseGrid,
     watch: &mut Watch<'_>,
 ) -> Result<LinearSolution<f32>> {
-    draw_linear(file, objective, (axis, change), (nodes, stride, None), watch)
-}
-
-/// The same about a field that the prior of the voxels gives with a seed, in place of its mean: with data that have noise
-/// once more, a draw of the posterior (randomise, then optimise: Bardsley et al. 2014). Without a seed or a prior that is
-/// [`solve_linear`].
-///
-/// # Errors
-/// As [`solve_linear`].
-pub fn draw_linear(
-    file: &FitFile,
-    objective: &mut Objective<f32>,
-    how: (Axis, Change),
-    (nodes, stride, seed): (usize, usize, Option<u64>),
-    watch: &mut Watch<'_>,
-) -> Result<LinearSolution<f32>> {
-    objective.model.weigh(how.0);
+    objective.model.weigh(axis);
     let frames: Vec<usize> = objective.observed().into_iter().step_by(stride.max(1)).collect();
-    solve_frames(&Of { file, objective, how, nodes, seed }, &frames, watch)
+    solve_frames(&Of { file, objective, axis, change, nodes, seed }, &frames, watch)
 }
 
 /// Parts of the linear problem of a fit; its model is weighed for the axis.
 pub(super) struct Of<'a> {
     pub file: &'a FitFile,
     pub objective: &'a Objective<f32>,
-    pub how: (Axis, Change),
+    pub axis: Axis,
+    pub change: Change,
     /// Nodes along each axis.
     pub nodes: usize,
     /// Seed of the field that the prior's density is about; about its mean, without one.
@@ -107,7 +105,7 @@ impl Of<'_> {
         frames: &[usize],
         solve: impl FnOnce(&LinearProblem<'_, f32>) -> Result<R>,
     ) -> Result<R> {
-        let Of { file, objective, how: (axis, change), nodes, .. } = *self;
+        let Of { file, objective, axis, change, nodes, .. } = *self;
         let settings = linear(file)?;
         let priors = priors(settings);
         let voxels = Voxels::cube(nodes, file.region.r_max, settings.degree);
@@ -148,7 +146,7 @@ fn iterations(file: &FitFile, settings: &Linear) -> usize {
 /// iterations must gain.
 fn enough(of: &Of<'_>, settings: &Linear) -> (f64, f64) {
     let (file, usual) = (of.file, LinearSettings::default());
-    let is_steady = !of.how.1.is_any();
+    let is_steady = !of.change.is_any();
     match settings.prior {
         // A draw of a posterior is to be as exact as the minimum.
         Some(_) => (SURE, 0.0),
@@ -167,7 +165,7 @@ pub(super) fn solve_frames(
     frames: &[usize],
     watch: &mut Watch<'_>,
 ) -> Result<LinearSolution<f32>> {
-    let Of { how: (_, change), nodes, .. } = *of;
+    let Of { change, nodes, .. } = *of;
     let settings = linear(of.file)?;
     let usual = LinearSettings::default();
     let coarse = usual.coarse.filter(|_| nodes >= FINE).map(|coarse| Coarse {

@@ -68,7 +68,8 @@ pub(super) struct Spoiled {
 
 /// Leakage, errors of gains, thermal noise and systematic errors, in the order of light's way.
 pub(super) fn spoil(
-    (file, fit): (&FitFile, &FitFile),
+    file: &FitFile,
+    fit: &FitFile,
     seen: &Observable,
     observation: &mut Observation,
 ) -> Result<Spoiled> {

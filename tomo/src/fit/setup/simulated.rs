@@ -28,11 +28,11 @@ impl FitData {
     ) -> Result<Self> {
         let simulated = file.simulated()?;
         if simulated == *file {
-            return simulate(file, file, instrument, (array, None));
+            return simulate(file, file, instrument, array, None);
         }
         let seen = if is_drawn(file) { densely(&simulated) } else { simulated.clone() };
         let instrument = Instrument::new(&seen).within("simulation")?;
-        simulate(&simulated, file, &instrument, (array, None))
+        simulate(&simulated, file, &instrument, array, None)
     }
 
     /// The same, where a geometry that is drawn is one of matter on circular geodesics by another forward model than that of the
@@ -51,7 +51,7 @@ impl FitData {
         }
         let drawn = file.simulated()?;
         let geometry = known_geometry(&drawn);
-        simulate(&drawn, file, instrument, (array, Some((other, geometry))))
+        simulate(&drawn, file, instrument, array, Some((other, geometry)))
     }
 }
 
@@ -59,7 +59,8 @@ fn simulate(
     file: &FitFile,
     fit: &FitFile,
     instrument: &Instrument,
-    (array, other): (Option<&Array>, Option<(OtherModel<'_>, Geometry)>),
+    array: Option<&Array>,
+    other: Option<(OtherModel<'_>, Geometry)>,
 ) -> Result<FitData> {
     if let Some(settings) = file.simulated_curve() {
         return light_curve::simulate(file, fit, instrument, settings);
@@ -99,7 +100,7 @@ fn simulate(
         }
     };
     let Spoiled { gains: true_gains, leakage: true_leakage } =
-        spoil((file, fit), seen, &mut observation)?;
+        spoil(file, fit, seen, &mut observation)?;
     let gains = gains::priors(fit.instrument.as_ref(), &fit.loss, &observation)?;
     let leakage = leakage::unknown(fit.instrument.as_ref(), &observation)?;
     let frame = |time: f64| hours.partition_point(|hour| *hour < time - 1e-9).min(hours.len() - 1);

@@ -155,7 +155,7 @@ impl Truth {
     ) -> Result<Frames<f64>> {
         let mut model = instrument.pictured::<f64>(&motion(file, times.to_vec())?)?;
         model.weigh(self.axis);
-        Frames::made((model.frames(), model.pixels()), |sink| {
+        Frames::made(model.frames(), model.pixels(), |sink| {
             if self.rings.is_empty() {
                 return self.images(&model, sink);
             }

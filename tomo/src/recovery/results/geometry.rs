@@ -204,7 +204,7 @@ fn trials(
         above_best: trial.value - least,
         trials: trial.trials,
         converged: has_converged(free, trial, sigma),
-        same: is_same(free, trial, (trials, sigma)),
+        same: is_same(free, trial, trials, sigma),
     };
     trials.iter().map(one).collect()
 }
@@ -263,7 +263,8 @@ fn has_converged(free: &[Free], trial: &Trial, sigma: &dyn Fn(usize) -> Option<f
 fn is_same(
     free: &[Free],
     trial: &Trial,
-    (trials, sigma): (&[Trial], &dyn Fn(usize) -> Option<f64>),
+    trials: &[Trial],
+    sigma: &dyn Fn(usize) -> Option<f64>,
 ) -> bool {
     let best = trials.iter().min_by(|a, b| a.value.total_cmp(&b.value));
     best.is_some_and(|best| {
@@ -299,9 +300,9 @@ mod tests {
             [(0.51, 5.0, true), (0.53, 5.0, false), (0.53, 1.0, true), (0.51, 50.0, false)]
         {
             let trials = [trial(0.5, 100.0), trial(spin, 100.0 + above)];
-            let same = is_same(&free, &trials[1], (&trials, &|_| Some(0.01)));
+            let same = is_same(&free, &trials[1], &trials, &|_| Some(0.01));
             assert_eq!(same, expected, "{spin} {above}");
-            assert!(is_same(&free, &trials[0], (&trials, &|_| None)));
+            assert!(is_same(&free, &trials[0], &trials, &|_| None));
         }
         for (further, expected) in [(0.505, true), (0.52, false)] {
             let further = Some(Geometry::new(further, 1.0));

@@ -166,7 +166,8 @@ fn row<T: Float, V: Lanes<T>>(
 /// Features of lanes of points, and whether they are inside.
 #[inline(always)]
 fn features<T: Float, V: Lanes<T>>(
-    (layout, geometries): (&Layout, &[Geometry<T>]),
+    layout: &Layout,
+    geometries: &[Geometry<T>],
     parameters: &[T],
     at: &Coordinates<'_, T>,
     from: usize,
@@ -202,10 +203,11 @@ impl<T: Float> Task<T> for Forward<'_, T> {
     #[inline(always)]
     fn run<V: Lanes<T>>(mut self) {
         let network = Network::of(self.layout, self.parameters);
-        let (grids, count) = ((self.layout, self.geometries), self.layout.inputs());
+        let (layout, geometries, parameters) = (self.layout, self.geometries, self.parameters);
+        let count = layout.inputs();
         for (k, values) in self.values.chunks_mut(V::LANES).enumerate() {
             let from = k * V::LANES;
-            let (inputs, inside) = features::<T, V>(grids, self.parameters, &self.at, from);
+            let (inputs, inside) = features::<T, V>(layout, geometries, parameters, &self.at, from);
             let inputs = &inputs[..count];
             let units = network.forward(inputs);
             let (value, slope) = self.activation.apply::<T, V>(units.output);
@@ -244,7 +246,8 @@ impl<T: Float> Task<T> for Backward<'_, T> {
     #[inline(always)]
     fn run<V: Lanes<T>>(mut self) {
         let network = Network::of(self.layout, self.parameters);
-        let (grids, count) = ((self.layout, self.geometries), self.layout.inputs());
+        let (layout, geometries, parameters) = (self.layout, self.geometries, self.parameters);
+        let count = layout.inputs();
         let zero = V::splat(T::zero());
         let mut sums = Sums::new(zero);
         for (k, out) in self.slopes.chunks_mut(V::LANES * count).enumerate() {
@@ -267,7 +270,8 @@ impl<T: Float> Task<T> for Backward<'_, T> {
                 out.zip(&lanes).for_each(|(out, lane)| *out = *lane);
             }
             if let Some(pulls) = &mut self.pulls {
-                pull::<T, V>(grids, self.parameters, &self.at, from, &slopes, &mut pulls[from..]);
+                let pulls = &mut pulls[from..];
+                pull::<T, V>(layout, geometries, parameters, &self.at, from, &slopes, pulls);
             }
         }
         sums.store(count, self.network);
@@ -277,7 +281,8 @@ impl<T: Float> Task<T> for Backward<'_, T> {
 /// dL/dx of lanes of points.
 #[inline(always)]
 fn pull<T: Float, V: Lanes<T>>(
-    (layout, geometries): (&Layout, &[Geometry<T>]),
+    layout: &Layout,
+    geometries: &[Geometry<T>],
     parameters: &[T],
     at: &Coordinates<'_, T>,
     from: usize,

@@ -27,8 +27,11 @@ pub struct MatrixMut<'a, T> {
 unsafe fn block<T: Float, V: Lanes<T>, const ROWS: usize>(
     start: [V; 2],
     count: usize,
-    (a, rows, columns): (*const T, usize, usize),
-    (b, step): (*const T, usize),
+    a: *const T,
+    rows: usize,
+    columns: usize,
+    b: *const T,
+    step: usize,
 ) -> [[V; 2]; ROWS] {
     let mut sums = [start; ROWS];
     let mut at = (a, b);
@@ -92,8 +95,11 @@ impl<T: Float> Forward<'_, T> {
                     let sums = block::<T, V, ROWS>(
                         start,
                         self.inputs,
-                        (input, self.input.stride, 1),
-                        (from, width),
+                        input,
+                        self.input.stride,
+                        1,
+                        from,
+                        width,
                     );
                     for (m, sum) in sums.into_iter().enumerate() {
                         let at = (row + m) * self.output.stride + p * width;
@@ -154,8 +160,11 @@ impl<T: Float> Backward<'_, T> {
                     let sums = block::<T, V, ROWS>(
                         [zero; 2],
                         self.units,
-                        (input, self.cotangent.stride, 1),
-                        (from, width),
+                        input,
+                        self.cotangent.stride,
+                        1,
+                        from,
+                        width,
                     );
                     for (m, sum) in sums.into_iter().enumerate() {
                         let at = (row + m) * self.output.stride + p * width;
@@ -227,8 +236,11 @@ impl<T: Float> Weights<'_, T> {
                     block::<T, V, ROWS>(
                         [V::splat(T::zero()); 2],
                         self.points,
-                        (self.input.numbers.as_ptr().add(row), 1, self.input.stride),
-                        (self.cotangent.numbers.as_ptr().add(p * width), self.cotangent.stride),
+                        self.input.numbers.as_ptr().add(row),
+                        1,
+                        self.input.stride,
+                        self.cotangent.numbers.as_ptr().add(p * width),
+                        self.cotangent.stride,
                     )
                 };
                 for (m, sum) in sums.into_iter().enumerate().take(rows - row) {

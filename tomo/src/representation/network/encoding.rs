@@ -54,7 +54,8 @@ fn put<T: Float, V: Lanes<T>>(x: V, rows: &mut [T], stride: usize, column: usize
 pub fn encode_vjp<T: Float>(
     rows: Matrix<'_, T>,
     cotangents: Matrix<'_, T>,
-    (scales, part): (&[T], T),
+    scales: &[T],
+    part: T,
     degree: usize,
     gradient: &mut CoordinatesMut<'_, T>,
 ) {

@@ -161,8 +161,8 @@ impl<T: Float + Default> Tile<T> {
         if let Some(mut gradient) = coordinates {
             let rows = matrix(&self.passed.rows[0], layout.rows[0]);
             let cotangents = matrix(&self.encoded, layout.rows[0]);
-            let scales = (&packed.scales()[..gradient.dimension()], packed.part());
-            encode_vjp(rows, cotangents, scales, network.settings.degree, &mut gradient);
+            let (scales, part) = (&packed.scales()[..gradient.dimension()], packed.part());
+            encode_vjp(rows, cotangents, scales, part, network.settings.degree, &mut gradient);
         }
     }
 

@@ -87,7 +87,7 @@ impl Media {
                 cells.find(seen.ray.last_time(), intervals, panels);
                 last = cells.light(scratch);
             }
-            self.keep((m, seen.number, j), last, scratch);
+            self.keep(m, seen.number, j, last, scratch);
         }
     }
 }

@@ -25,7 +25,8 @@ impl DepthProfile {
         spin: f64,
         nodes: &RayNodes<'_>,
         emission: &Emission,
-        (depths, total): (&[f64], f64),
+        depths: &[f64],
+        total: f64,
     ) {
         self.total = total;
         let count = depths.len();

@@ -155,9 +155,14 @@ impl Media {
             let length = length * scene.hole.seconds().unwrap_or(f64::NAN); // gas needs it
             all.push(Arc::new(GasModel::new(gas, hole, length, effects)));
         }
-        let effects = (spectral_index, scene.effects.slow_light);
         for (source, file) in scene.volume.iter().zip(files) {
-            all.push(Arc::new(VolumeModel::new(source, file, hole, effects)?));
+            all.push(Arc::new(VolumeModel::new(
+                source,
+                file,
+                hole,
+                spectral_index,
+                scene.effects.slow_light,
+            )?));
         }
         let smooth = (0..all.len()).filter(|m| all[*m].cell_size().is_none()).collect();
         Ok(Media { all, smooth })
@@ -290,15 +295,15 @@ impl Media {
         scratch.profile.clear();
         if medium.absorbs() {
             let total = scratch.lights_of(m, seen.number)[first..].first().map_or(0.0, |l| l.depth);
-            let depths = (&scratch.sums.depths[..], total);
-            scratch.profile.set(optics.hole.spin(), nodes, &emission, depths);
+            let depths = &scratch.sums.depths;
+            scratch.profile.set(optics.hole.spin(), nodes, &emission, depths, total);
         }
         scratch.emission = emission;
         done
     }
 
     /// Keeps the light of medium number `m` along ray `k` at time number `j`.
-    pub fn keep(&self, (m, k, j): (usize, usize, usize), light: Light, scratch: &mut MediaScratch) {
+    pub fn keep(&self, m: usize, k: usize, j: usize, light: Light, scratch: &mut MediaScratch) {
         scratch.lights_of(m, k)[j] = light;
     }
 
@@ -306,7 +311,8 @@ impl Media {
     #[inline(always)]
     pub fn add(
         &self,
-        (k, j): (usize, usize),
+        k: usize,
+        j: usize,
         source: u32,
         scratch: &MediaScratch,
         light: &mut Accumulator,

@@ -45,7 +45,7 @@ fn exact_inclination_is_found_beside_births() {
     let images: f64 = linear.misfit(&x).unwrap() / count;
     let left = problem.left(&best).unwrap();
     assert!((left - images).abs() < 1e-6 * images, "{left} {images}");
-    let cost = linear.change.penalty(&best.x, (cell(&linear), 1.0), &[], &mut vec![0.0; x.len()]);
+    let cost = linear.change.penalty(&best.x, cell(&linear), 1.0, &[], &mut vec![0.0; x.len()]);
     let whole = problem.reduced(best.chi2);
     assert!((whole - left - cost / count).abs() < 1e-3 * whole && cost > 0.01 * best.chi2);
 }

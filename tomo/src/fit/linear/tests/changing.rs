@@ -77,7 +77,7 @@ fn compare_with_images(
         let is_active: Vec<bool> =
             random(4 * voxels.count(), 4).iter().map(|x| *x < share).collect();
         let active = Active::new(&is_active, &voxels.corners(), 0);
-        let walk = Walk::new(model, axis(), (voxels, knots));
+        let walk = Walk::new(model, axis(), voxels, knots);
         let operator = Operator::new(walk, active, &FRAMES, budget);
         is_transposed(&operator, model, |emission| images(model, field, emission));
     }

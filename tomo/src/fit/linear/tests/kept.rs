@@ -40,7 +40,7 @@ fn assert_room_changes_no_bit(model: &ForwardModel<f64>, knots: Knots, degree: D
         random(knots.count * voxels.count(), 4).iter().map(|x| *x < 0.6).collect();
     let within = |room| {
         let active = Active::new(&is_active, &voxels.corners(), 0);
-        let walk = Walk::new(model, axis(), (voxels, knots));
+        let walk = Walk::new(model, axis(), voxels, knots);
         Operator::within(walk, active, &FRAMES, [usize::MAX, room])
     };
     let kept = within(usize::MAX);
@@ -81,11 +81,11 @@ fn exact_room_does_not_decide_what_is_walked() {
     let frames: Vec<usize> = FRAMES.iter().copied().cycle().take(40).collect();
     let walked = |room, budget| {
         let active = Active::new(&vec![true; voxels.count()], &voxels.corners(), 0);
-        let walk = Walk::new(&model, axis(), (voxels, Knots::STEADY));
+        let walk = Walk::new(&model, axis(), voxels, Knots::STEADY);
         counts(&Operator::within(walk, active, &frames, [budget, room]))
     };
     let active = Active::new(&vec![true; voxels.count()], &voxels.corners(), 0);
-    let walk = Walk::new(&model, axis(), (voxels, Knots::STEADY));
+    let walk = Walk::new(&model, axis(), voxels, Knots::STEADY);
     let all = Operator::new(walk, active, &frames, usize::MAX).bytes();
     assert_eq!(walked(usize::MAX, all / 2), [24, 0, 16]);
     assert_eq!(walked(0, all / 2), [0, 24, 16]);

@@ -59,14 +59,14 @@ fn exact_price_is_that_of_the_linear_problem() {
     }
     let change = Change { knots: KNOTS, weight: 0.3, within: None, sharpen: None };
     let mut slopes = vec![0.0; parameters.len()];
-    let known = change.penalty(&parameters, (1.0, 1e-9), &[], &mut slopes);
+    let known = change.penalty(&parameters, 1.0, 1e-9, &[], &mut slopes);
     assert!((known - 0.3 * 14.0).abs() < 1e-6);
     let [mean, error] = price(&parameters, true, None);
     assert!((mean - known).abs() < 4.0 * error + 0.02 * known, "{mean} {error} {known}");
     let settings = OccupancySettings { cells: 10, threshold: 1e-4, memory: 0.9 };
     let region = Region { r_min: 0.0, r_max: R, z_width: f64::INFINITY };
     let mut mask = Occupancy::new(settings, region);
-    mask.refresh(&field(), &parameters, (3, &KNOTS.times()), &mut Workspace::new());
+    mask.refresh(&field(), &parameters, 3, &KNOTS.times(), &mut Workspace::new());
     assert!(mask.fraction() < 0.2, "{}", mask.fraction());
     let [masked, masked_error] = price(&parameters, true, Some(&mask));
     assert!(

@@ -16,10 +16,12 @@ const MOST: usize = 128;
 
 /// Errors that the model has of itself in a geometry that a search has found with χ²/N of `reduced`.
 pub(super) fn errors(
-    of: (&FitFile, &UnknownGeometry),
+    file: &FitFile,
+    unknown: &UnknownGeometry,
     place: &Place,
     problem: &GeometryProblem<'_, f32>,
-    (spread, reduced): (&Spread, f64),
+    spread: &Spread,
+    reduced: f64,
 ) -> Result<ModelErrors> {
     if let Some(why) = left_out(&place.seen, problem) {
         let known = spread.unexplained(problem.excess(reduced), reduced).into_iter().collect();
@@ -30,7 +32,7 @@ pub(super) fn errors(
         let standing = problem.standing(geometry)?;
         let voxels = voxels(&standing, problem)?;
         let sums = sums(&standing, problem)?;
-        let pixels = pixels(of, place, &standing, problem)?;
+        let pixels = pixels(file, unknown, place, &standing, problem)?;
         let refined: Vec<Refined> = [voxels, sums, pixels].into_iter().flatten().collect();
         Ok(ModelErrors { known: standing.errors(problem.free, &refined), left_out: None })
     })
@@ -71,7 +73,8 @@ fn sums(standing: &Standing, problem: &GeometryProblem<'_, f32>) -> Result<Optio
 /// sums converge faster than any power of the pixel, unless the data are known to have pixels. Polarised light is seen along single
 /// rays.
 fn pixels(
-    (file, unknown): (&FitFile, &UnknownGeometry),
+    file: &FitFile,
+    unknown: &UnknownGeometry,
     Place { seen, at, view, errors, even }: &Place,
     standing: &Standing,
     problem: &GeometryProblem<'_, f32>,
@@ -91,7 +94,7 @@ fn pixels(
         return Ok(None);
     }
     let other = seen.sampled(finer(seen.view.file.screen.pixels))?;
-    other.with(unknown, view, (*errors, problem.memory), |finer| {
+    other.with(unknown, view, *errors, problem.memory, |finer| {
         let model = GeometryModel { split: problem.model.split, ..finer.model.clone() };
         standing.refined(kind, &GeometryProblem { model: &model, ..*finer })
     })

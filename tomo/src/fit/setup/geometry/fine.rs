@@ -19,7 +19,8 @@ impl Detail<'_> {
     /// none if it was cancelled. Where steps lead on from the ends, these move.
     pub fn search(
         &self,
-        (trials, anchor): (&mut [Trial], &Anchor),
+        trials: &mut [Trial],
+        anchor: &Anchor,
         reduced_chi2: f64,
         how: &Exploration,
         watch: &mut TrialWatch<'_>,
@@ -71,9 +72,9 @@ impl Detail<'_> {
         if !self.is_foreign()? {
             return Ok(sure);
         }
-        let of = (self.file, self.unknown);
         let own = self.through(place, |problem| {
-            discretisation::errors(of, place, problem, (spread, sure.reduced_chi2))
+            let reduced = sure.reduced_chi2;
+            discretisation::errors(self.file, self.unknown, place, problem, spread, reduced)
         })?;
         let spread = sure.spread.map(|spread| spread.beside(&self.unknown.free, own));
         Ok(Sure { spread, ..sure })
@@ -86,7 +87,7 @@ impl Detail<'_> {
         work: impl FnOnce(&GeometryProblem<'_, f32>) -> Result<R>,
     ) -> Result<R> {
         let Place { seen, at, view, errors, .. } = place;
-        seen.with(self.unknown, view, (*errors, self.memory), |problem| {
+        seen.with(self.unknown, view, *errors, self.memory, |problem| {
             let model = seen_through(self.file, problem.model.clone(), at.rays)?;
             work(&GeometryProblem { model: &model, ..*problem })
         })
@@ -110,7 +111,7 @@ fn populated(
     how: &Exploration,
     watch: &mut TrialWatch<'_>,
 ) -> Result<Option<Sure>> {
-    let explored = quick(problem).explore((start, None), how, watch)?;
+    let explored = quick(problem).explore(start, None, how, watch)?;
     explored.map(|explored| valued(problem, &explored)).transpose()
 }
 
@@ -126,19 +127,19 @@ fn about_volumes(
     let first = seen.about(&quick, volume, |quick| Ok(Anchor::of(quick, &quick.solve(start)?)))?;
     let Some(first) = first else {
         let x = refined(&volume.voxels, &volume.x, &problem.voxels())?;
-        let Some(explored) = quick.explore((start, Some(&x)), how, watch)? else {
+        let Some(explored) = quick.explore(start, Some(&x), how, watch)? else {
             return Ok(None);
         };
-        return surely_about((seen, problem), &explored).map(Some);
+        return surely_about(seen, problem, &explored).map(Some);
     };
-    let explored = seen.about(&quick, &first, |quick| quick.explore((start, None), how, watch))?;
+    let explored = seen.about(&quick, &first, |quick| quick.explore(start, None, how, watch))?;
     let Some(explored) = explored.flatten() else { return Ok(None) };
     let short = Exploration { trials: how.trials / 2, ..*how };
     let Some(explored) = nearer(seen, &quick, explored, &short, watch)? else {
         return Ok(None);
     };
     let anchor = Anchor::of(problem, &explored.best);
-    let found = seen.about(problem, &anchor, |problem| surely_about((seen, problem), &explored))?;
+    let found = seen.about(problem, &anchor, |problem| surely_about(seen, problem, &explored))?;
     Ok(found.map(|sure| {
         let spread = sure.spread.filter(|_| sure.reduced_chi2 < WAY);
         Sure { spread, ..sure }
@@ -162,7 +163,8 @@ const WAY: f64 = 3.0;
 
 /// Returns the errors of the best of the geometries that were explored.
 fn surely_about(
-    (seen, problem): (&SearchData, &GeometryProblem<'_, f32>),
+    seen: &SearchData,
+    problem: &GeometryProblem<'_, f32>,
     explored: &Explored,
 ) -> Result<Sure> {
     if is_stepped(seen, problem) {
@@ -208,8 +210,8 @@ pub(super) fn nearer(
     explored.best = problem.solve_from(explored.best.geometry, &explored.best.x)?;
     for _ in 0..NEARER {
         let (anchor, geometry) = (Anchor::of(problem, &explored.best), explored.best.geometry);
-        let next = seen
-            .about(problem, &anchor, |problem| problem.explore((geometry, None), short, watch))?;
+        let next =
+            seen.about(problem, &anchor, |problem| problem.explore(geometry, None, short, watch))?;
         let Some(mut next) = next.flatten() else { return Ok(None) };
         next.best = problem.solve_from(next.best.geometry, &next.best.x)?;
         if next.best.value >= explored.best.value {

@@ -98,8 +98,7 @@ fn enveloped(
         match other {
             None => look(problem)?,
             Some((seen, (_, unknown, view))) => {
-                let how = (problem.scale, problem.memory);
-                seen.with(unknown, view, how, look)?;
+                seen.with(unknown, view, problem.scale, problem.memory, look)?;
             }
         }
     }
@@ -126,9 +125,11 @@ impl<'a> GeometryPosterior<'a> {
     /// # Errors
     /// If a prior is out of its range.
     pub fn new(
-        (file, measured): (&'a FitFile, &'a FitData),
+        file: &'a FitFile,
+        measured: &'a FitData,
         unknown: &UnknownGeometry,
-        (geometry, spread): (Geometry, &Spread),
+        geometry: Geometry,
+        spread: &Spread,
         factor: f64,
     ) -> Result<Self> {
         let Spread { open, sigma, correlation, .. } = spread;

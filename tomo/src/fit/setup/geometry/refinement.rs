@@ -160,11 +160,8 @@ mod tests {
     fn told(per_side: usize) -> Option<usize> {
         let spot = Spot { center: [4.5, 0.0, 0.0], sigma: 1.2, amplitude: 1.0, ..Spot::default() };
         let truth = Truth { spot: vec![spot], ..Truth::default() };
-        let mut file = FitFile::new(Hole::new(0.6), 50.0, [2.0, 9.0], Kind::LinearGrid).simulating(
-            truth,
-            (4, 0.0, 40.0),
-            1e-3,
-        );
+        let mut file = FitFile::new(Hole::new(0.6), 50.0, [2.0, 9.0], Kind::LinearGrid)
+            .simulating(truth, 4, 0.0, 40.0, 1e-3);
         file.screen.pixels = 16;
         let mut seen = file.clone();
         seen.screen.samples_per_pixel = Some(per_side * per_side);

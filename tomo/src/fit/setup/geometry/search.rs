@@ -59,8 +59,8 @@ pub fn find_geometry(
     // Beside a prior of the voxels data count as their errors say.
     let scale = |reduced: f64| if has_prior { 1.0 } else { scale(reduced) };
     let first = coarse
-        .with(unknown, &search.coarse, (1.0, memory), |problem| least(problem, search.starts))?;
-    let found = coarse.with(unknown, &search.coarse, (scale(first), memory), |problem| {
+        .with(unknown, &search.coarse, 1.0, memory, |problem| least(problem, search.starts))?;
+    let found = coarse.with(unknown, &search.coarse, scale(first), memory, |problem| {
         from_starts(&coarse, problem, file.seed, unknown, watch)
     })?;
     let Some(Found { best, reduced_chi2, mut trials }) = found else {
@@ -71,7 +71,7 @@ pub fn find_geometry(
     let mut told = |trials: usize, best: f64| watch((count - 1, count), trials, best);
     // The coarse search has left less than it began with.
     let detail = Detail { file, measured, unknown, memory, scale: &scale };
-    let found = detail.search((&mut trials, &best), reduced_chi2, &how, &mut told)?;
+    let found = detail.search(&mut trials, &best, reduced_chi2, &how, &mut told)?;
     Ok(found.map(|Detailed { sure, errors, resolution }| FoundGeometry {
         geometry: sure.geometry,
         reduced_chi2: sure.reduced_chi2 / errors,
@@ -104,7 +104,7 @@ fn from_starts(
         let mut told = |trials: usize, best: f64| watch((k, search.starts + 1), trials, best);
         let seed = seed.wrapping_add(k as u64);
         let how = Exploration { width: WIDTHS[0], trials: search.coarse.trials, seed };
-        let Some(explored) = searched(seen, problem, (start, lit), &how, &mut told)? else {
+        let Some(explored) = searched(seen, problem, start, lit, &how, &mut told)? else {
             return Ok(None);
         };
         trials.push(trial(&explored, problem)?);
@@ -155,12 +155,13 @@ fn beginnings(
 fn searched(
     seen: &SearchData,
     problem: &GeometryProblem<'_, f32>,
-    (start, lit): (Geometry, Option<Estimate>),
+    start: Geometry,
+    lit: Option<Estimate>,
     how: &Exploration,
     watch: &mut TrialWatch<'_>,
 ) -> Result<Option<Explored>> {
     let mut from = |problem: &GeometryProblem<'_, f32>| -> Result<Option<Explored>> {
-        let Some(explored) = problem.explore((start, None), how, watch)? else { return Ok(None) };
+        let Some(explored) = problem.explore(start, None, how, watch)? else { return Ok(None) };
         let Some(explored) = or_twin(problem, explored, how, watch)? else { return Ok(None) };
         let further = lowest(problem, &explored)?;
         Ok(Some(Explored { further, ..explored }))
@@ -193,7 +194,7 @@ fn or_twin(
         return Ok(Some(explored));
     };
     let short = Exploration { width: WIDTHS[1], trials: how.trials / MIRROR, ..*how };
-    let Some(other) = problem.explore((mirror, None), &short, watch)? else { return Ok(None) };
+    let Some(other) = problem.explore(mirror, None, &short, watch)? else { return Ok(None) };
     if other.best.value < explored.best.value {
         explored.best = other.best;
     }

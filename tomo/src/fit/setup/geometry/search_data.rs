@@ -84,7 +84,8 @@ impl SearchData {
         &self,
         unknown: &UnknownGeometry,
         view: &SearchView,
-        (scale, memory): (f64, Memory<'_>),
+        scale: f64,
+        memory: Memory<'_>,
         search: impl FnOnce(&GeometryProblem<'_, f32>) -> Result<R>,
     ) -> Result<R> {
         let CoarseView { file, instrument, measured } = &self.view;

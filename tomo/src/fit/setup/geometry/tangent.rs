@@ -42,7 +42,7 @@ impl SearchData {
         anchor: &Anchor,
         work: impl FnOnce(&GeometryProblem<'_, f32>) -> Result<R>,
     ) -> Result<Option<R>> {
-        let images = problem.images(anchor.geometry, (&anchor.voxels, &anchor.x))?;
+        let images = problem.images(anchor.geometry, &anchor.voxels, &anchor.x)?;
         let measured = &self.view.measured;
         let Some(weight) = tangent_weight(measured, &self.view.file.loss) else { return Ok(None) };
         let Some(term) = measured.tangents(problem.frames, &images)? else { return Ok(None) };
