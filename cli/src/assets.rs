@@ -72,6 +72,7 @@ pub fn load(
         let path = folder.join(&mesh.path);
         let name = || format!("`mesh.{k}.path` {}", path.display());
         let bytes = read(&path).with_context(|| format!("`mesh.{k}.path`"))?;
+        // The parent of a bare name is empty, and an empty path has no canonical form.
         let beside = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let beside = beside.unwrap_or(Path::new("."));
         let resources = |name: &str| {

@@ -55,6 +55,7 @@ impl Call {
     ) -> Result<Self, Ended> {
         let arguments = Arguments::parsed(words.clone())?;
         let (limit, note) = memory::bytes(arguments.memory)?;
+        // Processor time is counted for the process: what the caller used before is not the call's.
         let cpu_seconds = usage().map_or(0.0, |usage| usage.cpu_seconds);
         let session = Arc::new(Session { hear: Box::new(hear), settings, words, cpu_seconds });
         let (of_threads, requests) = (Arc::clone(&session), Requests::of_call());
@@ -77,8 +78,10 @@ impl Call {
     /// With what the work panics, which is [`Stopped`](kerrlight_geodesic::interrupt::Stopped) where it was cut off.
     pub fn run(&self, program: &Program, wait: impl FnOnce()) -> Result<(String, Value), Ended> {
         let mut result = None;
+        // In place: `wait` stays on the caller's thread, perhaps the only one to see its signals.
         self.threads.in_place_scope(|scope| {
             scope.spawn(|_| {
+                // Dropped last, also when the work panics: `wait` would never return otherwise.
                 let _end = End(&self.session);
                 self.note.iter().for_each(|note| eprintln!("{note}"));
                 let answer = self.arguments.verb.run(&self.arguments, program);

@@ -24,6 +24,7 @@ impl Changed<'_> {
         read: impl Fn(&str) -> Result<T, Error>,
         told: impl Fn(Error) -> anyhow::Error,
     ) -> anyhow::Result<T> {
+        // A line number would make the same error differ, since the changed text is laid out anew.
         let bare = |text: &str| read(text).map_err(Error::without_line);
         let error = match bare(self.text) {
             Ok(found) => return Ok(found),

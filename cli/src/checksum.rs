@@ -60,6 +60,7 @@ pub fn sealed(mut object: serde_json::Value) -> String {
     object["checksum"] = serde_json::json!(NONE);
     let text = format!("{object:#}\n");
     let sum = crc32fast::hash(text.as_bytes());
+    // JSON escapes line ends in strings and indents inner keys further: KEY occurs once.
     text.replacen(&format!("{KEY}{NONE}"), &format!("{KEY}{sum:08x}"), 1)
 }
 
@@ -72,10 +73,12 @@ pub fn seal_list(
     mut entries: impl Iterator<Item = String>,
 ) -> std::io::Result<()> {
     let Some(first) = entries.next() else {
+        // An empty list is printed on one line and has no place for entries.
         object[name] = serde_json::json!([]);
         return out.write_all(sealed(object).as_bytes());
     };
     object["checksum"] = serde_json::json!(NONE);
+    // The single zero marks where the entries go in the printed text.
     object[name] = serde_json::json!([0]);
     let text = format!("{object:#}\n");
     let (before, behind) = text.split_once("\n    0\n").unwrap_or((&text, ""));

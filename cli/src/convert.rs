@@ -118,6 +118,7 @@ impl Convert {
         self.check_intervals(&observation)?;
         let selection = flags.apply(&observation);
         let mut observation = selection.observation;
+        // Gains and leakage belong to single times and feeds: they come out before any average.
         self.calibrate(&mut observation)?;
         self.correct_leakage(&mut observation)?;
         if self.stokes_i {

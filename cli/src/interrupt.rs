@@ -77,6 +77,7 @@ impl Requests {
         let mut now = self.now();
         let is_first = now.signal.is_none();
         now.signal.get_or_insert(signal);
+        // A flag by itself: it publishes no other data.
         self.stop.store(true, Ordering::Relaxed);
         let keeper = now.keeper.clone();
         drop(now);
@@ -86,10 +87,12 @@ impl Requests {
                 let said = words.clone();
                 let late = threads::spawn(move || {
                     std::thread::sleep(MOMENT);
+                    // Work that has ended in the meantime has dropped its guard.
                     if self.now().keeper.is_some() {
                         self.cut_off(signal, &said);
                     }
                 });
+                // Without a thread that waits, nobody would end the work later.
                 if late.is_err() {
                     self.cut_off(signal, &words);
                 }
@@ -207,6 +210,7 @@ fn is_hangup_ignored() -> bool {
         // SAFETY: neither the default nor ignoring runs any code of ours.
         unsafe { sigaction(Signal::SIGHUP, &action) }
     };
+    // The present action is told only in exchange for another one.
     let ignored =
         set(SigHandler::SigIgn).is_ok_and(|old| matches!(old.handler(), SigHandler::SigIgn));
     if !ignored {

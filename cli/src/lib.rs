@@ -147,6 +147,7 @@ impl Program {
     /// Help, and what is wrong with the words themselves, end the process.
     pub fn run_with(self, words: impl IntoIterator<Item = OsString>) -> u8 {
         let words: Vec<OsString> = words.into_iter().collect();
+        // Before the parser, whose messages repeat words as they were given.
         if let Err(error) = plain::check_words(&words) {
             eprintln!("error: {}", plain::reasons(&error));
             return 2;

@@ -58,6 +58,7 @@ impl Lock {
 
     /// Returns whether a process has the lock of a file.
     pub fn is_held(path: &Path) -> bool {
+        // Shared, so that two who look at once do not take each other for the owner.
         let file = File::open(path);
         file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
     }

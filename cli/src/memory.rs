@@ -119,7 +119,7 @@ fn groups() -> Option<u64> {
             _ => return None,
         };
         let at = Path::new(root).join(path.trim_start_matches('/'));
-        // A container may see its own group as the root.
+        // The limits of all groups above hold as well; a container may see its own as the root.
         at.ancestors().take_while(|at| at.starts_with(root)).filter_map(|at| left(at, names)).min()
     };
     own.lines().filter_map(of).min()
@@ -132,6 +132,7 @@ fn left(group: &Path, [limit, used]: [&str; 2]) -> Option<u64> {
     let (limit, used) = (number(limit)?, number(used)?);
     let pages = std::fs::read_to_string(group.join("memory.stat")).ok().and_then(|text| {
         let line = |name: &str| text.lines().find_map(|line| line.strip_prefix(name));
+        // Version 1 counts groups below under `total_` alone, version 2 always.
         line("total_inactive_file ").or(line("inactive_file "))?.trim().parse::<u64>().ok()
     });
     Some(limit.saturating_sub(used.saturating_sub(pages.unwrap_or(0))))
@@ -190,6 +191,7 @@ unsafe impl GlobalAlloc for Bounded {
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        // A block that grows counts by its new size, not by both.
         give_back(layout.size());
         take(size);
         // SAFETY: as above.

@@ -114,6 +114,7 @@ impl Observe {
         if let Some(FrameTimes::File(path)) = &self.frame_times {
             output.must_differ_from(path)?;
         }
+        // The name of a built-in array is no file and differs from every output.
         output.must_differ_from(self.array.as_ref())?;
         let seed = self.seed()?;
         let array = arguments::array_of(&self.array)?;

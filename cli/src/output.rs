@@ -169,6 +169,7 @@ impl Output {
         write(&mut buffer).with_context(name)?;
         buffer.flush().with_context(name)?;
         drop(buffer);
+        // On the disk before the rename: a crash of the machine leaves the old file or the new one.
         file.as_file().sync_all().with_context(name)?;
         file.persist(&self.path).with_context(name)?;
         Ok(())

@@ -42,6 +42,7 @@ pub fn from_here(assignment: &str, folder: Option<&Path>) -> anyhow::Result<Stri
     let here = std::path::absolute(".").context("the current folder")?;
     let folder = folder.map(|folder| here.join(folder));
     move_paths(key.trim(), &mut value, &|path| moved(path, &here, folder.as_deref()));
+    // What names no file keeps its digits and its layout.
     Ok(if value == before { assignment.to_owned() } else { format!("{keys}={value}") })
 }
 

@@ -20,6 +20,7 @@ fn tell(
     name: &'static str,
     say: impl Fn(&str) + Send + 'static,
 ) {
+    // A thread that held the bar would go on after the work has dropped it.
     let bar = bar.downgrade();
     let lines = move || {
         loop {

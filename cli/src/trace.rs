@@ -238,8 +238,10 @@ impl Trace {
             vec![result("r_min", &|t, k| t.turning_radius[k])],
         ];
         let crossings = points(traced, usize::from(self.crossings), "", |b| &b.crossings);
+        // θ is π/2 at every crossing.
         groups.push(crossings.into_iter().filter(|column| column.name() != "theta").collect());
         if self.samples > 0 {
+            // A ray that turns round passes between the radii twice.
             let pieces = if self.between.is_some() { 2 } else { 1 };
             let width = self.samples as usize * pieces;
             groups.push(points(traced, width, "sample_", |b| &b.samples));
@@ -322,6 +324,7 @@ impl LineCounter<'_> {
         let lines = |bytes: &[u8]| bytes.iter().filter(|b| **b == b'\n').count() as u64;
         self.line += lines(&self.bytes[self.at.min(start)..start]);
         self.at = start;
+        // A record begins where the one before ended: skipped lines lie between.
         let skipped = self.bytes[start..]
             .split(|b| *b == b'\n')
             .take_while(|text| text.starts_with(b"#") || text.trim_ascii().is_empty())

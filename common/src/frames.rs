@@ -61,6 +61,7 @@ impl<T: Float> Frames<T> {
         pixels: usize,
         make: impl FnOnce(&mut Sink<'_, T>) -> Result<(), E>,
     ) -> Result<Self, E> {
+        // In floating point, so that no number of images can overflow.
         let bytes = count as f64 * pixels as f64 * size_of::<T>() as f64;
         let file = if bytes > memory::part(SHARE) { memory::scratch(bytes) } else { None };
         let failed = |error| failure(count, pixels, "written", &error);
@@ -180,9 +181,11 @@ impl<T: Float> Frames<T> {
         let Store::File(file) = &self.store else { return Ok(Vec::new()) };
         let size = size_of::<T>();
         let mut bytes = vec![0; count * size];
+        // A reader that panicked has left nothing half done: every read seeks first.
         let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
         let place = SeekFrom::Start((from * size) as u64);
         let read = file.seek(place).and_then(|_| file.read_exact(&mut bytes));
+        // Others may read while these bytes become numbers.
         drop(file);
         read.map_err(|error| failure(self.count, self.pixels, "read", &error))?;
         Ok(bytes.chunks_exact(size).map(get).collect())
@@ -206,6 +209,7 @@ fn failure(
 
 /// The bytes of a number, of four or eight bytes.
 fn put<T: Float>(x: T, bytes: &mut Vec<u8>) {
+    // Exact: a number of four bytes is an f32.
     match size_of::<T>() {
         4 => bytes.extend_from_slice(&(x.double() as f32).to_le_bytes()),
         _ => bytes.extend_from_slice(&x.double().to_le_bytes()),

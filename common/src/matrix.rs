@@ -47,6 +47,8 @@ pub fn multiply<T: Float>(a: &[T], of_a: Shape, b: &[T], of_b: Shape, result: &m
     // SAFETY: the shapes have been checked to lie within their slices, `result` is not aliased,
     // and `T` is f32 or f64, which gemm implements.
     unsafe {
+        // Distances of columns stand before those of rows, and the factor of what is there, if that
+        // is read, before that of a·b.
         gemm::gemm(
             of_a.rows,
             of_b.columns,

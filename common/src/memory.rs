@@ -29,6 +29,7 @@ pub struct TooLarge {
 
 /// Sets how many bytes may be taken by this process; without it there is no limit.
 pub fn set_limit(bytes: u64) {
+    // Nothing else is published with this number: it needs no order.
     LIMIT.store(bytes, Ordering::Relaxed);
 }
 

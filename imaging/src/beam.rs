@@ -11,6 +11,7 @@ pub fn blurred(image: &[f64], side: usize, fwhm: f64) -> Vec<f64> {
         (0..side).map(|k| kernel[k.abs_diff(at)] * value(k)).sum()
     };
     let pixels = 0..side * side;
+    // A round Gaussian is a product of one along rows and one along columns.
     let rows: Vec<f64> =
         pixels.clone().map(|k| along(&|j| image[k / side * side + j], k % side)).collect();
     pixels.map(|k| along(&|i| rows[i * side + k % side], k / side)).collect()

@@ -25,6 +25,7 @@ pub enum Profile {
 impl Envelope {
     /// Shares of the flux in the pixels, nowhere below 1e-6 of the brightest.
     pub fn shares(self, grid: ImageGrid) -> Vec<f64> {
+        // The entropy divides by these shares, and both profiles underflow far out.
         const FLOOR: f64 = 1e-6;
         let Self { profile, fwhm_uas } = self;
         match profile {

@@ -76,6 +76,7 @@ impl Calibration {
         let all: Vec<f64> = self.at_minimum().filter_map(|image| image.number(number)).collect();
         let (mean, of_mean) = mean_with_error(&all)?;
         let added = mean - of_shape;
+        // A factor that is even between ½ and 1½ has a standard deviation of 1/√12.
         let of_sky = if self.explains { 0.0 } else { added / 12f64.sqrt() };
         Some((added, of_mean.hypot(of_sky)))
     }
@@ -152,6 +153,7 @@ impl Survey {
     /// Images of an even ring have any direction, and say nothing of that.
     pub fn ring_direction(&self) -> Option<(f64, Option<f64>)> {
         let here = self.found().ring.as_ref()?.position_angle_deg;
+        // As turns from the image's own direction: means of angles would jump at north.
         let turned: &Number<'_> =
             &|_, ring| Some((ring?.position_angle_deg - here + 540.0).rem_euclid(360.0) - 180.0);
         let is_known = self.calibration().and_then(|known| known.added(turned));

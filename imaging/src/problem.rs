@@ -50,6 +50,7 @@ impl ImageProblem<'_> {
     /// The pixels' shares of the flux, and the flux in Jy.
     pub fn light(&self, parameters: &[f64]) -> (Vec<f64>, f64) {
         let (last, logs) = parameters.split_last().unwrap_or((&0.0, &[]));
+        // A common constant changes no share: with the largest logarithm at 0 none overflows.
         let most = logs.iter().fold(f64::NEG_INFINITY, |most, x| most.max(*x));
         let mut shares: Vec<f64> = logs.iter().map(|x| (x - most).exp()).collect();
         let sum: f64 = shares.iter().sum();
@@ -85,9 +86,12 @@ impl ImageProblem<'_> {
                 },
             );
         let mut slope = gradient.last().map_or(0.0, |g| g.abs());
+        // The flux, last among the parameters, has no share: the zip leaves it out.
         for ((x, share), g) in parameters.iter_mut().zip(&shares).zip(gradient) {
             if *share < floor && *g < 0.0 {
+                // A slope with ln s goes as s: it is small in the dark, whatever is missing.
                 slope -= g * floor / share;
+                // Shares go as e^x: differences of parameters are logarithms of their ratios.
                 *x = bright + (floor / most).ln();
             } else {
                 slope += g.abs();
@@ -141,6 +145,7 @@ impl ImageProblem<'_> {
         weight: f64,
         gradient: &mut [f64],
     ) -> f64 {
+        // A part of the frames may have no datum of a kind.
         let scale = 1.0 / self.count(term).max(1) as f64;
         let of_frame =
             |frame: &usize| term.value_and_gradient(*frame, image, weight * scale, gradient);
@@ -156,12 +161,14 @@ impl ImageProblem<'_> {
             weight * self.term(&**term, &image, *weight, &mut of_image)
         });
         let mut value: f64 = data.sum();
+        // All pixels go as F: the slope with ln F is Σ g I. Penalties see shares alone.
         let pull: f64 = of_image.iter().zip(&image).map(|(g, i)| g * i).sum();
         let (prior, slope) = self.flux_prior(flux);
         value += prior;
         let mut of_shares: Vec<f64> = of_image.iter().map(|g| g * flux).collect();
         value += self.penalties(&shares, &mut of_shares);
         value += self.entropy(&shares, &mut of_shares);
+        // ∂s_j/∂x_k = s_j (δ_jk − s_k): what all shares have in common is no slope.
         let mean: f64 = of_shares.iter().zip(&shares).map(|(g, s)| g * s).sum();
         for ((out, g), share) in gradient.iter_mut().zip(&of_shares).zip(&shares) {
             *out = share * (g - mean);
@@ -198,6 +205,7 @@ impl ImageProblem<'_> {
     fn penalties(&self, shares: &[f64], gradient: &mut [f64]) -> f64 {
         let (n, side) = (shares.len() as f64, self.side);
         let spacing = 1.0 / side as f64;
+        // One layer of thickness 1: the integral over a volume is that over the field.
         let shape = Shape { nodes: [1, side, side], spacing: [1.0, spacing, spacing] };
         let brightness: Vec<f64> = shares.iter().map(|share| share * n).collect();
         let mut of_brightness = vec![0.0; shares.len()];

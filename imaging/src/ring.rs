@@ -70,6 +70,7 @@ impl Ring {
         let central = sky.within(centre, CENTRE);
         let coverage = sky.coverage(centre, central);
         let central_brightness = central / sky.around(centre, mean);
+        // Negated, so that a quotient that is no number makes no ring.
         if !(central_brightness <= MOST_CENTRAL && coverage >= LEAST_COVERAGE) {
             return None;
         }
@@ -122,6 +123,7 @@ impl Sky<'_> {
         let brightest = |angle: f64| {
             let light = self.radii.iter().map(|r| self.on(centre, angle, *r)).enumerate();
             let (k, _) = light.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+            // At a limit the profile still rises beyond it: no peak.
             (k > 0 && k < last).then(|| self.radii[k])
         };
         let peaks: Vec<f64> = directions().filter_map(brightest).collect();
@@ -169,6 +171,7 @@ impl Sky<'_> {
             let scores = places.filter_map(|place| Some((place, self.scatter(place, middle)?)));
             found = scores.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(place, _)| place);
             centre = found?;
+            // Two halved steps reach the neighbours, between which the minimum is.
             (step, reach) = (0.5 * step, 2);
         }
         found
@@ -204,6 +207,7 @@ impl Sky<'_> {
         let last = (2.0 * most / step) as usize;
         let of = |angle: f64| {
             let light = |k: usize| self.on(centre, angle, step * k as f64) - floor;
+            // The peak lies between the ring's radii; its flanks may reach beyond them.
             let inside = |k: &usize| {
                 let r = step * *k as f64;
                 r >= self.radii[0] && r <= most
@@ -223,6 +227,7 @@ impl Sky<'_> {
         const CIRCLES: usize = 11;
         let (mut east, mut north, mut size) = (0.0, 0.0, 0.0);
         for k in 0..CIRCLES {
+            // A ring that is wider than its diameter has no innermost circles.
             let r = (radius + width * (k as f64 / (CIRCLES - 1) as f64 - 0.5)).max(0.0);
             let mut sums = [0.0; 3];
             for angle in directions() {
@@ -233,6 +238,7 @@ impl Sky<'_> {
             }
             let length = sums[0].hypot(sums[1]);
             if length > 0.0 && sums[2] > 0.0 {
+                // The published mean is one of directions: every circle counts the same.
                 east += sums[0] / length;
                 north += sums[1] / length;
                 size += length / sums[2];

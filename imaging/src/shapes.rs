@@ -112,6 +112,7 @@ impl Shape {
             Self::Crescent => turns(4)
                 .flat_map(|(s, c)| around.iter().map(move |f| vec![l + f.ln(), l - 1.0, s, c]))
                 .collect(),
+            // From one separation alone fits can stick far from the data.
             Self::Double => turns(12)
                 .flat_map(|(s, c)| {
                     [0.4, 0.9].map(|apart| vec![l - 0.7, l - 0.7, apart * s, apart * c, 0.2])
@@ -127,6 +128,8 @@ impl Shape {
         let bell = |square: f64, ln: f64| (-4.0 * LN_2 * square / width(ln).powi(2)).exp();
         let light = |east: f64, north: f64| match self {
             Self::Gaussian => {
+                // The exponential of [[x₁, x₂], [x₂, −x₁]], of determinant 1: x₀ sets the area.
+                // A round Gaussian, whose angle means nothing, is a point like others.
                 let h = x[1].hypot(x[2]).min(3.0);
                 let part = if h > 0.0 { h.sinh() / h } else { 1.0 };
                 let round = h.cosh() * (east * east + north * north);
@@ -134,12 +137,13 @@ impl Shape {
                 bell((round + part * long).max(0.0), x[0])
             }
             Self::Disc => {
-                // An edge of a pixel.
+                // About a pixel wide: differences of pixels see no slope of a sharp edge.
                 let inside = (0.5 * width(x[0]) - east.hypot(north)) / pixel;
                 1.0 / (1.0 + (-4.0 * inside).exp())
             }
             Self::Ring => bell((east.hypot(north) - 0.5 * width(x[0])).powi(2), x[1]),
             Self::Crescent => {
+                // Against 0/0: in the middle of the ring, and below at b = 0.
                 let r = east.hypot(north).max(1e-9);
                 let size = x[2].hypot(x[3]).max(1e-9);
                 let side = size.tanh() / size * (x[2] * east + x[3] * north) / r;
@@ -149,6 +153,7 @@ impl Shape {
                 let off = [0.5 * size * x[2], 0.5 * size * x[3]];
                 let one = |sign: f64, ln: f64| {
                     let square = (east - sign * off[0]).powi(2) + (north - sign * off[1]).powi(2);
+                    // Over its area: the weights of both are then parts of the flux.
                     bell(square, ln) / width(ln).powi(2)
                 };
                 let first = 1.0 / (1.0 + (-x[4]).exp());
@@ -160,6 +165,7 @@ impl Shape {
             light(place[0] / MICROARCSECOND, place[1] / MICROARCSECOND)
         };
         let all: Vec<f64> = (0..grid.pixels()).map(of).collect();
+        // A ring that a step has put beyond the field lights no pixel: 0, not 0/0.
         let sum: f64 = all.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         all.into_iter().map(|x| x / sum).collect()
     }
@@ -203,6 +209,7 @@ pub fn best_shape<'a>(shapes: impl Iterator<Item = &'a ShapeFit>) -> Option<&'a 
 
 /// A width of this logarithm in a picture: nothing is narrower than its pixels tell.
 fn drawn(ln: f64, pixel: f64) -> f64 {
+    // Line searches may try any length: its exponential stays finite.
     ln.clamp(-5.0, 9.0).exp().hypot(pixel)
 }
 
@@ -252,6 +259,7 @@ impl Fitting<'_> {
     /// The minimum from parameters, by derivatives of the pixels from differences; none if `go_on` said no.
     fn solved(&self, begin: &[f64], go_on: &(dyn Fn() -> bool + Sync)) -> Option<Minimum> {
         let mut objective = |x: &[f64], g: &mut [f64]| {
+            // Only pixels are differenced: data and their gains are solved once for a gradient.
             let (value, of_image) = self.problem.data_and_gradient(&self.image(x), x[0].exp());
             for (k, g) in g.iter_mut().enumerate() {
                 const STEP: f64 = 1e-4;
@@ -285,6 +293,7 @@ pub(crate) fn refitted_flux(
 ) -> Option<f64> {
     let fitting = Fitting { shape: fit.shape, problem, grid, size: size(file) };
     let mut begin = fit.parameters.clone();
+    // The flux counts from the mean of its prior, which is another one here: it stays the same.
     begin[0] += (file.image.flux_jy / problem.flux.jy).ln();
     let found = fitting.solved(&begin, go_on)?;
     Some(problem.flux.jy * found.parameters[0].exp())

@@ -57,11 +57,13 @@ pub fn solve(
         let found = minimum(&mut objective, &scaled, iterations - used, go_on)?;
         parameters = plain(&found.parameters);
         used += found.iterations;
+        // Before dark pixels are raised: the loss and its gradient are those of this image.
         let image = problem.image(&parameters);
         let mut gradient = vec![0.0; parameters.len()];
         let loss = problem.value_and_gradient(&parameters, &mut gradient);
         let slope = problem.raise(&mut parameters, &gradient);
         let has_converged = slope <= FLAT * loss;
+        // A round may make no iteration at all: unless the loss has to fall there is no end.
         let goes_on = least - loss > FALL * loss && used < iterations;
         if has_converged || !goes_on {
             return Some(Solution { parameters, image, loss, iterations: used, has_converged });

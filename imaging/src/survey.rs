@@ -180,6 +180,7 @@ const GAP: f64 = 1.5;
 fn parts(times: &[f64], files: &[usize], folds: usize) -> Vec<usize> {
     let file = |frame: usize| files.get(frame).copied().unwrap_or(0);
     let mut last: BTreeMap<usize, f64> = BTreeMap::new();
+    // Bands of a night may be seconds apart: the cadence is that within a file.
     let own = times
         .iter()
         .enumerate()
@@ -190,6 +191,7 @@ fn parts(times: &[f64], files: &[usize], folds: usize) -> Vec<usize> {
         scans[frame + 1] = scans[frame] + usize::from(pair[1] - pair[0] > GAP * least);
     }
     let count = scans.last().map_or(0, |last| last + 1);
+    // Without enough scans, frames of several files go by the cadence: bands stay together.
     let of = |frame: usize| match last.len() {
         _ if count >= 2 * folds => scans[frame],
         2.. => ((times[frame] - times[0]) / least) as usize,
@@ -315,6 +317,7 @@ impl Search<'_> {
                 ImageProblem { terms: &terms, envelope, ..self.problem(strength, frames, flux) };
             let start = others.starts[k % others.starts.len()];
             let mut begin = start.solution.parameters.clone();
+            // The flux counts from the mean of its prior, which is drawn here: it stays the same.
             if let Some(last) = begin.last_mut() {
                 *last += (self.flux().jy / flux.jy).ln();
             }
@@ -344,6 +347,7 @@ impl Search<'_> {
         };
         let one = |k: usize| self.refitted_flux(measured, shape, &image, frames, k);
         let fluxes: Result<Option<Vec<f64>>, Error> = match shape.explains {
+            // As many as draws of the image: shapes are fitted fast.
             true => (0..2 * count).into_par_iter().map(one).collect(),
             false => Ok(Some(Vec::new())),
         };

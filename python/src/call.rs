@@ -62,6 +62,7 @@ fn watched<T: Send, E: Display + Send>(
     let wait = || {
         while !ended.load(Ordering::Acquire) {
             thread::park_timeout(MOMENT);
+            // After the first exception, or the end of the work, signals are left to Python.
             if raised.is_none()
                 && !ended.load(Ordering::Acquire)
                 && let Err(error) = Python::attach(|py| py.check_signals())
@@ -74,6 +75,7 @@ fn watched<T: Send, E: Display + Send>(
     let result = py.detach(|| pool.work(work, wait));
     match (raised, result) {
         (Some(error), _) => {
+            // The pool serves later calls as well.
             pool.stop(false);
             Err(error)
         }

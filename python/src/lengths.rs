@@ -125,14 +125,17 @@ fn fill(
     let mut sum = 0.0;
     for (k, length) in row.iter_mut().enumerate() {
         let (from, to) = (step * k.saturating_sub(1) as f64, step * k as f64);
+        // On the way out the clock counts back from the end of the ray.
         let mirrored = turning.is_some() && from + to > total;
         let [start, end] = [from, to].map(|t| near + if mirrored { total - t } else { t });
+        // ∫Σ dτ = ∫Σ · clock d ln(clock).
         let span = (end / start).ln();
         let piece = rule.iter().map(|(x, weight)| {
             let clock = start * (span * x).exp();
             let time = if mirrored { total - (clock - near) } else { clock - near };
             weight * clock * density(time.clamp(0.0, total))
         });
+        // A clock that counts back has a negative span; lengths grow all the same.
         sum += piece.sum::<f64>() * span.abs();
         *length = sum;
     }

@@ -57,6 +57,7 @@ impl Model {
             let allowed = "above the least radius that the rays reach: no ray meets the region";
             return Err(Error::out_of_range("r_max", settings.region.1, allowed).into());
         }
+        // Within the weights, the factor is part of the model and of its adjoint.
         lines.weight.iter_mut().for_each(|weight| *weight *= settings.scale);
         let redshift = settings.redshift_power.map(|power| Redshift { power });
         let axis = Axis::new(settings.axis)?;
@@ -73,6 +74,7 @@ impl Model {
         let mut model = ForwardModel::new(&lines, &motion, hole, redshift)?;
         model.weigh(axis);
         let mut batch = Batch::default();
+        // Any frame would do: redshifts are those of the places of nodes, the same in all frames.
         batch.set((0..lines.rays() as u32).map(|ray| (ray, 0)));
         batch.gather_whole(&model, axis);
         let mut model = Model {
@@ -139,6 +141,7 @@ impl Model {
         for (plane, image) in images.chunks_mut(self.model.pixels()).enumerate() {
             interrupt::check();
             for (pixel, nodes) in self.rays() {
+                // Sums are in double precision, whatever the arrays are.
                 let light = nodes.map(|k| self.light(plane, frame, k) * emission[k].double());
                 image[pixel] = T::of(light.sum());
             }
@@ -151,6 +154,7 @@ impl Model {
             |plane: usize, pixel: usize| images[plane * self.model.pixels() + pixel].double();
         for (pixel, nodes) in self.rays() {
             for k in nodes {
+                // A node lies on one ray: it is summed over Stokes parameters, not over pixels.
                 let part = |plane| self.light(plane, frame, k) * cotangent(plane, pixel);
                 cotangents[k] = T::of((0..self.planes()).map(part).sum());
             }
@@ -217,6 +221,7 @@ impl Model {
     /// Frames one after the other, so that the sum has one order.
     fn to_voxels<T: Float>(&self, grid: &Grid, movie: &[T], frames: &[usize]) -> Vec<T> {
         let count = grid.settings().nodes.iter().product();
+        // A linear grid has the same gradient at any volume.
         let (mut sum, volume) = (vec![T::zero(); count], vec![T::zero(); count]);
         let (mut workspace, mut cotangents) = (Workspace::new(), vec![T::zero(); self.nodes()]);
         for (image, frame) in movie.chunks(self.pixels()).zip(frames) {

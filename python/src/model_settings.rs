@@ -51,8 +51,10 @@ impl Settings {
         let law: Velocity =
             serde_json::from_str(&self.velocity).map_err(|e| Refused(format!("velocity: {e}")))?;
         Ok(Motion {
+            // Matter that turns about a tilted axis ξ is dragged by the part a·ξ_z of the spin.
             velocity: law.angular(0, spin * axis.vector()[2])?,
             reference: self.reference,
+            // `Model::weight` leaves dark what is emitted before the injection.
             injection: None,
             times: self.times.clone(),
         })

@@ -136,6 +136,7 @@ impl Columns<'_> {
                 products: [0, 1, 2, 3].map(|p| products[4 * k + p]),
                 noise_sigma: [0, 1, 2, 3].map(|p| sigmas[4 * k + p]),
                 opacity: [opacity[2 * k] as f32, opacity[2 * k + 1] as f32],
+                // Without channels every row has the number 0.
                 channel: number(channel[k], observation.channels.len().max(1), "channel")?,
             })
         };
@@ -282,6 +283,7 @@ impl Visibilities {
         let kind = if phases { ClosureKind::Phase } else { ClosureKind::LogAmplitude };
         let of = &self.observation;
         let sets = detached(py, || Ok::<_, Infallible>(ClosureSet::of(of, kind, least_snr)))?;
+        // Legs count rows with Stokes I; Python wants numbers among all rows.
         let has_i = |(_, row): &(usize, &Row)| row.stokes_i(of.basis).is_some();
         let rows: Vec<i64> =
             of.rows.iter().enumerate().filter(has_i).map(|(k, _)| k as i64).collect();

@@ -93,6 +93,7 @@ impl Plan {
         observation.source.clone_from(&source.name);
         let hours = match (&self.frame_hours, movie.i.frames()) {
             (Some(hours), _) => hours.clone(),
+            // A single image is seen by all scans, whatever its time.
             (None, 1) => vec![0.0],
             (None, _) => schedule.hours_utc(setup.ut1)?,
         };

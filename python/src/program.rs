@@ -30,6 +30,7 @@ fn with_ours(launcher: Vec<OsString>) -> Program {
 fn program(py: Python<'_>, arguments: Vec<OsString>, launcher: Vec<OsString>) -> u8 {
     let program = with_ours(launcher);
     let run = AssertUnwindSafe(|| program.run_with(arguments));
+    // A representation in Python ends a fit by unwinding to here: its trait has no errors.
     py.detach(|| catch_unwind(run)).unwrap_or_else(|panic| match panic.downcast::<Raised>() {
         Ok(raised) => {
             raised.0.display(py);
@@ -87,6 +88,7 @@ fn call(
     let work =
         AssertUnwindSafe(|| call.run(&program, || error = listen(messages, &call, &listener)));
     let result = py.detach(|| catch_unwind(work));
+    // What the listener or a signal raised comes before what became of the work.
     if let Some(error) = error {
         return Err(error);
     }
@@ -103,6 +105,7 @@ fn listen(
 ) -> Option<PyErr> {
     let mut error = None;
     loop {
+        // Dropped at the end of each turn, which wakes the thread that waits in `sent`.
         let (message, _heard) = match messages.recv_timeout(MOMENT) {
             Ok((Message::End, _)) | Err(RecvTimeoutError::Disconnected) => return error,
             Ok((message, heard)) if error.is_none() => (Some(message), Some(heard)),

@@ -136,6 +136,7 @@ impl Representation<f32> for OfPython {
             copied(&first, &mut of_parameters)?;
             if wants_points { copied(&second, &mut of_points) } else { Ok(()) }
         });
+        // The trait adds to what is there; the class gives the part of this batch.
         gradient.parameters.iter_mut().zip(&of_parameters).for_each(|(sum, part)| *sum += *part);
         let Some(mut coordinates) = gradient.coordinates else { return };
         for (c, column) in coordinates.columns().iter_mut().enumerate() {

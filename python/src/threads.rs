@@ -34,6 +34,7 @@ pub fn stay_on_this_thread() {
 
 /// Returns whether this thread has been made the only one of a pool.
 fn is_alone() -> bool {
+    // The count first: looking at IS_ALONE makes a pool of a thread that has none.
     rayon::current_num_threads() == 1 && IS_ALONE.with(|is_alone| *is_alone)
 }
 
@@ -67,6 +68,7 @@ impl Pool {
     /// The pool of this process.
     fn of_process(is_main: bool) -> PyResult<&'static Self> {
         let place = &POOLS[usize::from(is_main)];
+        // `Acquire`, since another thread may have made the pool behind the pointer.
         let found = place.load(Ordering::Acquire);
         // SAFETY: what is stored comes from a box that is never freed.
         match unsafe { found.as_ref() } {
@@ -74,7 +76,8 @@ impl Pool {
             _ => {
                 let new = Box::into_raw(Box::new(Self::new()?));
                 let _ = place.compare_exchange(found, new, Ordering::AcqRel, Ordering::Acquire);
-                // SAFETY: as above; if another thread was faster, its pool is as good, and this one is dropped.
+                // SAFETY: as above; of two threads that make a pool, both take the first one, and
+                // the other pool stays idle.
                 Ok(unsafe { &*place.load(Ordering::Acquire) })
             }
         }

@@ -22,6 +22,7 @@ pub fn in_sigmas(
     let total: f64 = weights.clone().sum();
     let weighed = visibilities.iter().zip(weights).map(|(v, w)| v * w / total.sqrt());
     let weighed: Vec<Complex<f64>> = weighed.collect();
+    // Samples of the sky: the transform of a pixel would weight long baselines down.
     let transform = Transform::<f64>::new(grid, Pulse::Delta, &[uv], Method::Cheaper(1e-6), KEPT)?;
     let mut image = vec![0.0; grid.width * grid.height];
     transform.adjoint(&weighed, &mut image);

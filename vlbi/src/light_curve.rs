@@ -216,6 +216,7 @@ fn stokes(row: &Row, basis: Basis) -> [Option<Flux>; 4] {
     [
         parallel.map(|(r, l)| half(r.visibility.re, l.visibility.re, r, l)),
         crossed.map(|(a, b)| half(a.visibility.re, b.visibility.re, a, b)),
+        // U = (RL − LR)/2i: of a real U the imaginary parts.
         crossed.map(|(a, b)| half(a.visibility.im, -b.visibility.im, a, b)),
         parallel.map(|(r, l)| half(r.visibility.re, -l.visibility.re, r, l)),
     ]

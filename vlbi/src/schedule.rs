@@ -268,6 +268,7 @@ pub fn observe_affordable(
     setup: &Setup,
 ) -> Result<Observation, Error> {
     if schedule.scans > TRIAL {
+        // Over the same hours: as many baselines see the source in a scan.
         let trial = Schedule { scans: TRIAL, ..*schedule };
         let few = observe(array, source, &trial, setup)?.rows.len() as f64;
         let rows = few * f64::from(schedule.scans) / f64::from(TRIAL);

@@ -206,6 +206,7 @@ pub fn fill_stokes(
         let seen = |pixels: &Vec<f64>| all_seen(observation, grid, pixels, pulse, times_h, method);
         pixels.as_ref().map(seen).transpose()
     };
+    // Before anything is set: a refusal leaves the observation as it was.
     let (linear, v) = (of(q)?.zip(of(u)?), of(v)?);
     let how = fill(observation, &movie.i, pulse, times_h, method)?;
     match linear {
@@ -244,6 +245,7 @@ fn check(frames: usize, times_h: &[f64]) -> Result<(), Error> {
 /// The images that a time lies between, with their weights; one where it is that of an image.
 fn neighbours(times_h: &[f64], time_h: f64) -> Result<impl Iterator<Item = (usize, f64)>, Error> {
     let after = times_h.partition_point(|time| *time <= time_h);
+    // Before the first image 0 wraps to an index that no list has.
     let weight = match (times_h.get(after.wrapping_sub(1)), times_h.get(after)) {
         _ if times_h.len() == 1 => 0.0,
         (Some(before), Some(after)) => (time_h - before) / (after - before),
@@ -253,6 +255,7 @@ fn neighbours(times_h: &[f64], time_h: f64) -> Result<impl Iterator<Item = (usiz
             return Err(Error::out_of_range("time of a scan", time_h, allowed));
         }
     };
+    // An image of weight 0 is dropped: at the last time it would be one that is not there.
     let before = after.saturating_sub(1);
     Ok([(before, 1.0 - weight), (before + 1, weight)].into_iter().filter(|(_, w)| *w > 0.0))
 }

@@ -70,6 +70,7 @@ fn describe(ray: &Draw) -> String {
 
 /// Traces them, writes hard.json and hard.csv, and fails if a ray went wrong.
 pub fn run(arguments: &Accuracy, rays: u64) -> anyhow::Result<Answer> {
+    // Places are checked now, not after hours of tracing.
     let csv = arguments.place("hard.csv", "csv")?;
     let json = arguments.place("hard.json", "json")?;
     let (integrator, tolerance) = (arguments.integrator, arguments.tolerance);

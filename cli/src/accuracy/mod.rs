@@ -40,6 +40,7 @@ pub struct Accuracy {
 impl Accuracy {
     /// Runs the sweep, or the hard rays.
     pub fn run(&self) -> anyhow::Result<Answer> {
+        // Before the folder is made: a wrong tolerance leaves nothing behind.
         if self.hard.is_some() {
             kerrlight_geodesic::Tracer::new(self.tolerance).context("--tolerance")?;
         }

@@ -45,6 +45,7 @@ pub fn figure(rows: &[Row]) -> anyhow::Result<Picture> {
 
 /// Correct digits at a quantile of one class against time, a line an integrator.
 fn panel(rows: &[Row], class: Class, quantile: usize, of: &str) -> (Vec<Plot>, Layout) {
+    // An error above 1 leaves no correct digit: the axis begins at 0.
     let digits = |error: f64| -error.clamp(1e-17, 1.0).log10();
     let mut plots = Vec::new();
     let mut all = Vec::new();

@@ -144,10 +144,12 @@ pub fn find(
     let (recipe, seeds) = recipe(experiment, source, choice)?;
     let known = || {
         let (before, _) = id.rsplit_once('_')?;
+        // The last one: the name of a level may contain `seed` itself.
         let (words, seed) = before.rsplit_once("seed")?;
         let seed: u64 = seed.parse().ok().filter(|seed| (1..=seeds).contains(seed))?;
         let case =
             |variant: usize| Case { recipe: Arc::clone(&recipe), variant: variant as u32, seed };
+        // Of a hundred thousand cases only those with these levels have their settings made.
         recipe.with_words(words).map(case).find(|case| case.slug() == id)
     };
     known().ok_or_else(|| {
@@ -166,6 +168,7 @@ fn recipe(
     if !(1..=1_000_000).contains(&seeds) {
         bail!("--seeds {seeds} is not allowed: 1 to 1000000");
     }
+    // Cases that are asked for by name take the place of the quick look's own choice.
     let only = match quick {
         Some(quick) if choice.only.is_empty() => &quick.only,
         _ => &choice.only,

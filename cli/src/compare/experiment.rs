@@ -267,6 +267,7 @@ impl Experiment {
         for table in &self.table {
             let name = || format!("table {:?}", table.title);
             known_result(&table.value).with_context(name)?;
+            // Each cell tells its best level, so that this factor is not left open.
             let rows: Vec<String> = table.rows.iter().chain(&table.best_of).cloned().collect();
             self.shown(&rows, &table.columns, &table.r#where, true).with_context(name)?;
             if table.best_of.is_some() && !QUALITIES.contains(&table.value.as_str()) {

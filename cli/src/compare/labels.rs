@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 /// A number with so many digits behind the point, or in powers of ten where none of them would tell.
 pub fn number(x: f64, digits: usize) -> String {
+    // Below five units of the last digit, rounding would change a number by more than a tenth.
     let tells = x == 0.0 || x.abs() >= 5.0 * 10f64.powi(-(digits as i32));
     if tells { format!("{x:.digits$}") } else { format!("{x:.1e}") }
 }
@@ -123,10 +124,12 @@ pub fn described(value: &str) -> (String, usize) {
 /// One result of a case.
 pub fn result(results: &Value, value: &str) -> Option<f64> {
     if value == "chi2" {
+        // With several kinds of data, a single number would be an arbitrary choice among them.
         let each = results["chi2_per_datum"].as_object()?;
         return (each.len() == 1).then(|| each.values().next()?.as_f64()).flatten();
     }
     if let Some(name) = value.strip_prefix(ONE_CHI2) {
+        // results.json names kinds of data with blanks, experiments with hyphens as settings do.
         return results["chi2_per_datum"][name.replace('-', " ")]
             .as_f64()
             .filter(|x| x.is_finite());

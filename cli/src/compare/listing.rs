@@ -22,6 +22,8 @@ pub fn cases(cases: Vec<Case>, command: &[String]) -> Answer {
     let command = command.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ");
     let mut lines: Vec<(String, Value)> = Vec::new();
     let all = (0..cases.len()).map(move |k| {
+        // A stretch at a time: its lines are made in parallel, and the first ones are printed
+        // before the last ones exist.
         if k % TOGETHER == 0 {
             let next = &cases[k..cases.len().min(k + TOGETHER)];
             lines = next.par_iter().map(|case| line(case, &command)).collect();
@@ -40,6 +42,7 @@ fn line(case: &Case, command: &str) -> (String, Value) {
     let command = format!("{command} --case {id}");
     let text = match error {
         None => format!("{id}\t{cost:.3e}\t{command}\n"),
+        // Every printed line gets run as a command: a case with wrong settings has none.
         Some(_) => String::new(),
     };
     let entry =

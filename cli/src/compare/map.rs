@@ -39,6 +39,7 @@ impl Map {
         let table = Colormap::Inferno.table();
         canvas.text(&self.columns[0], [LEFT, 20.0], 15.0, Align::Left, BLACK);
         canvas.text(&self.rows[0], [8.0, TOP - 10.0], 15.0, Align::Left, BLACK);
+        // A name needs the width of a full cell.
         let every = (CELL[0] / wide).ceil() as usize;
         for (k, name) in self.columns[1..].iter().enumerate().step_by(every) {
             let x = LEFT + wide * (k as f64 + 0.5);
@@ -60,6 +61,7 @@ impl Map {
                     continue;
                 }
                 let text = format!("{mean:.*}", self.digits);
+                // The upper part of Inferno is bright, the lower one dark.
                 let ink = if part > 0.6 { BLACK } else { WHITE };
                 canvas.text(
                     &text,

@@ -109,9 +109,11 @@ impl Compare {
         if self.status {
             return status::show(&folder, &chosen);
         }
+        // First, because the check refuses one χ² for several kinds of data.
         ran::split_chi2(&mut asked.experiment, &chosen);
         let Asked { experiment, choice, source, .. } = &asked;
         ran::check(experiment, &chosen).with_context(|| name.display().to_string())?;
+        // One wrong case fails by itself; where all are wrong, nothing is begun.
         if let [first, ..] = &chosen[..]
             && let Some(why) = first.early_error()
             && chosen.iter().all(|case| case.early_error().is_some())
@@ -121,6 +123,7 @@ impl Compare {
         if self.list {
             return Ok(listing::cases(chosen, &self.command(&asked, threads, memory)));
         }
+        // Cases that are not run need no data.
         if !self.collect {
             ran::check_data(&chosen)?;
         }
@@ -128,6 +131,7 @@ impl Compare {
         let lock = self.enter(&asked)?;
         let draws = experiment.samples(choice.quick);
         let runner = Runner::new(&folder, threads, memory, program, draws, lock)?;
+        // The report is written anew: what earlier runs of this folder found has to stay in it.
         let cases = if choice.is_restricted() {
             let all = cases::expand(experiment, source, &choice.unrestricted())?;
             with_known(chosen, all, &runner)
@@ -265,12 +269,14 @@ struct Asked {
 /// The chosen cases, and those that an earlier run of the same folder has done beside them.
 fn with_known(chosen: Vec<Case>, all: Vec<Case>, runner: &Runner<'_>) -> Vec<Case> {
     let wanted: HashSet<String> = chosen.iter().map(Case::slug).collect();
+    // The look for a folder comes first: most cases of a large experiment have no results to read.
     let is_shown = |case: &Case| {
         wanted.contains(&case.slug())
             || (runner.run_of(case).is_dir() && matches!(runner.known(case), Status::Done(_)))
     };
     let mut cases: Vec<Case> = all.into_par_iter().filter(is_shown).collect();
     let known: HashSet<String> = cases.iter().map(Case::slug).collect();
+    // Seeds beyond the experiment's own are among the chosen cases only.
     cases.extend(chosen.into_iter().filter(|case| !known.contains(&case.slug())));
     cases
 }

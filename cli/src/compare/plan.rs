@@ -74,6 +74,7 @@ impl Plan {
     /// Writes it into a folder, with the text of the experiment.
     pub fn write(&self, folder: &Path, experiment: &str) -> anyhow::Result<()> {
         Output::new(&folder.join(EXPERIMENT), "toml")?.write(experiment.as_bytes())?;
+        // The plan last: whoever finds it reads the experiment beside it.
         let text = sealed(serde_json::to_value(self)?);
         Output::new(&folder.join(FILE), "")?.write(text.as_bytes())
     }
@@ -149,8 +150,10 @@ fn appear(plan: &Plan, experiment: &str, folder: &Path) -> anyhow::Result<bool> 
         builder.permissions(fs::Permissions::from_mode(0o777))
     };
     let beside = builder.tempdir_in(parent).with_context(name)?;
+    // The lock tells other processes that this is no leftover of a killed one.
     let _lock = fs::File::open(beside.path()).ok().filter(output::lock);
     plan.write(beside.path(), experiment)?;
+    // The rename replaces an empty folder, and fails where the plan of another process is there.
     Ok(fs::rename(beside.path(), &place).is_ok())
 }
 
@@ -167,6 +170,7 @@ fn begin_within(plan: &Plan, experiment: &str, folder: &Path) -> anyhow::Result<
         match Lock::take(folder, BUSY, Duration::ZERO) {
             Ok(_alone) if folder.join(FILE).is_file() => break,
             Ok(_alone) => plan.write(folder, experiment)?,
+            // Whoever has the lock is about to write the plan.
             Err(error) if clock.elapsed() > BEGINNING => return Err(error),
             Err(_) => std::thread::sleep(Duration::from_millis(20)),
         }
@@ -182,6 +186,7 @@ fn is_foreign(folder: &Path) -> bool {
         [lock::NAME, FILE, EXPERIMENT].iter().any(|ours| name == ours)
             || name.to_string_lossy().starts_with(output::BESIDE)
     };
+    // An experiment without a plan is a beginning that was cut short.
     !names.iter().any(|name| name == EXPERIMENT) && !names.iter().all(is_ours)
 }
 

@@ -91,6 +91,7 @@ impl Recipe {
     ) -> anyhow::Result<Self> {
         let kept = kept(experiment, only)?;
         let mut experiment = experiment.clone();
+        // With paths from the root, a case has the same text, and so the same ID, from any folder.
         experiment.set = source.anchored(&experiment.set);
         experiment.quick.set = source.anchored(&experiment.quick.set);
         let mut levels: Vec<Vec<Level>> = experiment.factor.iter().map(Factor::levels).collect();
@@ -110,6 +111,7 @@ impl Recipe {
         variants.retain_mut(|variant| {
             let is_wanted = recipe.is_wanted(&variant.chosen, &kept);
             let levels = variant.chosen.iter().copied().enumerate();
+            // `count` and not `any`, which would stop before all levels are marked as seen.
             variant.is_new = is_wanted && levels.filter(|level| seen.insert(*level)).count() > 0;
             is_wanted
         });
@@ -206,6 +208,7 @@ impl Recipe {
         let Stamp::Around([before, behind]) = stamp else {
             return crc32fast::hash(text(seed).as_bytes());
         };
+        // The CRC-32 of joined texts follows from those of the parts: only the seed is hashed.
         let [mut sum, behind] = [before, behind]
             .map(|(crc, length)| crc32fast::Hasher::new_with_initial_len(*crc, *length));
         sum.update(seed.to_string().as_bytes());
@@ -216,6 +219,7 @@ impl Recipe {
     /// The settings of a fit as text.
     pub fn text(&self, variant: usize, seed: u64) -> anyhow::Result<String> {
         let text = toml::to_string(&self.merged(variant, seed)?).context("settings")?;
+        // The command line comes last: it overrides levels and the quick look.
         self.choice.set.iter().try_fold(text, |text, assignment| {
             fit::assigned(&text, &paths::from_here(assignment, None)?)
         })
@@ -257,6 +261,7 @@ impl Recipe {
 
     /// The settings of a fit, which is read once.
     fn fit(&self, path: &Path) -> anyhow::Result<Table> {
+        // Held while a fit is read, so that other threads wait for it and read it once.
         let mut fits = self.fits.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(table) = fits.get(path) {
             return Ok(table.clone());
@@ -286,6 +291,7 @@ impl Stamp {
         let sum = |part: &str| (crc32fast::hash(part.as_bytes()), part.len() as u64);
         match parts.as_slice() {
             [before, behind] => Stamp::Around([sum(before), sum(behind)]),
+            // A seed given by --set leaves no mark in the text.
             _ => Stamp::Any,
         }
     }

@@ -59,6 +59,7 @@ impl<'a> Runner<'a> {
     pub fn known(&self, case: &Case) -> Status {
         let run = &self.run_of(case);
         match results(run) {
+            // The page is written after results.json: without it the fit was cut short.
             Some((results, true)) if is_ours(&results) && run.join("report.html").exists() => {
                 self.with_draws(results, run).map_or(Status::Open, Status::Done)
             }
@@ -107,6 +108,7 @@ impl<'a> Runner<'a> {
             Status::Open => {}
             known => return known,
         }
+        // With many combinations, not all settings have been checked before.
         if let Some(error) = case.error() {
             return Status::Failed(error.to_owned());
         }
@@ -130,7 +132,6 @@ impl<'a> Runner<'a> {
         run: &Path,
         keeper: &SignalGuard,
     ) -> anyhow::Result<(ExitStatus, String)> {
-        // Paths in it start from the root.
         let settings = self.folder.join(format!("{}.toml", case.slug()));
         // Paths start from the root: a case is the same bytes in any folder.
         let text = from_folder(&case.settings().unwrap_or_default(), Path::new("/"));
@@ -208,6 +209,7 @@ fn is_ours(results: &Value) -> bool {
 
 /// Returns the last words of a process that did not succeed.
 fn failure(status: ExitStatus, said: &str) -> String {
+    // The error is the last line; notes and progress come before it.
     let last = said.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or_default();
     #[cfg(unix)]
     {

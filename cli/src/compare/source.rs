@@ -116,6 +116,7 @@ impl Source {
             return Ok(output::read_text(&folder.join(path))?.into());
         }
         let wanted = path.to_string_lossy();
+        // Paths in a carried experiment start from its place in the repository, `experiments/`.
         let wanted = match wanted.strip_prefix("../") {
             Some(path) => path.to_owned(),
             None => format!("experiments/{wanted}"),

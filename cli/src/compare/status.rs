@@ -42,6 +42,7 @@ pub fn show(folder: &Path, cases: &[Case]) -> anyhow::Result<Answer> {
         if there.contains(&slug) && at.join(&slug).join("report.html").is_file() {
             State::Done
         } else if has("lock") && Lock::is_held(&one::lock_of(folder, case)) {
+            // The lock file outlives its process, the lock does not.
             State::Running
         } else if let Some(why) = case.early_error() {
             State::Failed(case.name(), why.to_owned())

@@ -113,6 +113,7 @@ impl<'a> Summary<'a> {
             (status, entry)
         };
         let mut all = Vec::with_capacity(cases.len());
+        // Whole results are in memory for one stretch at a time; of the others only numbers stay.
         let entries = cases.chunks(TOGETHER).flat_map(|some| {
             let read: Vec<_> = some.par_iter().map(read).collect();
             let (states, entries): (Vec<_>, Vec<String>) = read.into_iter().unzip();
@@ -151,6 +152,7 @@ impl<'a> Summary<'a> {
         let (first, _) = self.all.first()?;
         let places = levels.iter().map(|(factor, level)| first.place(factor, level));
         let mut places = places.collect::<Option<Vec<(usize, u32)>>>()?;
+        // One key for the same levels, in whatever order they are named.
         places.sort_unstable();
         places.dedup();
         let (factors, levels): (Vec<usize>, Vec<u32>) = places.into_iter().unzip();

@@ -46,6 +46,7 @@ impl Cell {
             Some(Self { spread: summary.spread(&asked.value, &here)?, best: Some(level.name) })
         };
         let all = experiment.levels(factor).into_iter().filter_map(cell);
+        // `best_of` is allowed only for results of which more is better.
         all.max_by(|a, b| a.spread.mean.total_cmp(&b.spread.mean))
     }
 
@@ -125,6 +126,7 @@ fn beside(
         let levels = experiment.levels(factor).into_iter().map(|level| level.name);
         (factor.clone(), levels.collect::<Vec<String>>())
     };
+    // Values count over all levels, some of which may not be shown.
     let every: Vec<(String, Vec<String>)> = asked.columns.iter().map(names).collect();
     let every = combinations(&every);
     let value = |column: &Vec<(&str, &str)>| {

@@ -65,6 +65,7 @@ pub fn velocities(text: &str) -> anyhow::Result<[Vec<[f64; 2]>; 2]> {
     let curve = |of: &FitFile| -> anyhow::Result<Vec<[f64; 2]>> {
         let velocity = setup::motion(of, Vec::new())?.velocity;
         let (low, high) = (file.region.r_min, file.region.r_max);
+        // A region may reach the centre, where r^(−3/2) has no value.
         let radius = |k: usize| (low + (high - low) * k as f64 / 99.0).max(1e-3);
         Ok((0..100).map(|k| [radius(k), velocity.rate(radius(k))]).collect())
     };

@@ -54,6 +54,7 @@ fn line(name: &str, points: Vec<[f64; 2]>) -> Series {
 
 /// Returns the prior of axes in any direction, at the inclinations that were looked at.
 fn prior(at: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    // Axes in any direction, dΩ ∝ sin i di, and just above 0 at the poles as in the search.
     let weight = |[degrees, _]: &[f64; 2]| degrees.to_radians().sin().max(1e-6);
     let all: f64 = at.iter().map(weight).sum();
     at.iter().map(|point| [point[0], weight(point) / all]).collect()

@@ -109,6 +109,7 @@ fn images(file: &FitFile, path: &Path) -> anyhow::Result<WithSize> {
     let kind = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     match kind.as_str() {
         "npz" => npz_frames(output::read_through(path)?).with_context(name),
+        // In Fortran order no image lies in one piece: such an array is read as a whole.
         "npy" if is_in_c_order(path)? => npy_frames(output::read_through(path)?).with_context(name),
         _ => {
             let Movie { grid, pixels } = movie(file, &files[0])?;
@@ -126,6 +127,7 @@ fn is_in_c_order(path: &Path) -> anyhow::Result<bool> {
 fn sequence(file: &FitFile, files: &[PathBuf]) -> anyhow::Result<WithSize> {
     let first = movie(file, &files[0])?.grid;
     let size = [first.width, first.height];
+    // Frames know errors of files alone: what is wrong with an image is kept aside.
     let mut refused = None;
     let frames = Frames::made(files.len(), first.pixels(), |sink| {
         files.iter().try_for_each(|path| match one(file, path, size) {
@@ -154,6 +156,7 @@ fn one(file: &FitFile, path: &Path, [width, height]: [usize; 2]) -> anyhow::Resu
 
 /// The movie of a file, which may know its field.
 fn movie(file: &FitFile, path: &Path) -> anyhow::Result<Movie> {
+    // Only pixels and their number are used: any field serves where none is given.
     let field = file.screen.field_uas.unwrap_or(1.0);
     let files = [path.to_owned()];
     let (movie, _) = movie_files::read(&files, Some(field)).or_else(|first| {

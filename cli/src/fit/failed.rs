@@ -30,6 +30,7 @@ pub fn told(error: anyhow::Error, folder: &Folder) -> anyhow::Error {
 /// A problem without a solution; wrong settings stay what they are.
 pub fn failed(error: Error) -> anyhow::Error {
     match error {
+        // It was the program's own before it passed through the library.
         Error::Kept(error) => anyhow::Error::from_boxed(error),
         error if has_no_solution(&error) => Failed(error.to_string()).into(),
         other => other.into(),

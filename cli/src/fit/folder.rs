@@ -66,6 +66,7 @@ impl Folder {
     pub fn open(path: &Path, patience: Duration) -> anyhow::Result<(Self, String)> {
         is_run(path)?;
         let lock = Lock::take(path, BUSY, patience)?;
+        // With the lock held nobody else writes here: every hidden file is a leftover.
         output::sweep(path, |_| true);
         Self::held(path, Some(lock))
     }

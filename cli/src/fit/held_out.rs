@@ -64,6 +64,7 @@ fn line_plot(
     points: Vec<[f64; 2]>,
     errors: Vec<f64>,
 ) -> LinePlot {
+    // A weight of 0 is allowed and has no place on a logarithmic axis.
     let log = points.iter().all(|[x, _]| *x > 0.0);
     LinePlot {
         title: title.to_owned(),

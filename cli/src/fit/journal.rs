@@ -78,6 +78,7 @@ impl kerrlight_tomo::fit::journal::Journal for Journal {
     fn keep(&self, key: u64, numbers: &[f64]) {
         let words: String = numbers.iter().map(|x| format!(" {:016x}", x.to_bits())).collect();
         let words = format!("{key:016x}{words}");
+        // A line is a single write: a kill cuts short the last one at most.
         let line = format!("{words} {:08x}\n", crc32fast::hash(words.as_bytes()));
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         // A full disk ends the notes, not the search.

@@ -44,6 +44,7 @@ const LOOSE: f64 = 0.5;
 pub fn statement(solution: &LinearSolution<f32>) -> String {
     let stopped = !matches!(solution.ending, Ending::Converged | Ending::Rounding);
     if let Some(certificate) = solution.certificate {
+        // The gap counts in losses of the dark field, which is 0 where dark explains the data.
         if !certificate.relative_gap().is_finite() {
             return "minimum of a convex problem: the dark field explains the data".to_owned();
         }

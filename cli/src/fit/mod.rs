@@ -111,6 +111,7 @@ impl Fit {
         if let Some(data) = &self.init {
             return init::write(data.as_deref(), self.output.as_deref(), self.model);
         }
+        // A device that is missing is told before any data are read.
         let device = self.device.open()?;
         if let Some(path) = &self.resume {
             let (folder, text) = Folder::open(path, self.patience())?;
@@ -129,17 +130,21 @@ impl Fit {
             return self.printed(&changed, guess.as_ref(), registry);
         }
         if let (Some(guess), Some(data)) = (&guess, &self.data) {
+            // After --set, which may give what nothing can be guessed of.
             guess.check(&text, data)?;
             eprint!("{text}\n{}", guess.sentences(&text));
         }
         let work = Work::read_changed(&changed)?;
+        // Told now, not after a fit of hours.
         if self.samples.is_some() {
             work.check_draws()?;
         }
+        // Checksums of all that is read tell a resumed run whether it is still the same.
         let (prepared, read) = output::with_reads(|| work.prepared(&base_dir, registry));
         let prepared = prepared?;
         prepared.check_device(device.as_ref())?;
         let text = Self::begun(&text, &base_dir);
+        // The folder comes last: refused settings and data leave none behind.
         let folder = match &self.output {
             Some(path) => path.clone(),
             None => Folder::unnamed()?,
@@ -263,6 +268,7 @@ impl Fit {
         let Some(path) = &self.file else { return Ok(()) };
         let given = output::read_text(path)?;
         if Work::read(&given)? != Work::read(text)? {
+            // The settings of a run have a line more at their head: where paths start from.
             let at = text.lines().skip(1).zip(given.lines()).position(|(a, b)| a != b);
             let line = at.map_or(String::new(), |k| format!(", first in line {}", k + 1));
             bail!("{} differs from the settings that the run began with{line}", path.display());

@@ -115,6 +115,7 @@ impl Survey {
 
     /// Counts a number.
     pub fn add(&mut self, value: f64) {
+        // One more than is shown tells that there are more.
         if self.first.len() <= SHOWN {
             self.first.push(value);
         }

@@ -42,6 +42,7 @@ fn counts(observation: &Observation) -> [usize; 2] {
     let baselines: BTreeSet<[u16; 2]> = rows
         .iter()
         .map(|row| {
+            // A baseline is the same in either order of its stations.
             if row.stations[0] < row.stations[1] {
                 row.stations
             } else {

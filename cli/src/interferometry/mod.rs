@@ -59,6 +59,7 @@ impl Written {
             ),
         };
         let format = asked.unwrap_or(by_name);
+        // Texts may have each other's endings, but no text is UVFITS.
         if (format == Written::Uvfits) != (by_name == Written::Uvfits) {
             bail!("output {}: its ending is not that of --format", path.display());
         }

@@ -36,6 +36,7 @@ pub fn files(argument: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let shown = argument.display();
     let name = argument.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let pattern = Pattern::parse(name);
+    // A file that exists is meant itself, even if its name looks like a pattern.
     if argument.exists() && !argument.is_dir() || !argument.is_dir() && pattern.is_none() {
         return Ok(vec![argument.to_owned()]);
     }
@@ -86,6 +87,7 @@ impl<'a> Pattern<'a> {
 
     fn fits(&self, name: &str) -> bool {
         let digits = |m: &str| !m.is_empty() && m.bytes().all(|b| b.is_ascii_digit());
+        // Hidden files are being written, or were left behind.
         !name.starts_with('.') && self.middle(name).is_some_and(|m| !self.digits || digits(m))
     }
 

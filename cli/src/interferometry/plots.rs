@@ -82,6 +82,7 @@ pub fn coverage(observation: &Observation, title: &str) -> (Vec<Plot>, Layout) {
 pub fn amplitudes(observation: &Observation, title: &str) -> (Vec<Plot>, Layout) {
     let points = observation
         .stokes_i()
+        // The axis of amplitudes is logarithmic.
         .filter(|(_, i)| i.visibility.norm() > 0.0)
         .map(|(row, i)| (row.time_h, (row.uv[0].hypot(row.uv[1]) / 1e9, i.visibility.norm())));
     let plots = by_time(points.collect(), 2.0).into_iter().map(Plot::from).collect::<Vec<_>>();

@@ -49,7 +49,8 @@ pub fn read(path: &Path, times_h: &[f64], reach: Reach) -> anyhow::Result<Stokes
         let rendered = render(&scene, assets.clone(), &|_| true).with_context(name)?;
         let factor = *first_factor.get_or_insert(rendered.summary.unit_factor);
         let channel = rendered.picture.channel("intensity").context("no intensity")?;
-        // Every picture has been scaled to the same flux: only the first is to be.
+        // Every picture has been scaled to the same flux: only the first is to be. Intensities
+        // are in Jy/µas², pixels of a movie in Jy.
         let scale = factor / rendered.summary.unit_factor * pixel_uas * pixel_uas;
         pixels.extend(channel.iter().map(|value| f64::from(*value) * scale));
         for (all, name) in polarized.iter_mut().zip(["Q", "U", "V"]) {

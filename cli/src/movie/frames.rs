@@ -64,6 +64,7 @@ impl Sequence {
     ) -> anyhow::Result<Self> {
         let Origin { name, text, files, device } = of;
         let plan = |time: &f64| -> anyhow::Result<Plan> {
+            // `:?` writes whole numbers with a point, so that TOML reads a float.
             let text = apply_override(text, &format!("observer.time={time:?}"))?;
             let scene = Scene::parse(&text).map_err(Error::without_line);
             let scene = scene.with_context(|| format!("{name} at the time {time} of a frame"))?;

@@ -69,6 +69,8 @@ impl Movie {
     pub fn run(&self) -> anyhow::Result<Answer> {
         let source = Source::new(Some(&self.scene))?;
         let (text, scene) = source.scene(&self.overrides)?;
+        // Each frame has a scene and a text of its own, made before any is rendered: a million of
+        // them may not fit into memory.
         let plans = f64::from(self.frames.all) * (2 * text.len() + 4096) as f64;
         memory::afford(|| format!("the settings of {} frames", self.frames.all), plans)?;
         let times = self.span.times(self.frames.all, &scene)?;
@@ -82,6 +84,7 @@ impl Movie {
                 self.frames.all
             );
         }
+        // A missing channel is told before the frames are rendered.
         if animations.any() {
             self.look.channels(&scene, &film.names())?;
         }

@@ -58,6 +58,7 @@ impl<'a> Rendering<'a> {
     }
 
     fn batch(&mut self, batch: &[usize]) -> anyhow::Result<()> {
+        // A guard for each batch: its words count the frames that are there by now.
         let keeper = SignalGuard::brief(self.there());
         let times: Vec<f64> = batch.iter().map(|k| self.sequence.time(*k)).collect();
         let frames = self.frames(&times, &keeper)?;

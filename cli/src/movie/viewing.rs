@@ -78,6 +78,7 @@ impl Animations {
             Some(white) => white,
             None => common_white(sequence, look)?,
         };
+        // Frames are read again one by one: a film need not fit into memory.
         let draw = |k: usize| {
             preview::draw(&sequence.read(k)?, look, white).context("cannot draw the frames")
         };
@@ -102,6 +103,7 @@ impl Animations {
             bar.inc(1);
         }
         bar.finish_and_clear();
+        // The encoder writes the end of the file as it goes.
         drop(gif);
         self.gif.as_ref().map_or(Ok(()), |output| output.write(&bytes))
     }

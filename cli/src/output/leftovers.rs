@@ -57,6 +57,7 @@ pub fn sweep_once(folder: &Path, name: &str) {
 
 /// Removes it unless somebody writes it. What is left behind does no harm.
 fn remove(path: &Path) {
+    // No leftover is a link, and the lock of a link would be that of the file it leads to.
     let is_link = std::fs::symlink_metadata(path).is_ok_and(|about| about.is_symlink());
     let lock = File::open(path).ok().filter(|file| !is_link && file.try_lock().is_ok());
     let Some(_lock) = lock else { return };

@@ -71,6 +71,7 @@ impl Render {
     pub fn run(&self) -> anyhow::Result<Answer> {
         let source = Source::new(self.scene.as_deref())?;
         let (text, scene) = source.scene(&self.all_overrides())?;
+        // Before the scene's files are read: none of them may be written over.
         let outputs = self.checked_outputs(&source)?;
         let files = assets::load(&scene, &source.folder, &outputs.all(), self.reach)?;
         source.compare(&files.identity);

@@ -64,6 +64,7 @@ impl Work<'_> {
 
     /// Renders what a preview needs.
     pub fn preview(&self, look: Option<Reduction>) -> anyhow::Result<(Summary, Option<Picture>)> {
+        // Without an EXR there is no place to resume from: the journal is in memory.
         let memory = Cursor::new(Vec::new());
         let (mut journal, _) = Journal::open(memory, "", self.raster.bands())?;
         let summary = self.fill(&mut journal, STOPPED).map_err(|error| match error {

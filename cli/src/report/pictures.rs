@@ -115,6 +115,7 @@ const GAP: usize = 4;
 impl Sheet {
     /// Brightness from 0 to `most`.
     fn new(cells: [usize; 2], n: usize, zoom: usize, most: f32) -> Self {
+        // Dark images have no scale of their own.
         let ends = [0.0, most.max(f32::MIN_POSITIVE)];
         Self::colored(cells, n, zoom, ends, Colormap::Inferno)
     }
@@ -171,6 +172,7 @@ impl<'a> Strip<'a> {
 /// Frames of a strip, of so many.
 fn chosen(all: usize) -> Vec<usize> {
     let count = all.min(STRIP);
+    // With the first and the last.
     (0..count).map(|k| k * (all - 1) / (count.max(2) - 1)).collect()
 }
 
@@ -228,6 +230,7 @@ pub fn residuals(maps: &[(&str, &Vec<f32>)], n: usize, what: &str) -> anyhow::Re
 /// An image of n × n pixels with `zoom` times as many along each side, linear between the centres of its own.
 pub fn enlarged(image: &[f32], n: usize, zoom: usize) -> Vec<f32> {
     let last = n.saturating_sub(1);
+    // Beyond the centres of the outer pixels their own values go on.
     let place = |k: usize| ((k as f32 + 0.5) / zoom as f32 - 0.5).clamp(0.0, last as f32);
     let at = |row: f32, column: f32| {
         let (i, j) = (row as usize, column as usize);

@@ -124,6 +124,7 @@ impl Drawn<'_> {
         let last = (0.5 * self.field_uas / step) as i32;
         for offset in (-last..=last).map(|k| f64::from(k) * step) {
             let text = format!("{offset}").replace('-', "−");
+            // East is left and north up: both offsets run against those of the canvas.
             let across = x + 0.5 * side - self.pixels(offset);
             let down = y + 0.5 * side - self.pixels(offset);
             let foot = y + side;
@@ -210,6 +211,7 @@ impl Drawn<'_> {
         for value in (0..).map(|k| f64::from(k) * step).take_while(|v| *v <= factor * most) {
             let height = y + side * (1.0 - value / (factor * most));
             canvas.line(&[[x + 12.0, height], [x + 16.0, height]], false, 1.0, BLACK);
+            // As many digits as the step has.
             let digits = (-step.log10().floor()).max(0.0) as usize;
             let text = format!("{value:.digits$}");
             canvas.text(&text, [x + 19.0, height + 4.0], TEXT, Align::Left, BLACK);

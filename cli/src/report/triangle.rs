@@ -78,6 +78,7 @@ impl Triangle {
         let all = || values.iter().copied().chain(*truth);
         let (low, high) =
             (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
+        // Draws that are all alike still need a range.
         let margin = 0.08 * (high - low).max(1e-9 * high.abs()).max(1e-12);
         [low - margin, high + margin]
     }

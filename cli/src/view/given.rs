@@ -81,6 +81,7 @@ fn times(subject: &Subject, reach: f64) -> Option<[f64; 2]> {
     let orbits = scene.spot.iter().map(|spot| spot.radius);
     let radius = orbits.fold(0.5 * reach * f64::from(u8::from(!scene.volume.is_empty())), f64::max);
     let start = scene.observer.time;
+    // The Keplerian period 2π r^(3/2), without the spin.
     scene.changes().then(|| [start, start + core::f64::consts::TAU * radius.powf(1.5)])
 }
 
@@ -106,6 +107,7 @@ fn shades(scene: &Scene) -> Option<Vec<u8>> {
     let temperature = |k: usize| peak * (9.0 * k as f64 / 511.0 - 6.0).exp();
     let colors: Vec<[f32; 3]> = (0..512).map(|k| body.color(temperature(k))).collect();
     let channels = (0..3).flat_map(|channel| colors.iter().map(move |color| color[channel]));
+    // A component that is 0 has a logarithm, too.
     Some(channels.flat_map(|x| x.max(1e-30).ln().to_le_bytes()).collect())
 }
 

@@ -87,6 +87,7 @@ fn law(source: &VolumeSource, turns: Option<&AngularVelocity>, reach: f64) -> Va
             json!({ "power": { "radius": radius, "rate": rate, "exponent": exponent } })
         }
         (_, Some(turns)) => {
+            // Equal ratios, from inside any horizon to just beyond the volume.
             let ratio = (1.01 * reach.max(1.0) / 0.5).ln() / 1023.0;
             let radii: Vec<f64> = (0..1024).map(|k| 0.5 * (ratio * f64::from(k)).exp()).collect();
             let rates: Vec<f64> = radii.iter().map(|r| turns.rate(*r)).collect();
@@ -121,6 +122,7 @@ impl Texture {
 
     /// Half floats, x fastest, of emission over the largest.
     pub fn bytes(&self) -> Vec<u8> {
+        // A dark volume has no largest value to divide by.
         let largest = self.volume.values().iter().copied().fold(f32::MIN_POSITIVE, f32::max);
         self.volume.x_fastest().flat_map(|value| half(value / largest).to_le_bytes()).collect()
     }

@@ -44,6 +44,7 @@ fn shared_exponent(color: [f32; 3]) -> u32 {
     if (most * 2f32.powi(24 - exponent)).round() > 511.0 {
         exponent += 1;
     }
+    // The bias of exponents, 15, and nine bits of a mantissa below the point.
     let scale = 2f32.powi(24 - exponent);
     let bits = color.map(|x| (x.clamp(0.0, most) * scale).round() as u32);
     bits[0] | bits[1] << 9 | bits[2] << 18 | (exponent as u32) << 27

@@ -120,13 +120,16 @@ impl<W: Write + Seek> ArchiveWriter<W> {
     ) -> Result<(), Error> {
         let count = shape.iter().fold(size_of::<T>() as u64, |bytes, n| bytes.saturating_mul(*n));
         let options = zip::write::SimpleFileOptions::default();
+        // An entry beyond 4 GiB needs the 64-bit format, chosen before its data are written.
         let options = options.large_file(count >= u64::from(u32::MAX) / 2);
         self.0.start_file(format!("{name}.npy"), options).map_err(std::io::Error::from)?;
+        // npyz writes number by number, too few bytes at a time for a compressor.
         let mut buffer = BufWriter::with_capacity(1 << 16, &mut self.0);
         let options = npyz::WriteOptions::new().default_dtype().shape(shape);
         let mut array = options.writer(&mut buffer).begin_nd()?;
         fill(&mut |values: &[T]| Ok(array.extend(values.iter().copied())?))?;
         array.finish()?;
+        // A buffer that is dropped would hide its error.
         Ok(buffer.flush()?)
     }
 

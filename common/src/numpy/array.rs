@@ -68,6 +68,7 @@ fn in_c_order(shape: &[u64], values: &[f64]) -> Vec<f64> {
     let mut index = vec![0; shape.len()];
     let mut ordered = Vec::with_capacity(values.len());
     for _ in 0..values.len() {
+        // In the file the first index runs fastest: strides grow from the front.
         let at = index.iter().zip(&shape).rev().fold(0, |at, (k, n)| at * n + k);
         ordered.push(values[at]);
         for (k, n) in index.iter_mut().zip(&shape).rev() {
@@ -150,11 +151,13 @@ fn each_number<R: Read, E: From<Error>>(
         let damaged = |message: String| Error::from(NumpyError::content(message));
         let header = file.header().clone();
         let shape = header.shape().to_vec();
+        // Lent to the array, so that what lies behind it can be read.
         let mut rest = file.into_inner();
         let file = npyz::NpyFile::with_header(header, &mut rest);
         for x in file.data::<T>().map_err(|error| damaged(error.to_string()))? {
             take(value(x.map_err(|error| damaged(error.to_string()))?))?;
         }
+        // Finds bytes that the shape does not count, and has an archive compare its checksum.
         match rest.read(&mut [0]) {
             Ok(0) => Ok(()),
             Ok(_) => {

@@ -30,12 +30,14 @@ fn reduced<T: Float, V: Lanes<T>>(x: V, n: V, pieces: &[T]) -> V {
 /// The nearest integer, for |x| below 2^22 (f32), 2^51 (f64).
 #[inline(always)]
 pub fn round<T: Float, V: Lanes<T>>(x: V) -> V {
+    // Floats of this size are whole numbers: the sum is rounded to one.
     (x + V::splat(T::ROUNDER)) - V::splat(T::ROUNDER)
 }
 
 /// ⌊n/2⌋ of integers and the remainder.
 #[inline(always)]
 fn halve<T: Float, V: Lanes<T>>(n: V) -> (V, V) {
+    // A half less leaves every quotient a quarter from a whole number: there are no ties.
     let half = round((n - V::splat(T::of(0.5))) * V::splat(T::of(0.5)));
     (half, n - (half + half))
 }
@@ -45,10 +47,12 @@ fn halve<T: Float, V: Lanes<T>>(n: V) -> (V, V) {
 fn near_sin_cos<T: Float, V: Lanes<T>>(x: V) -> (V, V) {
     let s = V::splat;
     let far = s(T::FAR);
+    // Beyond `FAR` multiples of the pieces are not exact. In this order a NaN stays one.
     let x = far.min(s(-T::FAR).max(x));
     let quarter = round(x * s(T::TWO_OVER_PI));
     let r = reduced(x, quarter, &T::HALF_PI);
     let z = r * r;
+    // The largest part comes last, so that it is rounded once.
     let sin = (polynomial(T::SIN, z) * z).mul_add(r, r);
     let cos = (z * z).mul_add(polynomial(T::COS, z), z.mul_add(s(T::of(-0.5)), s(T::one())));
     let (half, odd) = halve::<T, V>(quarter);
@@ -92,6 +96,7 @@ fn patch<T: Float, V: Lanes<T>>(x: V, sin: V, cos: V) -> (V, V) {
 pub fn exp<T: Float, V: Lanes<T>>(x: V) -> V {
     let s = V::splat;
     let x = s(T::HELD).min(s(-T::HELD).max(x)); // a NaN stays one
+    // |n| is 126 (f32), 1021 (f64) at most: 2ⁿ is a normal number.
     let n = round(x * s(T::LOG2_E));
     let r = reduced(x, n, &T::LN_2);
     let e = (r * r).mul_add(polynomial(T::EXP, r), r) + s(T::one());
@@ -110,6 +115,7 @@ pub fn sigmoid<T: Float, V: Lanes<T>>(x: V) -> V {
 pub fn softplus<T: Float, V: Lanes<T>>(x: V) -> V {
     let zero = V::splat(T::zero());
     let e = exp((zero - x).min(x)); // −|x|
+    // ln(1 + e) = 2 artanh(e/(2 + e)), where 1 + e would drop the digits of a small e.
     let s = e / (e + V::splat(T::of(2.0)));
     let z = s * s;
     (polynomial(T::LOG, z) * z).mul_add(s, s + s) + zero.max(x)

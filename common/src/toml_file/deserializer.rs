@@ -167,6 +167,7 @@ impl<'de> Deserializer<'de> for Value<'_> {
     }
 
     fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {
+        // TOML has no null: a key that stands there has a value.
         visitor.visit_some(self)
     }
 

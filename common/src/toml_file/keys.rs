@@ -94,6 +94,7 @@ impl OutOfRange {
 
 impl Range {
     fn has(&self, number: f64) -> bool {
+        // Above a least value alone, infinity says that there is no limit.
         number >= self.least.unwrap_or(f64::MIN)
             && (number <= self.most.unwrap_or(f64::MAX)
                 || (self.least.is_some() && self.most.is_none() && !number.is_nan()))
@@ -279,6 +280,7 @@ impl Keys {
         };
         let ranges = || parts.iter().filter(|part| is_number(part.schema)).map(|part| &part.range);
         let mut all = ranges();
+        // Keys without a number in the schema are a user's own, or refused where settings are read.
         match all.next() {
             Some(first) if !first.has(number) && !all.any(|range| range.has(number)) => {
                 Err(OutOfRange { key: key.clone(), value: number, range: first.clone() })

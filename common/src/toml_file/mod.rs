@@ -47,6 +47,7 @@ pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, ReadError> {
 /// # Errors
 /// Those of [`read`], without a line.
 pub fn read_table<T: DeserializeOwned>(table: &Table) -> Result<T, ReadError> {
+    // By way of text, so that no type is compiled for a second deserialiser.
     let text = table.to_string();
     let table = DeTable::parse(&text).map_err(|error| ReadError::syntax(&error))?;
     T::deserialize(deserializer::Root(&table))

@@ -36,6 +36,7 @@ fn value(value: impl Into<Value>) -> Written {
 fn under(variant: Option<&'static str>, item: Item) -> Item {
     let Some(name) = variant else { return item };
     let mut table = Table::new();
+    // As `[law.infall]` names both, `law` needs no heading of its own.
     table.set_implicit(true);
     table.insert(name, item);
     Item::Table(table)

@@ -61,6 +61,7 @@ fn join(all: &mut FitData, names: (&str, &str), part: FitData, file: usize) -> R
         amplitude_sigma.extend(more.amplitude_sigma);
     }
     if let Some(LeakageUnknown { shared, .. }) = &mut all.leakage {
+        // Leakage is looked up by the number of a station among those of all files.
         *shared = SharedLeakage::none(seen.stations.len());
     }
     Ok(())
@@ -111,6 +112,7 @@ fn contradiction(a: &Observation, b: &Observation) -> Option<String> {
     }
     match (a.position, b.position) {
         (Some(here), Some(there)) => {
+            // The short way round: right ascensions on both sides of 0 h are neighbours.
             let turn = (here.ra_hours - there.ra_hours + 12.0).rem_euclid(24.0) - 12.0;
             let east = 15.0 * turn * here.dec_deg.to_radians().cos();
             if east.hypot(here.dec_deg - there.dec_deg) > SAME_DEG {

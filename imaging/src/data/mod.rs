@@ -117,6 +117,7 @@ fn polarized_errors(
         // Half of the sum of two hands has the error that the law says.
         let hands = row.parts_of_i(basis).iter().flatten().count().max(1) as f64;
         let of_light = has_intrinsic_variability(of_light) * hands.sqrt();
+        // √2: both stations of a baseline leak, and not the same.
         let leaked = SQRT_2 * polarization.leakage_left * light;
         let of_polarized =
             share * has_intrinsic_variability(polarization.variability).hypot(leaked);

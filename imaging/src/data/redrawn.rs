@@ -72,6 +72,8 @@ fn other_amplitudes(
         let station = names.iter().position(|name| *name == gain.station);
         let sigma = station.map_or(0.0, |k| priors.amplitude_sigma[k]);
         let off: f64 = random.sample(StandardNormal);
+        // In place of the fitted amplitude: fitted ones are pulled to 1 and scatter too little, and
+        // a draw on top of them would have twice the prior's variance.
         gain.gain = ((sigma * off).exp() / gain.gain.norm()).into();
     }
     others

@@ -79,6 +79,7 @@ impl PolarizedProblem<'_> {
         let (side, mean) = (self.side, self.light.iter().sum::<f64>() / self.light.len() as f64);
         let mut value = 0.0;
         let mut pair = |j: usize, k: usize| {
+            // Spacings cancel: |Δm|²/h² times the area h² of a pixel.
             let weight = self.smoothness * 0.5 * (self.light[j] + self.light[k]) / mean;
             for part in 0..2 {
                 let step = m[j][part] - m[k][part];

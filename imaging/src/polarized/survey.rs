@@ -104,6 +104,7 @@ pub fn survey_polarized(
         },
         |_, _| {},
     )?;
+    // A round finds leakage after its image: the last leakage has no image yet.
     if leakage.is_some() {
         found = strength(best);
     }

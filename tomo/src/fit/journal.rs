@@ -28,6 +28,7 @@ impl Journal for Forgetful {
 
 /// The key of something: the same in every process of the same program.
 pub(crate) fn key(of: impl Hash) -> u64 {
+    // Its keys are fixed, unlike those of a `RandomState`.
     let mut hasher = DefaultHasher::new();
     of.hash(&mut hasher);
     hasher.finish()

@@ -109,7 +109,9 @@ impl Adam {
         let power = |beta: f64| beta.powf(steps as f64);
         Constants {
             beta: [self.beta1, self.beta2].map(T::of),
+            // In double precision: 1 − 0.999 in single is wrong in the fifth digit.
             rest: [1.0 - self.beta1, 1.0 - self.beta2].map(T::of),
+            // Moments that begin at 0 are too small by 1 − βᵗ.
             unbiased: [self.beta1, self.beta2].map(|beta| T::of(1.0 / (1.0 - power(beta)))),
             rate: T::of(rate),
             epsilon: T::of(self.epsilon),

@@ -81,6 +81,7 @@ struct Pairs<'a, T> {
 impl<T: Float> Pairs<'_, T> {
     /// The pair of `age` (0: newest).
     fn pair(&self, age: usize) -> (&[T], &[T]) {
+        // + memory, so that nothing is taken below 0.
         let slot = (self.pairs as usize + self.memory - 1 - age) % self.memory;
         let range = slot * self.count..(slot + 1) * self.count;
         (&self.steps[range.clone()], &self.differences[range])
@@ -99,6 +100,7 @@ impl<T: Float> Pairs<'_, T> {
         }
         if self.kept() > 0 {
             let (s, y) = self.pair(0);
+            // Scale of the first matrix, from the newest pair (equation 7.20).
             let scale = T::of(dot(s, y) / dot(y, y));
             g.iter_mut().for_each(|x| *x *= scale);
         }
@@ -126,6 +128,7 @@ impl<T: Float> Pairs<'_, T> {
     /// Takes up a pair whose curvature is positive.
     fn push(&mut self, step: &[T], difference: &[T]) -> u64 {
         let curvature = dot(step, difference);
+        // Directions are divided by the curvature: one of the size of rounding would spoil them.
         if curvature > f64::EPSILON * dot(difference, difference) {
             let slot = self.pairs as usize % self.memory;
             let range = slot * self.count..(slot + 1) * self.count;
@@ -158,6 +161,7 @@ impl Lbfgs {
         if !value.is_finite() || !slope.is_finite() {
             return Step::NotFinite;
         }
+        // A gradient has no length of its own: the first trial moves the parameters by 1 in all.
         let first = if pairs.pairs == 0 { 1.0 / slope.abs().sqrt() } else { 1.0 };
         let (mut trial, mut trial_gradient) = (parameters.to_vec(), vec![T::zero(); count]);
         let mut evaluations = 0;
@@ -168,10 +172,12 @@ impl Lbfgs {
             let value = objective(&trial, &mut trial_gradient);
             Point { length, value, slope: dot(&trial_gradient, &direction) }
         };
+        // Values for quasi-Newton steps (Nocedal & Wright 2006, section 3.1).
         let wolfe = Wolfe { decrease: 1e-4, curvature: 0.9, evaluations: self.evaluations };
         let start = Point { length: 0.0, value, slope };
         let found = if slope < 0.0 { wolfe.search(start, first, evaluate) } else { None };
         let Some(at) = found else { return Step::NoDescent };
+        // The step as it was rounded, not as it was meant: the gradients are those of its two ends.
         direction.iter_mut().zip(&trial).zip(&*parameters).for_each(|((d, t), p)| *d = *t - *p);
         gradient.iter_mut().zip(&trial_gradient).for_each(|(g, t)| *g = *t - *g);
         state.pairs = pairs.push(&direction, gradient);

@@ -39,6 +39,7 @@ impl Wolfe {
         for used in 1..=self.evaluations {
             let at = evaluate(length);
             let left = self.evaluations - used;
+            // The loss is not defined so far out: back towards a point where it is.
             if !at.value.is_finite() || !at.slope.is_finite() {
                 length = 0.5 * (before.length + at.length);
                 continue;
@@ -50,6 +51,7 @@ impl Wolfe {
                 return Some(at);
             }
             if at.slope >= 0.0 {
+                // Beyond a minimum, and lower than the point before: the better end comes first.
                 return self.zoom(start, at, before, left, evaluate);
             }
             (before, length) = (at, 2.5 * at.length);
@@ -68,6 +70,7 @@ impl Wolfe {
     ) -> Option<Point> {
         for _ in 0..evaluations {
             let at = evaluate(between(low, high));
+            // A loss that is not a number decreases nothing, and becomes the far end.
             if !self.decreases(start, at) || at.value >= low.value {
                 high = at;
             } else {
@@ -80,7 +83,8 @@ impl Wolfe {
                 low = at;
             }
         }
-        // Enough of a decrease will do, if it is the point at hand.
+        // Enough of a decrease will do. It is evaluated again, since the caller takes the gradient
+        // of the last point.
         let last = evaluate(low.length);
         (low.length > 0.0 && self.decreases(start, last)).then_some(last)
     }
@@ -89,9 +93,12 @@ impl Wolfe {
 /// Minimum of the cubic through both ends, kept a tenth away from them.
 fn between(a: Point, b: Point) -> f64 {
     let width = b.length - a.length;
+    // Nocedal & Wright 2006, equation 3.59.
     let d1 = a.slope + b.slope - 3.0 * (a.value - b.value) / (a.length - b.length);
     let d2 = (d1 * d1 - a.slope * b.slope).sqrt() * width.signum();
     let part = 1.0 - (b.slope + d2 - d1) / (b.slope - a.slope + 2.0 * d2);
+    // In the middle where an end is not finite or the cubic has no minimum; elsewhere away from
+    // both ends, so that the interval always shrinks.
     let part = if part.is_finite() { part.clamp(0.1, 0.9) } else { 0.5 };
     a.length + part * width
 }

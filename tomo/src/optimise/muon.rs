@@ -98,6 +98,7 @@ fn orthogonal<T: Float>(mut x: Vec<T>, rows: usize, columns: usize) -> Vec<T> {
     if norm == 0.0 {
         return x;
     }
+    // No singular value exceeds this norm, and the iteration needs values of at most 1.
     x.iter_mut().for_each(|x| *x = T::of(x.double() / norm));
     let (of, side) = (Shape::by_rows(rows, columns), rows.min(columns));
     let square = Shape::by_rows(side, side);

@@ -104,6 +104,7 @@ impl Evidence<'_> {
                 None => Errors::Stated,
             };
             let mut tested = Tested::gaussian(statistics, errors);
+            // Draws of noise say nothing about data that have none.
             if tested.errors != Errors::Weight
                 && let Some(model) = &model
                 && let Some(draws) = self.draws(loss, model)
@@ -145,6 +146,7 @@ impl Evidence<'_> {
         let (mut count, mut weights, mut sums) = (0, 0.0, [0.0; 2]);
         for (row, frame) in observation.rows.iter().zip(frames) {
             let Some(i) = row.stokes_i(observation.basis) else { continue };
+            // A row without an error would have all the weight.
             if row.uv[0].hypot(row.uv[1]) > shortest || i.noise_sigma <= 0.0 {
                 continue;
             }

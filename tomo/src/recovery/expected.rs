@@ -65,6 +65,7 @@ impl Evidence<'_> {
             return None;
         }
         let draw = |k: u64| {
+            // Noise of simulated data has the seed itself: draws must not repeat it.
             let drawn = redrawn(observation, model, self.seed.wrapping_add(1000 + k));
             statistics(&drawn, frames, loss, model)
         };

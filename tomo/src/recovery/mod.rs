@@ -136,9 +136,11 @@ pub fn fit_with<R, E: From<Error>>(
         None => {
             progress.starts()?;
             fit.start(&mut state, motion, times, progress)?;
+            // An interrupted fit need not find again what its start has found.
             progress.save(&state)?;
         }
     }
+    // A linear grid is solved for at the start.
     if file.representation.kind != Kind::LinearGrid {
         fit.steps(&mut state, progress)?;
     }

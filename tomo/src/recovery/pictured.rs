@@ -52,6 +52,7 @@ impl Fit<'_, '_> {
         if let Some(found) = objective.not_finite(frames, movie)? {
             return Err(Error::Failed(named(found)));
         }
+        // A convex χ² may be least in the dark; other data have no slope there to leave it by.
         if !self.file.is_convex() && is_dark(movie)? {
             let data = objective.names().join(", ");
             return Err(Error::Failed(format!(

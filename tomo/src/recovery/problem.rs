@@ -91,6 +91,7 @@ impl Problem {
         let motion = setup::motion(&settings, measured.times.clone())?;
         let mut problem = Self { settings, registry, instrument, measured, motion, rays: None };
         problem.check()?;
+        // After all checks: choosing rays takes the solution of linear problems.
         problem.resolve()?;
         Ok(problem)
     }

@@ -79,6 +79,8 @@ pub(super) fn placed(
         (Some(choice), ..) => (choice, None),
         (None, Stage::Geometry, Some(unknown)) => {
             let found = geometry(problem, unknown, progress)?;
+            // The fit goes on with what is kept, not with what was found: a resumed fit then has
+            // the same bits.
             let choice = progress.keep(&Found::Geometry(problem, unknown, &found))?;
             (choice, Some(Searched::Geometry(Box::new(found))))
         }
@@ -109,6 +111,7 @@ fn band(problem: &Problem, progress: &mut dyn Progress) -> Result<BandScan, Erro
     let Problem { settings, measured, .. } = problem;
     let Some(band) = &settings.band else { return Err(Stopped::Kept.into()) };
     let journal = progress.journal()?;
+    // Geometries are weighed by several threads, each of which tells.
     let told = Mutex::new(&mut *progress);
     let watch =
         |done: usize| told.lock().unwrap_or_else(PoisonError::into_inner).goes_on(At::Band(done));
@@ -166,6 +169,7 @@ pub fn settled(file: &FitFile, geometry: &Geometry) -> FitFile {
             *quantity = (geometry.get(parameter) / parameter.unit()).into();
         }
     }
+    // A search is refused where nothing has a prior.
     file.search = None;
     file
 }

@@ -36,6 +36,7 @@ fn scan(
     let stopped = || Error::from(Stopped::Lost("axes were being scanned"));
     let view = CoarseView::new(file, measured, pixels)?;
     let settings = AxisSettings { directions, ..AxisSettings::default() };
+    // Axes are compared by several threads, each of which tells.
     let told = Mutex::new(progress);
     let watch = |solved: usize, expected: usize| {
         let mut progress = told.lock().unwrap_or_else(PoisonError::into_inner);
@@ -113,6 +114,7 @@ fn solve_linear(
     };
     let objective = &mut trainer.objective;
     let mut solution = None;
+    // Two closures tell, and `progress` can be borrowed by one: the lock lends it to either.
     let told = Mutex::new(&mut *progress);
     let tell = |event: Event<'_>| told.lock().unwrap_or_else(PoisonError::into_inner).found(event);
     let images = || -> Result<Vec<f32>, Error> {
@@ -130,6 +132,7 @@ fn solve_linear(
         }
         let parameters = &found.parameters();
         let field = Field { representation, parameters, axis, occupancy: None };
+        // The images are for the leakage: without it none are computed.
         let frames: Vec<usize> = match measured.leakage {
             Some(_) => (0..measured.times.len()).collect(),
             None => Vec::new(),
@@ -140,6 +143,7 @@ fn solve_linear(
         solution = Some(found);
         Ok(movie)
     };
+    // `rounds` returns nothing: its error waits until the rounds are over.
     let mut refused = Ok(());
     let rounds = |round: usize, found: &SolvedLeakage| {
         refused = tell(Event::Round(round, found));

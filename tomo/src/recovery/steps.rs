@@ -26,6 +26,7 @@ impl Fit<'_, '_> {
             self.solve_leakage(state, progress)?;
             let outcome = match self.trainer.step(state) {
                 Ok(outcome) => outcome,
+                // The step was not taken: any device may go on from this state.
                 Err(Error::Device(error)) => {
                     progress.save(state)?;
                     return Err(error.into());
@@ -57,6 +58,8 @@ impl Fit<'_, '_> {
             is_known && file.loss.iter().all(linear) && self.trainer.training.axis_rate.is_none();
         let weights: f64 = file.loss.iter().map(|loss| loss.weight).sum();
         let step = state.now.step;
+        // The loss is Σ weight · χ²/N. Above Σ weight data are not followed closely on the whole,
+        // and the images of all frames need not be computed.
         let may_follow = step > 0 && step.is_multiple_of(COMPARED) && state.now.loss < weights;
         if !tells || !may_follow {
             return Ok(false);
@@ -94,6 +97,7 @@ impl Fit<'_, '_> {
 /// Steps of training from one solution for the leakage to the next; none where it is not solved for.
 fn interval(file: &FitFile) -> Option<u64> {
     let settings = file.instrument.as_ref()?.leakage?;
+    // One interval more than solutions: steps follow the last one, too.
     Some(file.training.steps.div_ceil(settings.rounds as u64 + 1).max(1))
 }
 

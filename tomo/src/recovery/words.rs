@@ -102,6 +102,7 @@ impl DataVerdict {
 
 /// The expected χ² per datum: `1.00 ± 0.02`, or `0.74 to 1.00 ± 0.02` where parameters may have used up a quarter of the data.
 pub fn range_of(Expected { chi2, spread, taken, .. }: &Expected) -> String {
+    // Less does not show in two digits.
     let least =
         if *taken >= 5e-3 { format!("{:.2} to ", chi2 * (1.0 - taken)) } else { String::new() };
     format!("{least}{chi2:.2} ± {spread:.2}")

@@ -44,10 +44,12 @@ impl Knots {
     /// If the spacing is not above 0, or there would be more than 10,000.
     pub fn between([from, to]: [f64; 2], spacing: f64, allowed: Allowed) -> Result<Self, Error> {
         let steps = ((to - from) / spacing).ceil();
+        // Negated, so that a NaN is refused too.
         if !(spacing > 0.0 && steps.is_finite() && steps < 10_000.0) {
             let allowed = "above 0, with at most 10,000 in the time of the data";
             return Err(Error::out_of_range("spacing of knots", spacing, allowed));
         }
+        // Data of one moment have two knots, too, a whole spacing apart: shares divide by it.
         let steps = (steps as usize).max(1);
         let spacing = (to - from).max(spacing) / steps as f64;
         Ok(Self { first: from, spacing, count: steps + 1, allowed })
@@ -82,6 +84,7 @@ impl Knots {
         let per_time = T::of(1.0 / self.spacing);
         let u = (time - T::of(self.time(knot))) * per_time;
         let (first, last) = (knot == 0, knot + 1 == self.count);
+        // Half-open, so that at a knot's own time one slope counts, that of its rise.
         let rises = !first && u > -one && u <= zero;
         let falls = !last && self.allowed == Allowed::Any && u > zero && u < one;
         if rises {
@@ -171,6 +174,7 @@ impl<T: Float> Changing<T> {
         let label = self.knots.label_time(knot);
         for (k, t) in time.iter().enumerate() {
             let share = self.knots.share(knot, *t);
+            // Without a share an evaluation would be for nothing.
             if share == (T::zero(), T::zero()) {
                 continue;
             }
@@ -199,6 +203,7 @@ impl<T: Float> Changing<T> {
         into: &mut CoordinatesMut<'_, T>,
     ) {
         let [time, to @ ..] = into.columns() else { panic!("points in time and space") };
+        // `slopes` hold cotangent and share already, the growth of the share holds neither.
         let grown = |at: usize| cotangents[part.points[at]] * values[at] * part.share[at].1;
         let Some(carrier) = &self.carrier else {
             for (at, k) in part.points.iter().enumerate() {
@@ -210,6 +215,8 @@ impl<T: Float> Changing<T> {
         let (angles, places) = part.pull_vjp(carrier.axis, slopes);
         for (at, k) in part.points.iter().enumerate() {
             let (place, elapsed) = (part.place[at], part.elapsed[at]);
+            // The place at the label time is R(angle(r, t)) stretch(r, t) x: both factors depend on
+            // the radius and on the time.
             let r = norm(place);
             let [stretch, _] = carrier.velocity.step_back(r, elapsed);
             let [by_radius, by_time] = carrier.velocity.step_back_slopes(r, elapsed);
@@ -217,6 +224,7 @@ impl<T: Float> Changing<T> {
             let of_stretch: f64 = (0..3).map(|c| of_place[c] * place[c]).sum();
             let along = |by: [f64; 2]| of_stretch * by[0] + angles[at].double() * by[1];
             time[*k] += T::of(grown(at).double() + along(by_time));
+            // At the centre the radius has no direction to change along.
             let of_radius = if r > 0.0 { along(by_radius) / r } else { 0.0 };
             for (c, to) in to.iter_mut().enumerate() {
                 to[*k] += T::of(stretch * of_place[c] + of_radius * place[c]);
@@ -253,6 +261,7 @@ impl<T: Float> Part<T> {
         let [stretch, angle] = carrier.velocity.step_back(r, elapsed);
         let [least, most] = carrier.limits;
         let inside = stretch * r >= least && stretch * r <= most;
+        // Matter on circles keeps the radius by which its nodes were chosen.
         if carrier.velocity.falling().is_some() && !inside {
             return;
         }
@@ -327,6 +336,7 @@ impl<T: Float> Representation<T> for Changing<T> {
     fn initialise(&self, seed: u64, parameters: &mut [T]) {
         let (first, others) = parameters.split_at_mut(self.inner.parameters());
         self.inner.initialise(seed, first);
+        // All knots start alike, as emission that does not change.
         others.chunks_exact_mut(first.len()).for_each(|knot| knot.copy_from_slice(first));
     }
 
@@ -377,6 +387,7 @@ impl<T: Float> Representation<T> for Changing<T> {
                 self.inner.vjp(own, part.coordinates(), &inner, gradient, workspace);
                 continue;
             };
+            // Slopes with the time need the field itself; parameters alone do not.
             let mut values = vec![T::zero(); part.points.len()];
             let mut slopes: [Vec<T>; 3] = core::array::from_fn(|_| values.clone());
             self.inner.eval(own, part.coordinates(), &mut values, workspace);

@@ -296,6 +296,7 @@ fn threads(subject: &Subject<'_>) {
 fn linked(subject: &Subject<'_>) {
     let draw = subject.draw(5_000, 7);
     let starts: Vec<usize> = (0..).map(|k| 31 * k + k % 3).take_while(|p| *p < 5000).collect();
+    // The last group is empty, as that of a ray that misses the region.
     let starts = [starts, vec![5000, 5000]].concat();
     let link = |groups: core::ops::Range<usize>, values: &[f64], cotangents: &mut [f64]| {
         assert!(starts[groups.end] - starts[groups.start] == values.len());

@@ -42,6 +42,7 @@ impl<T: Copy + Default> Lines<T> {
         self.length = length;
         if self.numbers.len() < length + LINE {
             self.numbers = vec![T::default(); length + LINE];
+            // `align_offset` may answer usize::MAX; unaligned numbers are slower, not wrong.
             self.start = self.numbers.as_ptr().align_offset(LINE).min(LINE);
         }
     }

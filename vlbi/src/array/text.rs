@@ -15,6 +15,7 @@ pub fn parse(text: &str) -> Result<Array, Error> {
     for (index, line) in text.lines().enumerate() {
         let line_of = |message: String| ArrayError::Line { line: index + 1, message };
         let line = line.split('#').next().unwrap_or_default();
+        // More than a station has: enough to refuse a line, however long it is.
         let cells: Vec<&str> = line.split_whitespace().take(15).collect();
         let heading = cells.first().is_none_or(|name| name.eq_ignore_ascii_case("site"));
         if heading {

@@ -65,6 +65,7 @@ impl<T: Float> Scan<T> {
             c.legs.iter().map(|leg| (leg.visibility, T::of(leg.sign.into()))).collect()
         };
         let precision: Vec<T> = inverse.iter().map(|x| T::of(*x)).collect();
+        // The inverse of tiny variances may overflow single precision.
         if precision.iter().any(|x| !x.is_finite()) {
             return Err(DataTermError::Singular(set.time_h));
         }

@@ -56,6 +56,7 @@ impl GainTerm {
     ) -> Result<Self, Error> {
         let sigma: Vec<f64> = checked(observation)?.iter().map(|m| m.noise_sigma).collect();
         let variance: Vec<f64> = sigma.iter().map(|sigma| sigma * sigma).collect();
+        // σ² may underflow where σ does not.
         let bad = variance.iter().position(|v| !v.recip().is_finite());
         if let Some(index) = bad {
             return Err(DataTermError::Overflow { index, sigma: sigma[index] }.into());
@@ -207,6 +208,8 @@ impl<T: Float> DataTerm<T> for GainTerm {
         if taken == 0 {
             return all;
         }
+        // At the minimum residuals are orthogonal to the slopes: the first numbers of Qᵀ r, one for
+        // each free gain, are 0, and the others have the same sum of squares.
         let turn = self.slopes(&seen, &gains).qr();
         let column = |of: fn(&Residual) -> f64| {
             let mut column = DVector::from_iterator(all.len(), all.iter().map(of));

@@ -71,6 +71,7 @@ const DARK: f64 = 100.0;
 /// The same angle in [−π, π].
 fn wrapped<T: Float>(angle: T) -> T {
     let turns = (angle / T::of(TAU)).round();
+    // 2π is rounded in single precision, and the rest may be a trifle beyond π.
     (angle - turns * T::of(TAU)).max(T::of(-PI)).min(T::of(PI))
 }
 

@@ -131,6 +131,7 @@ impl PolarizedTerm {
         let gain = |pair: [u16; 2]| match &gains {
             None => Complex64::new(1.0, 0.0),
             Some((stations, gains, _)) => {
+                // Stations of the term are in order: that is a station's number among them.
                 gains.on(pair.map(|k| stations.partition_point(|s| *s < k)))
             }
         };

@@ -85,6 +85,7 @@ impl Baseline {
         let (mut i, mut weight) = (self.i.visibility, self.i.noise_sigma.powi(-2));
         let mut residuals = Vec::with_capacity(self.crossed.len());
         for (m, (_, p)) in self.ratios(stokes).zip(&self.crossed) {
+            // P measures m I: one number is updated as by a Kalman filter.
             let (variance, of_p) = (p.noise_sigma.powi(2), p.noise_sigma.powi(-2));
             let residual = m * i - p.visibility;
             residuals.push(residual / (variance + m.norm_sqr() / weight).sqrt());

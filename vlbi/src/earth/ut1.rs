@@ -70,6 +70,7 @@ pub fn ut1_minus_utc(mjd_utc: f64) -> Result<f64, Error> {
     if !(f64::from(*first)..=f64::from(last)).contains(&mjd_utc) {
         return Err(unknown().into());
     }
+    // The last value of the table ends an interval and begins none.
     let day = (mjd_utc.floor() as i32).min(last - 1);
     let seconds = |day: i32| f64::from(microseconds[(day - first) as usize]) * 1e-6;
     // Within a day UT1 − TAI is smooth; the leap second comes at its end.

@@ -79,6 +79,7 @@ impl View {
             Frame::OfDate => {
                 let [ut1, tt] = moment.ut1_tt(ut1)?;
                 let matrix = sofars::pnp::c2t06a(tt.0, tt.1, ut1.0, ut1.1, 0.0, 0.0);
+                // Aberration before the turn to the Earth: the velocity has the axes of the ICRS.
                 let sky = Self::sky(source, source.ra_hours * PI / 12.0);
                 Ok(sky.seen_at(earth_velocity(tt)).turned(&matrix))
             }

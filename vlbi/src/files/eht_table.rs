@@ -24,6 +24,7 @@ pub enum EhtTable {
 pub fn to_eht_table(observation: &Observation, style: EhtTable) -> Result<String, Error> {
     super::one_channel(observation)?;
     super::check_numbers(observation)?;
+    // Half of the eighth decimal: less would be written as 0.
     let is_lost = |sigma: f64| sigma > 0.0 && sigma < 5e-9;
     if let Some((row, i)) = observation.stokes_i().find(|(_, i)| is_lost(i.noise_sigma)) {
         let ([a, b], sigma) = (observation.names(row), i.noise_sigma);

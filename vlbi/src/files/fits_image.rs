@@ -93,6 +93,7 @@ fn values(unit: &Unit<'_>, count: usize) -> Result<Vec<f64>, FileError> {
     let size = header.number_size()?;
     let scale = header.number("BSCALE")?.unwrap_or(1.0);
     let zero = header.number("BZERO")?.unwrap_or(0.0);
+    // Below, 8 bytes are a double, and 1 byte is no number.
     if header.integer("BITPIX")? == Some(8) || header.integer("BITPIX")? == Some(64) {
         return Err(header.error("BITPIX", "16, 32, -32 or -64 in an image"));
     }

@@ -107,6 +107,7 @@ fn gain(cells: &[&str], places: &Places) -> Result<StationGain, String> {
     }
     let phase = if places[5].is_some() { value(5)? } else { 0.0 };
     let gain = Complex64::from_polar(amplitude, phase.to_radians());
+    // The column has the error of |g|, the table that of ln|g|.
     let errors = [error(4)? / amplitude, error(6)?.to_radians()];
     Ok(StationGain { time_h, span_s, station: cell(2)?.to_owned(), gain, errors })
 }

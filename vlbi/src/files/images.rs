@@ -207,6 +207,7 @@ pub fn frames_with(
     let pixels = pixels.filter(|pixels| bytes(pixels).is_some());
     let pixels =
         pixels.ok_or_else(|| NumpyError::content(format!("shape {shape:?}: no pixels")))?;
+    // Images need not be in memory together; one has to.
     let what = || format!("an image of {width} x {height} pixels");
     memory::afford(what, memory::movie(1.0, pixels as f64))?;
     let frames = Frames::made(count, pixels, |sink| {

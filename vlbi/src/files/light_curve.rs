@@ -156,6 +156,7 @@ pub fn is_light_curve(text: &str) -> bool {
             continue;
         }
         let here = names(line).0;
+        // Several parameters without a time: the reader of light curves says what is missing.
         let has = |p: &&StokesParameter| here.iter().any(|n| n.eq_ignore_ascii_case(p.name()));
         let stokes = StokesParameter::ALL.iter().filter(has).count();
         return stokes > 1 || [here, comment].iter().any(|names| Heading::find(names).is_some());
@@ -225,6 +226,7 @@ fn hours(cell: &str, days: bool, first_day: &mut Option<f64>) -> Result<f64, Str
     let time = number(cell, "column time:")?;
     let hours = match days {
         true => {
+            // Told by its size, whatever the column is called.
             let mjd = if time > JULIAN { time - JULIAN } else { time };
             24.0 * (mjd - *first_day.get_or_insert(mjd.floor()))
         }

@@ -67,6 +67,7 @@ pub fn parse(text: &str) -> Result<Observation, Error> {
             if is_comment && comments::read(bare, &mut observation, &mut names).map_err(located)? {
                 continue;
             }
+            // The names of columns are a comment in the EHT's tables.
             let columns = cells(bare.trim());
             heading = Heading::find(&columns);
             if let Some(heading) = &heading {

@@ -49,6 +49,7 @@ pub fn parse(bytes: &[u8]) -> Result<Pixels, FileError> {
         let (column, row) = (place % width, place / width);
         let (x0, y0) = *last.get_or_insert((*x, *y));
         let expected = [x0 - column as f64 * step_as, y0 - row as f64 * step_as];
+        // Places are rounded, but one that is out of order is off by a pixel or more.
         if (x - expected[0]).abs().max((y - expected[1]).abs()) > 0.25 * step_as {
             let message = format!(
                 "x = {x}, y = {y}, where {:.10}, {:.10} is expected: rows from the north, each from the east, as FOVX and FOVY say",

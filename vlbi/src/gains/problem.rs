@@ -130,12 +130,15 @@ impl GainProblem {
         let mut gains = self.start(model);
         let (mut now, mut damping) = (self.local(model, &gains, true), 1e-6);
         for _ in 0..STEPS {
+            // Exact second derivatives need not be positive far from the minimum.
             let Some(step) = now.step(damping) else {
                 damping = (10.0 * damping).max(1e-6);
                 continue;
             };
+            // What a Newton step takes off a parabola: half of its slope along the step.
             let promise = -0.5 * now.gradient.dot(&step);
             let trial = gains.moved(&step);
+            // Of so small a step the rounded values no longer tell whether it helps.
             if promise < ENOUGH * (1.0 + now.value) {
                 return trial;
             }
@@ -170,6 +173,7 @@ impl GainProblem {
         let n = self.stations();
         let (mut gradient, mut bends) = (DVector::zeros(2 * n), DMatrix::zeros(2 * n, 2 * n));
         for (k, &[a, b]) in self.pairs.iter().enumerate() {
+            // ∂(g₁ ḡ₂ V)/∂ln|g| is g₁ ḡ₂ V itself, ∂/∂arg g is i times it at station 1, −i at 2.
             let seen = gains.on([a, b]) * model[k];
             let pull = (seen - self.data[k]).conj() * seen * self.weight[k];
             let size = self.weight[k] * seen.norm_sqr();
@@ -190,6 +194,7 @@ impl GainProblem {
             gradient[k] += p * gains.log_amplitude[k];
             bends[(k, k)] += p;
         }
+        // Rows and columns of the identity: the steps of what is fixed are 0.
         for k in (0..2 * n).filter(|k| self.is_fixed[*k]) {
             bends.row_mut(k).fill(0.0);
             bends.column_mut(k).fill(0.0);
@@ -211,6 +216,7 @@ impl GainProblem {
             .collect();
         for sweep in 0..SWEEPS {
             for station in (0..n).filter(|k| self.has_phase(*k)) {
+                // Re(ḡ Σ D V̄ g₂/σ²) is largest where g has the phase of the sum.
                 let mut sum = Complex64::new(0.0, 0.0);
                 for (&[a, b], product) in self.pairs.iter().zip(&products) {
                     // At first only stations that are in step already count.

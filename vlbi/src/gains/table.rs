@@ -111,6 +111,7 @@ impl GainTable {
                 Some(g.gain / truth.get(&(g.time_h.to_bits(), g.station.as_str()))?)
             };
             let of_scan: Vec<Complex64> = scan.iter().filter_map(ratio).collect();
+            // The mean direction: amplitudes have no weight in the phase that all share.
             let turn: Complex64 = of_scan.iter().map(|r| r / r.norm()).sum();
             ratios.extend(of_scan.iter().map(|r| r * turn.conj() / turn.norm()));
         }

@@ -58,6 +58,7 @@ pub fn apply_gains(observation: &mut Observation, errors: &GainErrors, seed: u64
         *gains = (0..stations)
             .map(|k| {
                 let amplitude: f64 = random.sample(StandardNormal);
+                // Drawn also where it is not used, so that amplitudes do not depend on it.
                 let phase: f64 = random.random_range(-PI..PI);
                 let amplitude = (constant[k] + scatter(k) * amplitude).exp();
                 Complex64::from_polar(amplitude, if errors.random_phases { phase } else { 0.0 })

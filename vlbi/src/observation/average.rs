@@ -53,6 +53,7 @@ impl Observation {
     pub fn averaged(&self, averaging: Averaging) -> Self {
         let merged = self.with_repeats_merged();
         let intervals = Intervals::of(&merged.rows, averaging);
+        // In order: `chunk_by` below needs the baselines of an interval next to each other.
         let mut bins: BTreeMap<([i64; 2], [u16; 2], u16), Vec<Row>> = BTreeMap::new();
         for row in merged.rows.iter().map(|row| merged.ordered(row)) {
             bins.entry((intervals.at(row.time_h), row.stations, row.channel))
@@ -93,6 +94,7 @@ impl Observation {
             row.channel = 0;
             bins.entry((row.time_h.to_bits(), row.stations)).or_default().push(row);
         }
+        // Channels are measured at one time: their integrations do not add up.
         let mean_of = |rows: &Vec<Row>| {
             let Row { time_h, integration_s, .. } = rows[0];
             Row { time_h, integration_s, ..mean(rows, true) }
@@ -130,6 +132,7 @@ impl Observation {
 /// The mean of rows of one baseline.
 pub(super) fn mean(rows: &[Row], weighted: bool) -> Row {
     let total: f64 = rows.iter().map(|row| row.integration_s).sum();
+    // Integration times that a file does not tell are 0: rows then count the same.
     let weight = |row: &Row| {
         if total > 0.0 { row.integration_s / total } else { 1.0 / rows.len() as f64 }
     };
@@ -170,6 +173,7 @@ fn weighted_mean(data: &[Measured]) -> (Complex64, f64) {
         let sum: Complex64 = data.iter().map(|m| m.visibility * m.noise_sigma.powi(-2)).sum();
         return (sum / weight, weight.sqrt().recip());
     }
+    // In units of the least error no weight leaves the range of numbers.
     let least = data.iter().fold(f64::INFINITY, |least, m| least.min(m.noise_sigma));
     let share = |m: &Measured| (least / m.noise_sigma).powi(2);
     let weight: f64 = data.iter().map(share).sum();
@@ -184,6 +188,7 @@ fn plain_mean(data: &[Measured]) -> (Complex64, f64) {
         let variance: f64 = data.iter().map(|m| m.noise_sigma.powi(2)).sum();
         return (sum / count, variance.sqrt() / count);
     }
+    // In units of the largest error no square leaves the range; it divides, so not 0.
     let most = data.iter().fold(f64::MIN_POSITIVE, |most, m| most.max(m.noise_sigma));
     let squares: f64 = data.iter().map(|m| (m.noise_sigma / most).powi(2)).sum();
     (data.iter().map(|m| m.visibility / count).sum(), most * (squares.sqrt() / count))

@@ -52,6 +52,7 @@ impl Observation {
             let next = numbers.len();
             of_rows.push(*numbers.entry(place(row)).or_insert(next));
         }
+        // Without repeats rows need not be copied.
         if numbers.len() == self.rows.len() {
             return None;
         }

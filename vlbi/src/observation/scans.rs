@@ -23,9 +23,11 @@ fn starts_h(rows: &[Row]) -> Vec<f64> {
     let mut last_end = f64::NEG_INFINITY;
     for [from, middle, to] in spans {
         match starts.last_mut().filter(|_| (from - last_end) * 3600.0 <= GAP_S) {
+            // Spans are in order of their starts: a short one may have the earlier middle.
             Some(start) => *start = start.min(middle),
             None => starts.push(middle),
         }
+        // A long integration may outlast those that begin after it.
         last_end = last_end.max(to);
     }
     starts

@@ -102,6 +102,7 @@ impl<T: Float> Dtft<T> {
         for (k, &[u, v]) in uv.iter().enumerate() {
             let pulse = self.pulse.transform([u, v], pixel_rad);
             for column in 0..width {
+                // Double precision for every T: in single, phases of many turns lose digits.
                 let (sin, cos) = (TAU * u * self.grid.east(column)).sin_cos();
                 east[column * 2 * n + k] = T::of(pulse * cos);
                 east[column * 2 * n + n + k] = T::of(pulse * sin);
@@ -223,6 +224,7 @@ impl<T: Float> Operator<T> for Dtft<T> {
                 Vec::new,
                 |z, (k, strip)| {
                     let rows = k * rows..k * rows + strip.len() / width;
+                    // Block after block in each strip: sums do not depend on the number of threads.
                     for block in &self.blocks[blocks.clone()] {
                         interrupt::check();
                         let data = &data[block.data.clone()];

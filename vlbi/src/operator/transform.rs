@@ -88,6 +88,7 @@ fn is_fast_cheaper(grid: ImageGrid, frames: &[Vec<[f64; 2]>], accuracy: f64) -> 
     let width = width_of(accuracy);
     let [across, rows] = [grid.width, grid.height].map(|pixels| cells(pixels, width) as f64);
     let all = || frames.iter().flatten();
+    // Half of the columns at most are kept: beyond half a turn a pixel, u folds back.
     let reach = all().fold(0.0, |most: f64, uv| most.max((uv[0] * grid.pixel_rad).abs())).min(0.5);
     let kept = reach * across + 2.0 * width as f64;
     let of_frame = grid.height as f64 * across * across.log2() + kept * rows * rows.log2();

@@ -44,6 +44,7 @@ pub fn turns(observation: &Observation) -> Result<Vec<[Complex64; 2]>, Error> {
     let mut all = Vec::with_capacity(observation.rows.len());
     let mut last: Option<(f64, View)> = None;
     for row in &observation.rows {
+        // Rows of a time follow each other: one view serves all of them.
         let view = match last {
             Some((time_h, view)) if time_h == row.time_h => view,
             _ => View::new(

@@ -78,6 +78,7 @@ impl SharedLeakage {
 
     /// Returns the present value.
     pub fn get(&self) -> Leakage {
+        // Values are replaced as a whole: what a panic elsewhere has left is one of them.
         self.0.read().unwrap_or_else(PoisonError::into_inner).clone()
     }
 

@@ -80,6 +80,7 @@ impl LeakageDatum {
             0 => self.turns[k],
             _ => self.turns[k].conj(),
         };
+        // Of row p of J the other hand holds d, which multiplies row 1 − p of the sky.
         let of_first: Complex64 = (0..2).map(|s| sky[1 - p][s] * second[q][s].conj()).sum();
         let of_second: Complex64 = (0..2).map(|r| first[p][r] * sky[r][1 - q]).sum();
         [
@@ -92,6 +93,7 @@ impl LeakageDatum {
 impl LeakageProblem {
     /// 1/s² of each real number.
     fn precision(&self) -> f64 {
+        // ⟨|d|²⟩ = s² is a variance of s²/2 of each of both parts.
         2.0 / (self.amplitude * self.amplitude)
     }
 
@@ -132,6 +134,7 @@ impl LeakageProblem {
         for datum in &self.data {
             let miss = datum.residual(leakage);
             let slopes = datum.parts(leakage).map(|(place, factor, of_conjugate)| {
+                // ∂d/∂Im d = i, ∂d̄/∂Im d = −i.
                 let along = Complex64::new(0.0, if of_conjugate { -1.0 } else { 1.0 });
                 (number(place), [factor, along * factor])
             });

@@ -81,6 +81,7 @@ impl ClosureSet {
     pub fn of(observation: &Observation, kind: ClosureKind, least_snr: f64) -> Vec<ClosureSet> {
         let mut scans: HashMap<(u64, u16), Layers<Baseline>> = HashMap::new();
         for (visibility, (row, measured)) in observation.stokes_i().enumerate() {
+            // Above, not at, the limit: a visibility of 0 has no phase, even where the limit is 0.
             let strong = measured.visibility.norm() > least_snr * measured.noise_sigma;
             if !strong || measured.noise_sigma <= 0.0 {
                 continue;
@@ -98,6 +99,7 @@ impl ClosureSet {
         });
         let mut sets: Vec<(u16, ClosureSet)> =
             sets.filter(|(_, set)| !set.closures.is_empty()).collect();
+        // A HashMap has no order; the sort is stable, so that layers of a scan keep theirs.
         sets.sort_by(|(j, a), (k, b)| a.time_h.total_cmp(&b.time_h).then(j.cmp(k)));
         sets.into_iter().map(|(_, set)| set).collect()
     }

@@ -31,6 +31,7 @@ fn count(observation: &Observation, kind: ClosureKind, least_snr: f64) -> usize 
 fn of_scans(observation: &Observation, kind: ClosureKind, possible: usize) -> Option<usize> {
     let n = observation.stations.len();
     let sets = observation.scans() * observation.channels.len().max(1);
+    // (n − 1)(n − 2)/2 triangles are the most of n stations: averages cannot add any.
     if possible >= sets * (n * n.saturating_sub(3) / 2 + 1) {
         return None;
     }

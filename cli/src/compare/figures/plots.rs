@@ -111,10 +111,12 @@ impl Figures<'_> {
         let mut plots = Vec::new();
         let cases = self.chosen(asked).filter(|(case, _)| case.seed == 1);
         for (case, _) in cases.take(super::MOST + 1) {
+            // Paths in the settings of cases start from the root.
             let uv = fit::coverage(&case.settings().unwrap_or_default(), Path::new("/"))?;
             if uv.is_empty() {
                 continue;
             }
+            // The sky is real: V(−u, −v) is the conjugate of V(u, v), and both are measured.
             let points = uv.iter().flat_map(|[u, v]| [[*u, *v], [-*u, -*v]]);
             let series = vec![Series {
                 name: format!("{} visibilities", uv.len()),
@@ -202,6 +204,7 @@ fn series_of(series: Vec<Series>) -> Vec<Vec<Series>> {
     while rest.peek().is_some() {
         parts.push(rest.by_ref().take(CURVES).collect::<Vec<Series>>());
     }
+    // A plot without any point would be an error of the page.
     parts.retain(|part| part.iter().any(|series| !series.points.is_empty()));
     parts
 }

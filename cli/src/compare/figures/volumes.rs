@@ -55,6 +55,7 @@ impl Figures<'_> {
             let Some(truth) = self.load(first, TRUTH, asked.later)? else { continue };
             for (line, (case, results)) in lines[1..].iter_mut().zip(cells) {
                 let Some(volume) = self.load(case, FOUND, asked.later)? else { return Ok(None) };
+                // results.json has the PSNR of the reference time alone.
                 let psnr = match asked.later {
                     Some(_) => metrics::compare(&volume.volume, &truth.volume, None)?.psnr_db,
                     None => results.get("psnr_db"),
@@ -187,6 +188,7 @@ fn view_of(asked: &FigureAsked, [x, y, z]: [f64; 3]) -> View {
 /// Returns the title of a recovered volume.
 fn quality(psnr: Option<f64>, results: &Results) -> String {
     let psnr = psnr.map(|x| format!("{x:.1} dB"));
+    // A known axis equals the true one up to rounding and needs no mention.
     let axis = results.get("axis_dot_truth").filter(|x| *x < 1.0 - 1e-9);
     let axis = axis.map(|x| format!("axis {x:.4}"));
     [psnr, axis].into_iter().flatten().collect::<Vec<_>>().join(", ")

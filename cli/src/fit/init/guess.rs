@@ -31,6 +31,7 @@ struct Missing {
 /// # Errors
 /// If the file holds no visibilities, images or light curve.
 pub fn guess(data: &[PathBuf], model: Option<Model>) -> anyhow::Result<Guess> {
+    // Absolute: guessed settings have no folder of their own, and runs are resumed from anywhere.
     let data: Vec<PathBuf> =
         data.iter().map(std::path::absolute).collect::<std::io::Result<_>>()?;
     let plain = of_data(&data, Path::new(""), model)?;

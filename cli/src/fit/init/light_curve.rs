@@ -170,6 +170,7 @@ impl Fitted {
     /// Samples that judge the fit: a part of their number, wherever gaps lie.
     fn held(&self) -> usize {
         let all = self.curve.samples.len();
+        // At least one sample is fitted, and at least one judges.
         all - ((FITTED * all as f64).round() as usize).clamp(1, all.saturating_sub(1).max(1))
     }
 
@@ -181,6 +182,7 @@ impl Fitted {
             60.0 * (sample.map_or(0.0, |s| s.time_h) - first.map_or(0.0, |s| s.time_h))
         };
         let fitted = samples.len() - self.held();
+        // Half-way between two samples, so that rounding carries neither across.
         let middle = 0.5 * (minutes(fitted.saturating_sub(1)) + minutes(fitted));
         (1e4 * middle).round() / 1e4
     }
@@ -273,6 +275,7 @@ fn span(curve: &LightCurve) -> Option<[f64; 2]> {
     let best = hours.iter().fold(first, |best, h| if count(*h) > count(best) { *h } else { best });
     let inside = hours.iter().filter(|h| (best..=best + SPAN_H).contains(*h));
     let end = inside.fold(best, |end, h| end.max(*h));
+    // Outward, so that rounding cuts off no sample.
     Some([(1e3 * best).floor() / 1e3, (1e3 * end).ceil() / 1e3])
 }
 

@@ -35,6 +35,7 @@ use std::path::{Path, PathBuf};
 /// An error in settings; of what is missing, with what to write.
 pub fn explained(error: &ReadError) -> anyhow::Error {
     let text = error.to_string();
+    // The reader of TOML tells the kind of error and the name in its words alone.
     let missing = text.split_once("missing field `").and_then(|(_, rest)| rest.split('`').next());
     let unknown = text.split_once("unknown field `").and_then(|(_, rest)| rest.split('`').next());
     let advice = match (missing, unknown) {
@@ -224,6 +225,7 @@ fn read_movie(path: &Path) -> anyhow::Result<Images> {
         let field = movie.grid.pixel_rad * movie.grid.width as f64 / MICROARCSECOND;
         Images { movie, times, field_uas: known.then_some(field) }
     };
+    // First without a field: FITS and text images, which have one, refuse another.
     movie_files::read(&files, None).map(|read| of(read, true)).or_else(|first| {
         movie_files::read(&files, Some(1.0)).map(|read| of(read, false)).map_err(|_| first)
     })
@@ -325,6 +327,7 @@ fn of_visibilities(observation: &Observation, path: &str, file: &str) -> anyhow:
 
 /// Returns whether closure phases are left of the rows that the template's fit keeps.
 fn has_closures(observation: &Observation, long_only: bool) -> bool {
+    // Averages and the shortest baseline of the template decide what still closes.
     let settings = VisibilitySettings { average_s: 300.0, uv_min: long_only.then_some(1e8) };
     let Ok(mut kept) = setup::prepared(observation.clone(), &settings) else { return false };
     setup::frames_of(&mut kept);
@@ -380,6 +383,7 @@ fn short_baselines(observation: &Observation) -> anyhow::Result<f64> {
         .filter(|pair| pair.iter().all(|x| x.is_finite()))
         .collect();
     all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    // The shortest resolve least; the median of a tenth does not hang on a single datum.
     all.truncate(all.len().div_ceil(10));
     all.sort_by(|a, b| a[1].total_cmp(&b[1]));
     match all.get(all.len() / 2) {
@@ -441,6 +445,7 @@ fn complete(template: &str, fields: &[(&str, String)]) -> anyhow::Result<String>
     let text = fields.iter().fold(template.to_owned(), |text, (name, value)| {
         text.replace(&format!("{{{name}}}"), value)
     });
+    // With everything filled in: a template that is no fit is found now, not by the user.
     Work::read(&text.replace("#? ", "")).context("the starter file")?;
     Ok(text)
 }

@@ -64,9 +64,11 @@ fn is_polarized(observation: &Observation) -> bool {
                 continue;
             }
             chi2 += datum.visibility.norm_sqr() / datum.noise_sigma.powi(2);
+            // |V|²/σ² has the squares of a real and an imaginary part.
             count += 2.0;
         }
     }
+    // χ² of n data scatters by √(2n).
     chi2 > count + CHANCE * (2.0 * count).sqrt()
 }
 

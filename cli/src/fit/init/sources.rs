@@ -88,6 +88,7 @@ pub const SOURCES: [Source; 2] = [
 pub fn named_in(name: &str) -> Option<&'static Source> {
     let upper = name.to_ascii_uppercase();
     let starts = |word: &str| {
+        // Only where a word begins: `usagra.csv` names no source.
         let before = |at: usize| upper[..at].chars().next_back();
         upper.match_indices(word).any(|(at, _)| !before(at).is_some_and(char::is_alphanumeric))
     };

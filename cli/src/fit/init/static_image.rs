@@ -31,7 +31,7 @@ pub fn of_visibilities(
     let extra = [long_only, source.and_then(|source| source.blur)].into_iter().flatten();
     let mut extra: Vec<String> = extra.map(str::to_owned).collect();
     if source.is_some_and(|source| source.varies) {
-        // At 4e9 wavelengths 2 % of the flux.
+        // (1 + (4e9/2e9)²)^(1.25/2) = 5^0.625: 2 % of the flux at 4e9 wavelengths.
         extra.push(format!(
             "variability = {{ jy = {}, uv = 2e9, power = 1.25 }} #! the source varies by 2 % of its flux on baselines of 4e9 wavelengths, and with their length to the power of -1.25 (EHT Collaboration 2022, ApJL 930, L14)",
             digits(0.02 * short * 5f64.powf(0.625))

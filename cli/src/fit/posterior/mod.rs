@@ -326,6 +326,8 @@ impl<'a> Drawing<'a> {
         file.seed = file.seed.wrapping_add(number);
         let has_prior = file.linear.as_ref().is_some_and(|linear| linear.prior.is_some());
         if file.representation.kind == Kind::LinearGrid && !has_prior {
+            // A prior varies what the data do not resolve; without one, other voxels vary what
+            // depends on their places.
             let nodes = &mut file.representation.linear_grid.nodes;
             *nodes = other_voxels(*nodes, number);
         }
@@ -339,6 +341,7 @@ impl<'a> Drawing<'a> {
         told("the geometry");
         let data = geometries.data(noise)?;
         let geometry = geometries.draw(number);
+        // Other rays of the photon ring in each draw: what depends on their places is not known.
         let rays = RaySampling { lattice: number, ..self.rays };
         let ResolvedFit { file, instrument, motion, .. } =
             ResolvedFit::in_geometry(self.prepared, &file, &geometry, rays)?;

@@ -80,6 +80,7 @@ impl Check {
 }
 
 fn probability(p: f64) -> String {
+    // A far tail underflows to 0, which is no probability.
     if p < 1e-300 {
         return "less than 1e-300".to_owned();
     }

@@ -79,6 +79,7 @@ pub fn draw(
 fn predicted(through: &Through<'_>, movie: &Frames<f32>) -> anyhow::Result<Vec<Check>> {
     let Through { file, instrument, motion, measured, .. } = *through;
     let pixels = file.screen.pixels * file.screen.pixels;
+    // The data as they were measured: those that were fitted have noise once more.
     let data = measured.terms(&file.loss, pixels)?;
     let objective = Objective { model: setup::forward_model(instrument, motion)?, data };
     let compared = (objective.names(), objective.statistics(movie)?);
@@ -126,6 +127,7 @@ fn begin(
     let (objective, axis) = (&mut trainer.objective, state.now.axis);
     let solution = setup::solve_linear(file, objective, axis, change, grid, &mut watch);
     let solution = solution.map_err(failed::failed).context("linear")?;
+    // A solver that is told to stop returns what it has, which is no draw.
     if keeper.stopped() {
         return Ok(false);
     }

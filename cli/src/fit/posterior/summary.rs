@@ -225,6 +225,7 @@ impl Interval {
 
     fn sentence(&self) -> String {
         let (words, unit) = self.parameter.label();
+        // A truth that rounds to 0 is printed without a sign.
         let truth = self.truth.map(|truth| if truth.abs() < 5e-4 { 0.0 } else { truth });
         let truth = truth.map_or(String::new(), |truth| format!(" (truth: {truth:.3}{unit})"));
         let ([from, to], [low, high]) = (self.ends(), self.bounds);
@@ -236,6 +237,7 @@ impl Interval {
 }
 
 fn intervals(file: &FitFile, found: &GeometryResults, draws: &[Kept]) -> Vec<Interval> {
+    // A stream of its own: coverage and the ranks of nodes have the seed plus 0, 1 and 2.
     let mut places = Pcg64::seed_from_u64(file.seed.wrapping_add(3));
     let one = |(parameter, best): (&Parameter, &f64)| {
         let (parameter, best) = (*parameter, *best);
@@ -266,6 +268,7 @@ fn covered(file: &FitFile, ensemble: &Ensemble, truth: &Volume) -> anyhow::Resul
     let region = file.region.limits();
     let inside = (0..truth.values().len()).filter(|k| region.holds(truth.position(*k))).count();
     let mut random = Pcg64::seed_from_u64(file.seed);
+    // Each node is taken with this probability: about NODES of them on any grid.
     let part = NODES / inside.max(1) as f64;
     let mut chosen = || random.random::<f64>() < part;
     let of_all = ensemble.coverage(truth, |x, _| chosen() && region.holds(x))?;

@@ -21,6 +21,7 @@ impl Estimate<'_> {
     pub(super) fn advice(&self, found: &Found<'_>, log: &[Value]) -> Vec<String> {
         let nodes = self.file.region.nodes;
         let sums = found.quadrature.and_then(|off| quadrature::sentence(off, nodes));
+        // Any fit may need finer sums; more detail is for models that explain too little.
         if found.judged.verdict.outcome != Outcome::Unexplained {
             return sums.into_iter().collect();
         }
@@ -39,6 +40,7 @@ fn voxels(file: &FitFile) -> Option<String> {
         _ => return None,
     };
     let (pixel, width) = (spacing(&file.screen).ok()?, 2.0 * file.region.r_max);
+    // Nodes are one more than the intervals between them.
     let enough = (width / (0.5 * pixel)).ceil() as usize + 1;
     (nodes < enough).then(|| {
         let wide = width / (nodes - 1) as f64 / pixel;
@@ -57,6 +59,7 @@ fn encoding(file: &FitFile) -> Option<String> {
         return None;
     }
     let network = &representation.network;
+    // The encoding has sin(2^k x/L) for k below its degree: periods of 2πL/2^k, here in pixels.
     let longest = 2.0 * PI * network.length_scale / spacing(&file.screen).ok()?;
     let shortest = longest / 2f64.powi(network.degree as i32 - 1);
     let enough = 1 + (longest / SHORT).log2().ceil().max(0.0) as usize;
@@ -77,6 +80,7 @@ fn steps(file: &FitFile, losses: &[f64]) -> Option<String> {
     let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
     let variance = |all: &[f64]| {
         let about = mean(all);
+        // That of the mean: the variance of one loss over their number.
         all.iter().map(|x| (x - about).powi(2)).sum::<f64>() / ((third - 1) * third) as f64
     };
     let (before, last) = losses[losses.len() - 2 * third..].split_at(third);

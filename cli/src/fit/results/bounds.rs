@@ -80,6 +80,7 @@ fn ceiling(file: &FitFile) -> Option<(&'static str, f64)> {
 }
 
 fn reached(bound: &'static str, most: f64, values: &[f32]) -> Option<Reached> {
+    // Q and U of a quiescent image have either sign.
     let sizes = || values.iter().map(|x| f64::from(x.abs()));
     let at = || sizes().filter(|x| *x >= REACHED * most);
     let (count, light) = (at().count(), at().sum::<f64>() / sizes().sum::<f64>());
@@ -109,6 +110,7 @@ fn edges(file: &FitFile, volume: &Volume) -> Vec<Reached> {
         is_cut.then_some(Reached { bound, value, count: None, light: part })
     };
     let (r_min, r_max) = (region.r_min, region.r_max);
+    // A slab that holds the whole sphere has no edge of its own.
     let z_width = region.z_width.filter(|z| *z < r_max).unwrap_or(f64::INFINITY);
     [
         edge("region.r_min", r_min, &|[r, _]| r - r_min),

@@ -96,6 +96,7 @@ struct Summary<'a> {
 fn widen(table: &mut GainTable, here: &GainTable, others: &[GainTable]) {
     let count = others.len().max(1) as f64;
     for (k, (gain, here)) in table.gains.iter_mut().zip(&here.gains).enumerate() {
+        // The logarithm has the distance of amplitudes as its real part, of phases as imaginary.
         let apart = || others.iter().map(|other| (other.gains[k].gain / here.gain).ln());
         let squares = [
             apart().map(|apart| apart.re * apart.re).sum::<f64>(),
@@ -113,6 +114,7 @@ fn calibrate(table: &mut GainTable, sky: &GainTable, images: &[GainTable], takes
         let more = images.iter().map(|image| (image.gains[k].gain / sky.gain).norm().ln());
         let Some((added, of_mean)) = mean_with_error(&more.collect::<Vec<f64>>()) else { return };
         if takes_off {
+            // What is taken off is a mean over images, with an error of its own.
             gain.gain *= (-added).exp();
             gain.errors[0] = gain.errors[0].hypot(of_mean);
         } else {
@@ -124,6 +126,7 @@ fn calibrate(table: &mut GainTable, sky: &GainTable, images: &[GainTable], takes
 impl Estimate<'_> {
     /// The gains of all stations and frames, beside these images and what data see of them, where they are solved for; writes their table.
     pub fn gains(&self, movie: &Frames<f32>, seen: &Frames<f32>) -> anyhow::Result<Option<Gains>> {
+        // Products of the feeds need images of all Stokes parameters, not of intensity alone.
         let is_polarized =
             self.file.loss.iter().any(|loss| loss.data == LossKind::PolarizedVisibilities);
         if !is_polarized || self.measured.gains.is_none() {

@@ -83,6 +83,7 @@ impl Estimate<'_> {
             if curve.background.is_some() {
                 series.push(line("background", &|k| curve.background_at(k)[0]));
             }
+            // Data go sample by sample, the Stokes parameters of each one after the other.
             let data = curve.hours.iter().zip(curve.data[plane..].iter().step_by(count));
             let measured: Vec<[f64; 3]> =
                 data.filter_map(|(h, datum)| datum.map(|[jy, sigma]| [*h, jy, sigma])).collect();

@@ -79,6 +79,7 @@ impl Estimate<'_> {
         let trainer = &mut fit.trainer;
         let volume = recovered(self.file, trainer, state)?;
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
+        // Before the loss, which sees the leakage from here on.
         let leakage = self.leakage(&seen)?;
         let quiescent = self.quiescent(trainer, state)?;
         let loss = trainer.objective.loss_of(&frames, &seen)?;
@@ -112,6 +113,7 @@ impl Estimate<'_> {
         };
         let results = self.results(trainer, &found)?;
         self.folder.keep("results.json", &results)?;
+        // After results.json: a comparison takes the page as the sign that a fit is whole.
         self.report(&found, &results)?;
         let last = numbers::last_line(&found.judged.worth(), &results);
         Ok((last, serde_json::to_value(results)?))

@@ -236,6 +236,7 @@ pub fn last_line(headline: &str, results: &Results) -> String {
     let headline = std::iter::once(headline.to_owned()).chain(said).collect::<Vec<_>>().join(" ");
     match results.closeness {
         Some(Closeness { psnr_db: Some(psnr), nrmse: Some(nrmse), .. }) => {
+            // The error of an empty volume is the truth itself, a relative error of 1.
             let empty = psnr + 20.0 * nrmse.log10();
             format!(
                 "{headline} PSNR beside the truth: {psnr:.2} dB (an empty volume: {empty:.2} dB)."

@@ -148,6 +148,7 @@ impl Estimate<'_> {
 
     fn view(&self, found: &Found<'_>) -> View3d {
         let (r_min, r_max) = (self.file.region.r_min, self.file.region.r_max);
+        // The table of rates begins above 0, where a Keplerian law has no value.
         let rates = report::rates(&self.motion.velocity, [r_min.max(1e-3), r_max]);
         let times = &self.measured.times;
         let ends = [times.first(), times.last()].map(|time| time.copied().unwrap_or(0.0));

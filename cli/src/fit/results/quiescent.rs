@@ -77,6 +77,7 @@ impl Estimate<'_> {
         let of = |truth: &Truth| -> Option<Vec<Vec<f32>>> {
             let one = |parameter: &StokesParameter| truth.quiescent(*parameter);
             let all = parameters.iter().map(one).collect::<Option<Vec<_>>>()?;
+            // The truth is an image also where data see its flux alone.
             let single = |image: &[f64]| match is_flux {
                 true => vec![image.iter().sum::<f64>() as f32],
                 false => image.iter().map(|x| *x as f32).collect(),

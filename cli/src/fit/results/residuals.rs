@@ -91,6 +91,7 @@ fn pixel_maps(tested: &Tested, pixels: usize) -> Option<[Vec<f32>; 2]> {
     let of = &tested.statistics.pixels;
     (of.len() == pixels).then(|| {
         let count = |n: usize| n.max(1) as f64;
+        // The mean of n residuals scatters by 1/√n, and χ²/n by √(2/n).
         let mean = of.iter().map(|sum| sum.sum / count(sum.part.count).sqrt());
         let chi2 = of.iter().map(|sum| {
             let n = count(sum.part.count);

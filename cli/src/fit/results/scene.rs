@@ -138,6 +138,7 @@ impl Estimate<'_> {
 
     fn volume(&self, state: &State<f32>) -> anyhow::Result<String> {
         let (motion, region) = (&self.file.motion, &self.file.region);
+        // The scene has to drag as the fit did, and to perturb from the same seed.
         let law = motion.law().seeded(self.file.seed).dragged(setup::drag(self.file)?);
         let law = toml_file::inline(&law).context("motion.velocity")?;
         let region =

@@ -203,6 +203,7 @@ impl<'a> Kept<'a> {
             format!("{} (restore it, or remove it to start over)", path.display())
         })?;
         let leakage = leakage::kept(&self.problem.measured, self.folder)?;
+        // Later steps will be taken and logged again.
         self.folder.cut_log(state.now.step)?;
         Ok(Some((state, leakage)))
     }
@@ -251,9 +252,11 @@ impl Progress for Kept<'_> {
     fn goes_on(&mut self, at: At<'_>) -> bool {
         let (keeper, bar) = match self.work.take() {
             Some((keeper, Some((kind, bar)))) if kind == name(at) => (keeper, bar),
+            // Work that was announced has its guard already; its bar begins now.
             Some((keeper, None)) => (keeper, self.bar(at)),
             other => {
-                // There is one keeper at a time.
+                // A guard that is dropped takes the present keeper with it: the old one has to go
+                // before the new one comes.
                 drop(other);
                 (self.keeper(at), self.bar(at))
             }
@@ -267,6 +270,7 @@ impl Progress for Kept<'_> {
 
     fn journal(&mut self) -> Result<Box<dyn journal::Journal>, Error> {
         self.end();
+        // A search keeps results as they come: it may be cut off at any moment.
         self.work = Some((SignalGuard::brief(self.folder.stopped()), None));
         Ok(Box::new(Journal::open(self.folder).map_err(kept)?))
     }
@@ -279,6 +283,7 @@ impl Progress for Kept<'_> {
         self.end();
         // What is read is what a resumed run will read, to the bit.
         let choice = self.written(found).map_err(kept)?;
+        // Only now: until the result is in its file, the journal is all there is of the search.
         Journal::remove(self.folder);
         Ok(choice.unwrap_or_else(|| found.choice()))
     }
@@ -328,6 +333,7 @@ impl Progress for Kept<'_> {
     }
 
     fn starts(&mut self) -> Result<(), Error> {
+        // Without a checkpoint everything that was logged is done again.
         let log = self.folder.file(folder::LOG);
         log.and_then(|log| log.write(b"")).map_err(kept)
     }
@@ -335,6 +341,7 @@ impl Progress for Kept<'_> {
     fn save(&mut self, state: &State<f32>) -> Result<(), Error> {
         let bytes = checkpoint::encode(state, self.text)?;
         self.folder.save(&bytes).map_err(kept)?;
+        // From the first checkpoint on there is a state to save: a signal waits for the step.
         if state.now.step == 0 {
             self.end();
             self.work = Some((self.keeper(At::Step(0)), None));

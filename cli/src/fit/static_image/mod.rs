@@ -78,6 +78,7 @@ impl Prepared {
         }
         let (measured, polarized) = data::of_static(&file, base_dir)?;
         let pixels = file.image.pixels * file.image.pixels;
+        // Only to refuse losses without data before a folder is made.
         measured.visibility_terms::<f64>(&file.loss, pixels)?;
         if let (Some(measured), Some(polarization)) = (&polarized, &file.polarization) {
             measured.visibility_terms::<f64>(&[polarization.loss()], pixels)?;
@@ -181,6 +182,7 @@ fn searched(
     let values = |s: &Option<StrengthSettings>| s.as_ref().map_or(0, |s| s.values.len() * s.folds);
     let draws = file.image.draws.unwrap_or(0);
     let of_polarized = file.polarization.as_ref().map_or(0, |p| values(&p.strength) + 1 + draws);
+    // About so many: starts are solved again where held-out frames choose another strength.
     let all = file.image.starts.len()
         + Shape::ALL.len()
         + values(&file.strength)
@@ -191,6 +193,7 @@ fn searched(
     let bar = progress::held_out(all as u64);
     let done = AtomicU64::new(0);
     let watch = |stage: Stage, solved: usize| {
+        // With nothing solved it is asked within a solution whether to go on.
         if solved > 0 {
             bar.set_message(match stage {
                 Stage::Starts => "starts",
@@ -251,6 +254,7 @@ fn beside(file: &StaticImageFile, measured: &FitData, survey: &Survey) -> Vec<(&
         let frames = || 0..measured.times.len();
         let count: usize = frames().map(|frame| term.degrees_of_freedom(frame)).sum();
         let mut none = vec![0.0; image.len()];
+        // χ² alone is wanted: a weight of 0 adds no gradient.
         let of_frame = |frame| term.value_and_gradient(frame, image, 0.0, &mut none);
         let chi2: f64 = frames().map(of_frame).sum();
         Some((name(kind), chi2 / count as f64))
@@ -266,6 +270,7 @@ impl Found<'_> {
         let n = self.file.image.pixels;
         let field = ("field_uas", vec![self.file.image.field_uas]);
         let image = self.survey.found().solution.image.iter().map(|x| *x as f32).collect();
+        // A movie of one frame, as `observe` reads it.
         let lists = [("time", vec![0.0]), ("hours", vec![0.0]), field.clone()];
         let mut all = vec![("recovered", image)];
         for (k, name) in [(1, "recovered_q"), (2, "recovered_u")] {

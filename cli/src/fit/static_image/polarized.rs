@@ -137,11 +137,13 @@ impl Polarized {
     ) -> anyhow::Result<Option<(Self, (String, Tested))>> {
         let Some(settings) = file.polarization.clone() else { return Ok(None) };
         let images = &survey.found.images;
+        // I, Q and U lie one after the other.
         let terms = measured.visibility_terms::<f64>(&[settings.loss()], images.len() / 3)?;
         let term: &dyn FrameTerm<f64> = &*terms.first().context("no polarised data")?.term;
         let frames = 0..measured.times.len();
         let residuals = frames.map(|frame| term.residuals(frame, images));
         let statistics = Statistics::of(residuals, 1);
+        // Variability is common to many data: χ² may lie far below 1.
         let errors =
             if measured.has_intrinsic_variability { Errors::Shared } else { Errors::Stated };
         let count = statistics.all.count;

@@ -69,6 +69,7 @@ pub fn doubt(survey: &Survey, shapes: &[ShapeFit]) -> Option<String> {
     }
     let least =
         |is_ring: bool| best_shape(shapes.iter().filter(|fit| fit.shape.is_ring() == is_ring));
+    // Without shapes of both kinds nothing speaks against the ring.
     let (ring, other) = (least(true)?, least(false)?);
     (other.criterion < ring.criterion).then(|| {
         format!(

@@ -126,6 +126,7 @@ impl Whitening {
             return Ok(Self { factor: None, ln_determinant: 0.0 });
         }
         let mut matrix = part(&curve.sampling.covariance(&background), used, used);
+        // Noise: data are over their standard deviations.
         (0..used.len()).for_each(|k| matrix[(k, k)] += 1.0);
         let wild = || Error::out_of_range("constant", background.constant, "smaller numbers");
         let factor = matrix.cholesky().ok_or_else(wild)?.unpack();
@@ -147,6 +148,7 @@ impl Whitening {
     pub fn covariance(&self, covariance: &DMatrix<f64>) -> DMatrix<f64> {
         match &self.factor {
             None => covariance.clone(),
+            // L⁻¹ (L⁻¹ C)ᵀ = L⁻¹ C L⁻ᵀ, since C is symmetric.
             Some(_) => self.columns(self.columns(covariance.clone()).transpose()),
         }
     }
@@ -173,6 +175,7 @@ pub fn expected_background(
     let all: Vec<usize> = (0..curve.data()).collect();
     let own = curve.of_background(&band.background);
     let none = || Error::out_of_range("radius of the band", band.radius, "that of any node");
+    // The flare is integrated out: beside the background it is noise of a known covariance.
     let mut together = part(&(curve.seen(band).ok_or_else(none)?.full(band) + &own), &used, &used);
     (0..used.len()).for_each(|k| together[(k, k)] += 1.0);
     let together = together.cholesky().ok_or_else(none)?;

@@ -44,6 +44,7 @@ pub fn evidence(
         for (width, length) in pairs(&prior.widths, &prior.lengths) {
             let (radius, height) = (*radius, prior.height);
             let band = Band { radius, width, height, length, ..Band::DARK };
+            // It depends on band and grid alone: the same bands are left out in all geometries.
             let Some(seen) = curve.seen(&band) else { continue };
             let columns = [&seen.uniform, &seen.total].map(|all| some(all.as_slice(), &used));
             let field = Field {
@@ -139,6 +140,8 @@ fn pairs<'a>(a: &'a [f64], b: &'a [f64]) -> impl Iterator<Item = (f64, f64)> + '
 
 /// The power with which the model's mean square is that of the first data.
 fn unit(covariance: &DMatrix<f64>, sets: &DMatrix<f64>) -> f64 {
+    // One prior of the amplitude for all sets. In a scan these differ by turns of Q and U with
+    // equal errors, which change no norm.
     let square = sets.column(0).norm_squared();
     let trace = covariance.trace();
     if trace > 0.0 { square / trace } else { 1.0 }
@@ -183,6 +186,7 @@ impl Lower {
             let products = [values.dot(&direction), values.dot(&emission)];
             for mean in means {
                 let strength = self.power * mean * mean;
+                // (C + s uuᵀ)⁻¹ by Sherman & Morrison, and det (C + s uuᵀ) = `more` det C.
                 let more = 1.0 + strength * square;
                 let form = chi2 - strength * products[0] * products[0] / more;
                 // All emission given the data: its covariance with them is this column times the power.
@@ -192,6 +196,7 @@ impl Lower {
                 let seen = with.norm_squared() - along * with.dot(&direction);
                 let own = total[0] + (mean * total[1]).powi(2);
                 let variance = self.power * (own - self.power * seen);
+                // Where data leave nothing open, rounding may bring the variance to 0 or below.
                 let positive = ln_normal(expected / variance.max(f64::MIN_POSITIVE).sqrt());
                 let ln = -0.5 * (form + self.ln_determinant + more.ln());
                 all.push((set, *mean, ln + core::f64::consts::LN_2 + positive));
@@ -205,6 +210,7 @@ impl Lower {
 fn ln_normal(z: f64) -> f64 {
     use core::f64::consts::{LN_2, SQRT_2, TAU};
     match z < -30.0 {
+        // `erfc` underflows below −38. The asymptote is off by 1/z², 0.0011 at −30.
         true => -0.5 * (z * z + TAU.ln()) - (-z).ln(),
         false => libm::erfc(-z / SQRT_2).ln() - LN_2,
     }
@@ -213,6 +219,7 @@ fn ln_normal(z: f64) -> f64 {
 /// ln of the sum of exponentials.
 fn ln_sum(values: impl Iterator<Item = f64> + Clone) -> f64 {
     let most = values.clone().fold(f64::NEG_INFINITY, f64::max);
+    // −∞ less −∞ would be no number.
     if most == f64::NEG_INFINITY {
         most
     } else {

@@ -51,14 +51,18 @@ impl CurveRows {
     /// the distance d between two points of the band's circle.
     fn round(&self, band: &Band) -> Vec<f64> {
         let (nodes, kappa) = (self.grid.azimuths, (band.radius / band.length).powi(2));
+        // d² = 4ρ₀² sin²(φ/2) = 2ρ₀² (1 − cos φ).
         let near = |node: usize| (kappa * ((TAU * node as f64 / nodes as f64).cos() - 1.0)).exp();
         let share = |harmonic: usize| {
             let wave = |node: usize| (TAU * (harmonic * node % nodes) as f64 / nodes as f64).cos();
             (0..nodes).map(|node| near(node) * wave(node)).sum::<f64>() / nodes as f64
         };
+        // Round a ring the covariance is circulant: its eigenvalues are Fourier coefficients.
         let shares = (0..=self.grid.waves() / 2).map(share);
+        // Rounding leaves some of the smallest below 0.
         let all: Vec<f64> = shares.map(|share| share.max(0.0)).collect();
         let most = all.iter().copied().fold(0.0, f64::max);
+        // Moments are made of the first harmonic: it stays, however faint.
         let count = all.iter().rposition(|share| *share > FAINT * most).unwrap_or(0).max(1);
         (0..=2 * count).map(|wave| all[wave.div_ceil(2)].sqrt()).collect()
     }
@@ -95,6 +99,7 @@ impl CurveRows {
         let rings = DVector::from_vec(self.grid.rings());
         let up = upright.parts.row_sum().transpose() * first;
         let of_power = |power: i32| {
+            // Factors that all four have in common cancel in azimuth and radius, and are left out.
             let ring = across.parts.tr_mul(&rings.map(|radius| radius.powi(power)));
             let both = &ring * up.transpose();
             DVector::from_column_slice(both.as_slice())
@@ -122,6 +127,7 @@ impl CurveRows {
         let up = upright.parts.row_sum().transpose() * first;
         let weights = DVector::from_column_slice((&ring * up.transpose()).as_slice());
         let of_one = across.envelope.dot(&rings) * upright.envelope.sum();
+        // Harmonics add up to nothing round a ring: only the first function has a sum.
         (parts.rows(0, weights.len()).tr_mul(&weights), [weights.norm_squared(), of_one])
     }
 

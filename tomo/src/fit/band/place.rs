@@ -103,12 +103,14 @@ impl Used {
     fn place(&self, columns: &DMatrix<f64>, band: &Band, ln: f64) -> Place {
         let uniform = columns.column(4);
         let strength = band.power * band.mean * band.mean;
+        // Sherman & Morrison: the mean is one direction more of the covariance.
         let more = strength / (1.0 + strength * uniform.norm_squared());
         let product = |a: usize, b: usize| {
             let [a, b] = [a, b].map(|k| columns.column(k));
             a.dot(&b) - more * a.dot(&uniform) * b.dot(&uniform)
         };
         let mean = Vector4::from_fn(|k, _| band.power * product(k, 5));
+        // Emission that goes round evenly has no moments: the mean adds nothing to theirs.
         let covariance =
             Matrix4::from_fn(|a, b| band.power * (self.own[(a, b)] - band.power * product(a, b)));
         let [radius, azimuth] = polar(&mean, &covariance);
@@ -141,6 +143,7 @@ pub fn together(places: &[Place]) -> Option<[Interval; 2]> {
         (s + weight * at.sin(), c + weight * at.cos())
     });
     let middle = sin.atan2(cos);
+    // Within half a turn of their middle, azimuths on both sides of ±π are neighbours.
     for (_, [at, _]) in &mut azimuths {
         let (sin, cos) = (*at - middle).sin_cos();
         *at = middle + sin.atan2(cos);
@@ -154,6 +157,7 @@ pub fn together(places: &[Place]) -> Option<[Interval; 2]> {
 /// Quantiles of a mixture of weighted normal distributions.
 fn quantiles(parts: &[(f64, Normal)]) -> Option<Interval> {
     let sum: f64 = parts.iter().map(|part| part.0).sum();
+    // 9 standard deviations leave 2e-19 of a normal distribution outside.
     let reach =
         |(_, [mean, deviation]): &(f64, Normal)| [mean - 9.0 * deviation, mean + 9.0 * deviation];
     let low = parts.iter().map(|part| reach(part)[0]).fold(f64::INFINITY, f64::min);
@@ -163,6 +167,7 @@ fn quantiles(parts: &[(f64, Normal)]) -> Option<Interval> {
     }
     let below = |x: f64| {
         let of = |(weight, [mean, deviation]): &(f64, Normal)| match *deviation > 0.0 {
+            // `erfc` keeps its digits where little lies below.
             true => weight * 0.5 * libm::erfc((mean - x) / (deviation * core::f64::consts::SQRT_2)),
             false => weight * f64::from(u8::from(x >= *mean)),
         };
@@ -170,6 +175,7 @@ fn quantiles(parts: &[(f64, Normal)]) -> Option<Interval> {
     };
     let quantile = |share: f64| {
         let (mut low, mut high) = (low, high);
+        // 2⁻⁶⁰ of the range is below rounding.
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
             if below(middle) < share { low = middle } else { high = middle }

@@ -42,6 +42,7 @@ impl PolarGrid {
 
     /// Functions of the azimuth that it tells apart: 1, and the cosine and sine of each harmonic.
     pub fn waves(&self) -> usize {
+        // Of an even number of nodes the last cosine has no sine beside it, and is left out.
         2 * ((self.azimuths - 1) / 2) + 1
     }
 
@@ -55,12 +56,14 @@ impl PolarGrid {
             return;
         }
         let halves = |u: f64, last: usize| {
+            // The last node belongs to the cell before it.
             let first = (u as usize).min(last);
             [(first, 1.0 + first as f64 - u), (first + 1, u - first as f64)]
         };
         for (layer, of_layer) in halves(up, self.layers - 2) {
             for (ring, of_ring) in halves(across, self.rings - 2) {
                 let start = (layer * self.rings + ring) * self.azimuths;
+                // Rings are closed: behind the last node comes the first.
                 for (azimuth, part) in halves(round, self.azimuths - 1) {
                     row[start + azimuth % self.azimuths] += weight * of_layer * of_ring * part;
                 }

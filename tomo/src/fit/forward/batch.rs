@@ -75,6 +75,7 @@ impl<T: Float> Columns<T> {
         to.into_par_iter().zip(from).with_min_len(SHARE).for_each(
             |((x, y, z, angle), (node, time))| {
                 let [stretch, turn] = fall.before(*node as usize, time.double());
+                // Copies of the batch: the model's own positions stay.
                 for x in [x, y, z] {
                     *x = T::of(x.double() * stretch);
                 }
@@ -131,6 +132,7 @@ impl<T: Float> Batch<T> {
     pub fn gather_events(&mut self, model: &ForwardModel<T>) {
         self.fill(model);
         if model.earliest.is_some() {
+            // `thin_out` moves all columns together: none may be shorter.
             self.columns.pulled.clone_from(&self.columns.position);
             self.thin_out(model.earliest, None, false);
         }
@@ -171,11 +173,13 @@ impl<T: Float> Batch<T> {
         let [x, y, z] = &columns.pulled;
         self.kept.extend((0..x.len()).map(|k| {
             earliest.is_none_or(|earliest| columns.time[k] >= earliest)
+                // Matter from outside of the region has no place (`Fall::before`).
                 && (!falls || x[k].is_finite())
                 && occupancy
                     .is_none_or(|mask| mask.holds([x[k].double(), y[k].double(), z[k].double()]))
         }));
         let (mut to, mut from) = (0, 0);
+        // A ray that loses all of its nodes keeps an empty range: pairs and starts stay aligned.
         for end in &mut self.starts[1..] {
             while from < *end {
                 if self.kept[from] {
@@ -216,6 +220,7 @@ impl<T: Float> Columns<T> {
             self.angle.extend(rates.iter().map(|rate| *rate * time));
         } else {
             self.time.extend(model.delay[range.clone()].iter().map(|delay| time - *delay));
+            // −Ω (time − delay): back from where the matter was when its light left.
             let phases = rates.iter().zip(&model.phase[range]);
             self.angle.extend(phases.map(|(rate, phase)| *rate * time + *phase));
         }

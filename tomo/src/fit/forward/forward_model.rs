@@ -133,11 +133,13 @@ impl<T: Float> ForwardModel<T> {
             let allowed = "as many as nodes";
             return Err(Error::out_of_range("Stokes factors", known as f64, allowed));
         }
+        // Before the planes: pixels of one image are the way from one of them to the next.
         if seen.is_flux() {
             (self.pixels, self.is_flux) = (1, true);
             self.pixel.fill(0);
         }
         match factors {
+            // One image needs no planes: its factor goes into the weights.
             Some(factors) if parameters == [StokesParameter::I] => self.scale(factors),
             Some(factors) if !parameters.is_empty() => {
                 let planes = Planes::new(factors, parameters, self.pixels);
@@ -258,6 +260,7 @@ impl<T: Float> ForwardModel<T> {
     /// `cotangents` holds dL/dweight of each node, summed over frames. Zero without redshift.
     pub fn weights_vjp(&self, axis: Axis, cotangents: &[f64]) -> [f64; 3] {
         let Some(shift) = &self.shift else { return [0.0; 3] };
+        // Of a weight, plain · g^power, the axis changes the second factor alone.
         let of_factor: Vec<f64> =
             cotangents.iter().zip(&self.plain_weight).map(|(c, plain)| c * plain).collect();
         shift.vjp(axis, &of_factor)

@@ -80,6 +80,7 @@ impl<T: Float> ForwardModel<T> {
         light: U,
     ) {
         let pixel = &mut image[self.pixel[ray] as usize];
+        // A pixel of an image has one ray: the nodes of several are grouped as those of one.
         if self.is_flux { *pixel += light } else { *pixel = light }
     }
 

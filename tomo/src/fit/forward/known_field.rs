@@ -87,6 +87,7 @@ impl<T: Float> ForwardModel<T> {
                 continue;
             }
             let sum = |range: &[usize]| (range[0]..range[1]).map(light).sum::<f64>();
+            // Put into pixels in the order of rays: the same bits on any number of threads.
             let fluxes: Vec<f64> = batch.starts.par_windows(2).map(sum).collect();
             fluxes.into_iter().enumerate().for_each(|(ray, flux)| self.put(&mut image, ray, flux));
             sink(&image)?;

@@ -57,9 +57,11 @@ impl Occupancy {
         let mut cell = 0;
         for x in point {
             let place = (x + self.half_width) * per_length;
+            // What is no number is in no cell either.
             if !(0.0..=n as f64).contains(&place) {
                 return false;
             }
+            // The upper face belongs to the last cell.
             cell = cell * n + (place as usize).min(n - 1);
         }
         self.occupied[cell]
@@ -101,6 +103,8 @@ impl Occupancy {
         let [x, y, z] = &points;
         let mut values = vec![T::zero(); n.pow(3)];
         let is_new = self.brightness.iter().all(|b| *b == 0.0);
+        // One random point of a cell may miss what shines in it: what was seen before fades over
+        // several looks.
         let memory = self.settings.memory;
         self.brightness.iter_mut().for_each(|b| *b = (f64::from(*b) * memory) as f32);
         for time in looks(times, is_new, &mut random) {
@@ -139,8 +143,11 @@ impl Occupancy {
     pub(in crate::fit) fn mark(&mut self) {
         let n = self.settings.cells;
         let peak = self.brightness.iter().fold(0.0f32, |peak, b| peak.max(*b));
+        // As long as all is dark this is 0 and every cell counts: without any, nothing would be
+        // evaluated, and nothing learnt.
         let least = (f64::from(peak) * self.settings.threshold) as f32;
         let mut bright: Vec<bool> = self.brightness.iter().map(|b| *b >= least).collect();
+        // One axis after the other: three passes reach all 26 neighbours.
         for stride in [1, n, n * n] {
             let spread = |k: usize| {
                 let place = k / stride % n;

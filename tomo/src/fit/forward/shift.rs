@@ -39,6 +39,7 @@ impl Circles {
     /// Returns whether matter that passes a point (M) is dark on its whole way about the axis.
     pub fn is_dark(&self, axis: Axis, x: [f64; 3]) -> bool {
         let is_faster_than_light = |x: [f64; 3]| {
+            // The speed alone counts: no light has to arrive.
             let node = Node::new(x, [0.0; 3], self.spin, &self.velocity);
             node.shift(axis.vector()).is_none()
         };
@@ -134,6 +135,7 @@ impl Node {
         let r = norm(x);
         let (u, flat) = (x[2] / r, x[0].hypot(x[1]));
         let (s, rate) = (flat / r, velocity.rate(r));
+        // On the axis every azimuth gives the same: there `round` is Σ, and `drag` is 0.
         let (cos, sin) = if flat > 0.0 { (x[0] / flat, x[1] / flat) } else { (1.0, 0.0) };
         let (theta, phi) = ([u * cos, u * sin, -s], [-sin, cos, 0.0]);
         let sigma_kerr = r * r + spin * spin * u * u;
@@ -142,6 +144,7 @@ impl Node {
         let scaled = |vector: [f64; 3], by: f64| vector.map(|c| by * c);
         Self {
             still: 1.0 - 2.0 * r / sigma_kerr,
+            // g_tφ = −2 a r sin²θ/Σ, of which dφ/dt takes one sine.
             drag: scaled(theta, -4.0 * spin * r * s * rate / sigma_kerr),
             speeds: [scaled(theta, rate * round.sqrt()), scaled(phi, rate * sigma_kerr.sqrt())],
             boost: scaled(momentum, rate),
@@ -163,10 +166,12 @@ impl Node {
         let [round, polar] = self.speeds.map(dot);
         let square = self.still + dot(self.drag) - round * round - polar * polar;
         let boost = self.ahead - dot(self.boost);
+        // Negated, so that what is no number is dark, too.
         if !(square > 0.0 && boost > 0.0) {
             return None;
         }
         let (clock, [of_round, of_polar]) = (square.sqrt(), self.speeds);
+        // d(√N/b) = dN/(2 √N b) + √N Ω L·dξ/b², with b = `ahead` − Ω L·ξ.
         let slope = |c: usize| {
             let of_square = self.drag[c] - 2.0 * (round * of_round[c] + polar * of_polar[c]);
             of_square / (2.0 * clock * boost) + clock * self.boost[c] / (boost * boost)

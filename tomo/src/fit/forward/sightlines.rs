@@ -59,6 +59,7 @@ impl Region {
         let r = norm(point);
         let along: f64 = point.iter().zip(axis).map(|(x, axis)| x * axis).sum();
         let across = (r * r - along * along).max(0.0).sqrt();
+        // On the circle |z − along · ξ_z| ≤ `reach`; rounding may leave squares below 0.
         let reach = across * (1.0 - axis[2] * axis[2]).max(0.0).sqrt();
         let least = (along * axis[2]).abs() - reach;
         r > self.r_min - margin && r < self.r_max + margin && least <= self.z_width + margin
@@ -187,8 +188,10 @@ impl Sightlines {
         self.starts.push(0);
         for (ray, range) in of_rays.iter().zip(ends.windows(2)) {
             let pixel = rays.pixel_of(*ray as usize);
+            // Rays without a node count in the share: they add darkness to the mean.
             let share = rays.share(pixel);
             self.weight[range[0]..range[1]].iter_mut().for_each(|weight| *weight *= share);
+            // Rays of a pixel follow each other: ranges merge where the end between them goes.
             if self.pixel.last() == Some(&(pixel as u32)) {
                 self.starts.pop();
             } else {
@@ -247,6 +250,7 @@ impl Sightlines {
         }
         let start = self.starts[first];
         let (pixels, ends) = (self.pixel.split_off(first), self.starts.split_off(first + 1));
+        // Columns of quantities that are not wanted are empty.
         let columns = self.columns().map(|column| column.split_off(start.min(column.len())));
         let mut order: Vec<usize> = (0..pixels.len()).collect();
         order.sort_by_key(|ray| pixels[*ray]);
@@ -277,6 +281,8 @@ impl Sightlines {
 /// Returns the excess of the time of flight from a finite radius over its finite part.
 fn flight(observer: &Observer) -> f64 {
     let w = observer.inverse_radius();
+    // r_o + 2 ln r_o, which delays to infinity leave out: so do all, and times of frames mean the
+    // same at any distance.
     if w > 0.0 { 1.0 / w - 2.0 * w.ln() } else { 0.0 }
 }
 
@@ -304,10 +310,12 @@ impl SightlineRequest {
 
     fn check_equal(&self, per_ray: usize, observer: &Observer) -> Result<(), Error> {
         let refuse = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
+        // The first chord would be infinitely long.
         if observer.is_at_infinity() {
             let allowed = "a finite radius with nodes equidistant in Mino time";
             return refuse("observer radius", f64::INFINITY, allowed);
         }
+        // Samples of a ray have no velocities.
         if self.momentum {
             return refuse("redshift", 1.0, "off with nodes equidistant in Mino time");
         }
@@ -375,6 +383,7 @@ impl Collector<'_> {
     /// Takes a node, if it lies in the region.
     fn node(&mut self, ray: &RayNodes<'_>, i: usize, lambda: f64) {
         let (r, u) = (ray.radius[i], ray.cos_theta[i]);
+        // 1 − u² would lose its digits next to the axis.
         let (s, (sin, cos)) = (((1.0 - u) * (1.0 + u)).sqrt(), ray.azimuth[i].sin_cos());
         let point = [r * s * cos, r * s * sin, r * u];
         if !self.request.region.holds(point) {

@@ -44,6 +44,7 @@ impl PolarizedView {
             let allowed = "nodes with momenta";
             return Err(Error::out_of_range("polarization", lines.points() as f64, allowed));
         }
+        // The unit may be the mean field of all nodes: no factor is known before all are seen.
         let views: Vec<Vec<Option<SynchrotronView>>> = (0..lines.rays())
             .into_par_iter()
             .map(|ray| self.along(lines, ray, hole, velocity))
@@ -52,6 +53,7 @@ impl PolarizedView {
         let of = |seen: &Option<SynchrotronView>| {
             seen.map_or(Stokes::default(), |seen| self.law.stokes(&seen, unit))
         };
+        // Angles of the law count from the projection of the spin, those of data from north.
         Ok(views.iter().flatten().map(|seen| of(seen).turned(self.position_angle)).collect())
     }
 
@@ -61,6 +63,7 @@ impl PolarizedView {
             return 1.0;
         }
         let (sum, count) = views.fold((0.0, 0.0), |(sum, n), seen| (sum + seen.field, n + 1.0));
+        // Without any field all factors are 0, whatever the unit.
         if sum > 0.0 { sum / count } else { 1.0 }
     }
 
@@ -118,7 +121,9 @@ impl Node {
         let [x, y, _] = self.n;
         let sin = x.hypot(y);
         let (cos_phi, sin_phi) = if sin > 0.0 { (x / sin, y / sin) } else { (1.0, 0.0) };
+        // With L = p_θ φ̂ − p_φ θ̂/sin θ: p_θ = L·φ̂ and p_φ = L_z.
         let polar = self.turn[1] * cos_phi - self.turn[0] * sin_phi;
+        // p_r = (dr/dτ)/Δ: backwards dr/dτ = −r² d(1/r)/dτ, and the photon has the opposite.
         let radial = self.radial * self.r * self.r / hole.delta(self.r);
         [-1.0, radial, polar, self.turn[2]]
     }

@@ -98,6 +98,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
             Error::out_of_range("width of the population", how.width, allowed)
         })?;
         while search.next_parallel().is_none() {
+            // Between populations only: within one the best so far depends on the order of threads.
             followed.write().unwrap_or_else(PoisonError::into_inner).clone_from(&best_of(&log));
             let best = search.overall_best_individual().map_or(f64::INFINITY, |best| best.value);
             if !watch(search.function_evals(), best) {
@@ -114,6 +115,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         samples.sort_by(|a, b| a.value.total_cmp(&b.value));
         let best = match best {
             Some(best) => best,
+            // Values of convex data, which may be recalled, are kept without their volumes.
             None => self.solve(samples.first().map_or(start, |best| best.geometry))?,
         };
         Ok(Some(Explored { start, best, samples, further: None }))
@@ -137,6 +139,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
                 value
             }
             Err(error) => {
+                // Populations take numbers alone: the first error is told when they have ended.
                 log.error.get_or_insert(error);
                 f64::INFINITY
             }
@@ -149,6 +152,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     fn recalled(&self, geometry: Geometry) -> Result<f64, Error> {
         let free: Vec<_> = self.free.iter().map(|free| free.parameter.name()).collect();
         let effort = format!("{:?}", self.effort);
+        // Bit by bit: a search that goes on from its journal has to end with the same bytes.
         let of = (geometry.bits(), free, effort, self.frames, self.scale.to_bits());
         self.memory.number(of, || Ok(self.solve(geometry)?.value))
     }

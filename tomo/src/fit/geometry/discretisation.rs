@@ -84,6 +84,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
             along -= r * d;
             square += d * d;
         }
+        // |r + t d|² is least at t = −r·d/d·d: below 0, residuals point away from the other model.
         Ok(if along > 0.0 { 0.5 * self.scale * along * along / square } else { 0.0 })
     }
 
@@ -155,6 +156,7 @@ impl Standing {
         let of_refined = |Refined { kind, step, certain, gain, excess }: &Refined| {
             // Coarser models follow more of the noise: a finer one with a higher χ² that explains the data is not contradicted.
             let against = (-gain).max(0.0).min(*excess);
+            // The square of the step counts exp(−against) times, as a ratio of likelihoods.
             let step = step * (kind.onwards * (-0.5 * against).exp() * certain.sqrt());
             own(kind.source, &(&step * step.transpose()))
         };
@@ -178,8 +180,10 @@ fn is_finite(matrix: &DMatrix<f64>) -> bool {
 /// A finer model leaves more open, and the noise of the same data moves the two minima apart with a covariance that is the
 /// difference of theirs (Hausman 1978, Econometrica 46, 1251).
 fn beyond_chance(slopes: &DVector<f64>, finer: &DMatrix<f64>, other: &DMatrix<f64>) -> f64 {
+    // Without an inverse nothing says what chance makes: all counts.
     let Some(inverse) = finer.clone().try_inverse() else { return 1.0 };
     let square = slopes.dot(&(finer * slopes));
+    // E[Δ·C⁻¹Δ] = tr C⁻¹(C − C₀): noise moves the minima apart by Δ = −C s.
     let by_chance = (slopes.len() as f64 - (inverse * other).trace()).max(0.0);
     if square > by_chance { 1.0 - by_chance / square } else { 0.0 }
 }

@@ -62,6 +62,7 @@ impl Axis {
         let row = |t: f64| Vector3::new(1.0, t, 0.5 * t * t);
         let normal: Matrix3<f64> = all().map(|(t, _)| row(t) * row(t).transpose()).sum();
         let right: Vector3<f64> = all().map(|(t, rise)| row(t) * rise).sum();
+        // Bounds may leave fewer than three places: a flat parabola keeps such an axis open.
         let found = normal.try_inverse().map_or_else(Vector3::zeros, |inverse| inverse * right);
         let square = |(t, rise): (f64, f64)| (rise - row(t).dot(&found)).powi(2);
         let more = (self.risen.len() + 1).saturating_sub(3);
@@ -99,11 +100,12 @@ impl Reach {
         let n = self.axes.len();
         let of = |k: usize| (self.axes[k].parabola(), self.axes[k].far());
         let slope = |k: usize, _| of(k).0.slope * of(k).1;
+        // Above 0, so that the form has an inverse; the prior then bounds an axis without a rise.
         let rise = |k: usize| (of(k).0.bend * of(k).1.powi(2)).max(1e-6);
         Form {
             slopes: vec![DVector::from_fn(n, slope)],
             bends: DMatrix::from_fn(n, n, |a, b| if a == b { rise(a) } else { 0.0 }),
-            // Of a slope through the two ends and the middles between.
+            // Of a slope through the two ends and the middles between: Σ ξ² = 2 (1 + ¼).
             uncertain: DMatrix::from_diagonal_element(n, n, self.ripple.powi(2) / 2.5),
             ripple: self.ripple,
         }
@@ -118,6 +120,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         let Some(mut axes) = self.principal(polished) else { return Ok(None) };
         for axis in &mut axes {
             self.step(polished, axis)?;
+            // As far as errors of the data ask for; ripples may ask for more once all are known.
             while axis.doublings < FEWEST || axis.rise() < RISE && axis.goes_on() {
                 self.double(polished, axis)?;
             }
@@ -126,6 +129,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         loop {
             let enough = CLEAR * ripple(&axes);
             let hidden = |axis: &&mut Axis| axis.rise() < enough && axis.goes_on();
+            // Each new value changes the ripples of all: the axis followed least far goes first.
             let Some(axis) = axes.iter_mut().filter(hidden).min_by_key(|axis| axis.doublings)
             else {
                 break;
@@ -141,6 +145,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
 
     fn principal(&self, polished: &Polished) -> Option<Vec<Axis>> {
         let n = self.free.len();
+        // Principal axes depend on units: in those of scales parameters change images alike.
         let scale = |k: usize| self.free[k].parameter.scale();
         let of = |a: usize, b: usize| polished.covariance[a * n + b] / (scale(a) * scale(b));
         let covariance = DMatrix::from_fn(n, n, of);

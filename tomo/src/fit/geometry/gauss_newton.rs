@@ -73,6 +73,8 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     /// # Errors
     /// If a number is out of its range, or χ² is not finite.
     pub fn polish(&self, start: &Estimate, how: &Polish) -> Result<Polished, Error> {
+        // The start may be of other pixels or solved for a shorter time; slopes hold about a volume
+        // that is the best one of this problem.
         let mut best = self.solve_from(start.geometry, &start.x)?;
         let mut bowl = self.bowl(&best, how.following)?;
         for _ in 0..how.steps {
@@ -103,6 +105,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         for part in PARTS {
             let step: Vec<f64> = step.iter().map(|step| part * step).collect();
             let geometry = self.moved(&from.geometry, &step);
+            // The linear response of the volume leaves little to solve for.
             let x = self.along(from, &bowl.responses, &step);
             let there = self.solve_from(geometry, &x)?;
             if there.value < from.value {
@@ -147,6 +150,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     fn covariance(&self, geometry: &Geometry, bowl: &Bowl) -> Vec<f64> {
         let n = self.free.len();
         let inverse = covariance(self.free, geometry, &bowl.bends, 1.0)
+            // Callers ask for finite numbers to learn whether there is a covariance.
             .unwrap_or_else(|| DMatrix::from_diagonal_element(n, n, f64::INFINITY));
         let scale = |k: usize| self.free[k].parameter.scale();
         (0..n * n).map(|k| inverse[(k / n, k % n)] * scale(k / n) * scale(k % n)).collect()
@@ -160,6 +164,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         moved.iter_mut().flatten().for_each(|x| *x *= T::of(1.0 / WIDTH));
         let Profile { slopes, bends, responses } =
             self.linear(&forward).profile(&at.x, &moved, following)?;
+        // Profiles are those of χ², beside a prior those of its mean over the data.
         let half = 0.5 * self.scale * self.unit();
         let mut bowl = Bowl {
             slopes: DVector::from_vec(slopes) * half,

@@ -131,6 +131,7 @@ impl Parameter {
             // Derivatives end where the horizons meet.
             Parameter::Spin => [-0.999, 0.999],
             Parameter::Inclination => [0.0, PI],
+            // Priors may lie about an angle of either sign: what is found stays near them.
             Parameter::PositionAngle => [-TAU, TAU],
             Parameter::Xi | Parameter::BetaR | Parameter::BetaPhi => [0.0, 1.0],
         }

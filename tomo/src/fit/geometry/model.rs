@@ -32,6 +32,7 @@ impl Law {
     fn velocity(&self, geometry: &Geometry, axis: Axis) -> Result<AngularVelocity, Error> {
         match self {
             Law::Infall(drag) => infall(*drag, geometry, axis),
+            // Matter about another axis meets the component of the spin along it: −a about −z.
             _ => Ok(self.circular(geometry.get(Parameter::Spin) * axis.vector()[2])),
         }
     }

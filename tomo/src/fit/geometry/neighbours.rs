@@ -30,6 +30,7 @@ impl Surroundings<'_> {
     ) -> Result<(), Error> {
         let Self { polished, reach, voxels, .. } = self;
         let to = other.voxels();
+        // Responses that are carried over spare the other voxels a bowl of their own.
         let on_others = |response: &Vec<f64>| refined(voxels, response, &to);
         let responses: Result<Vec<_>, Error> = polished.responses.iter().map(on_others).collect();
         let start = other.solve(polished.best.geometry)?;
@@ -49,6 +50,7 @@ impl Surroundings<'_> {
         inflation: f64,
     ) -> Option<Envelope> {
         let Self { polished, reach, scatter, seen, .. } = self;
+        // Where all lattices together are no bowl, the axes of the first one alone may be.
         let form = fitted(seen, problem.free.len()).unwrap_or_else(|| reach.form());
         let trials = seen.iter().map(|seen| seen.values.len()).sum();
         let about = polished.best.geometry;
@@ -68,6 +70,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     pub fn around<'a>(&self, polished: &'a Polished) -> Result<Option<Surroundings<'a>>, Error> {
         let Some(reach) = self.reach(polished)? else { return Ok(None) };
         let mut seen = reach.seen();
+        // The reach has looked at the ends of the axes already.
         let (best, responses) = (&polished.best, &polished.responses);
         self.look_at(best, responses, &reach.columns, diagonals(self.free.len()), &mut seen)?;
         let scatter = match self.gaussian {

@@ -54,15 +54,18 @@ impl Prior {
     /// Slope and second derivative of its penalty by differences of half width `width` inside its bounds.
     pub(super) fn curve(&self, x: f64, width: f64) -> [f64; 2] {
         let [low, high] = self.bounds();
+        // Wider differences would let the bounds of the clamp below cross, which panics.
         let width = width.min(0.25 * (high - low));
         if width <= 1e-9 * (1.0 + x.abs()) {
             return [0.0; 2]; // as good as fixed
         }
+        // One width from a bound at least: beyond it the penalty is infinite.
         let x = x.clamp(low + width, high - width);
         // Rounding must not lead across a bound.
         let [before, here, after] =
             [x - width, x, x + width].map(|x| self.penalty(x.clamp(low, high)));
         let slope = (after - before) / (2.0 * width);
+        // Densities are log-concave: a second derivative below 0 is rounding.
         [slope, ((after - 2.0 * here + before) / (width * width)).max(0.0)]
     }
 
@@ -90,6 +93,7 @@ impl Prior {
             Prior::Uniform { low, high } => low + (high - low) * share,
             Prior::Normal { mean, sigma } => mean + sigma * normal(share),
             Prior::Isotropic { low, high } => {
+                // Directions in space are uniform in cos i.
                 (low.cos() + (high.cos() - low.cos()) * share).clamp(-1.0, 1.0).acos()
             }
         }

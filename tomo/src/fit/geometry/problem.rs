@@ -53,6 +53,7 @@ impl Free {
             return value.clamp(low, high);
         }
         let near = self.near_prior(low + (value - low).rem_euclid(TAU));
+        // The copy near a bell curve at the end of the range may lie one turn beyond it.
         match near {
             near if near < low => near + TAU,
             near if near > high => near - TAU,
@@ -113,6 +114,7 @@ impl Free {
 
     pub(super) fn is_circle(&self) -> bool {
         let [low, high] = self.bounds();
+        // Degrees of settings become a whole circle only to rounding.
         self.parameter == Parameter::PositionAngle && high - low > TAU - 1e-6
     }
 }
@@ -180,7 +182,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     /// in the middle.
     pub fn starts(&self, count: usize) -> Vec<Geometry> {
         let dimensions = self.free.len() as f64;
-        // The positive root of x^(d + 1) = x + 1.
+        // The positive root of x^(d + 1) = x + 1; near it a round leaves less than ⅓ of the error.
         let root = (0..64).fold(2.0f64, |x, _| (1.0 + x).powf(1.0 / (dimensions + 1.0)));
         let start = |k: usize| {
             let share = |d: usize| (0.5 + k as f64 * root.powi(-(d as i32 + 1))).fract();
@@ -230,6 +232,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         let count = |term: &Weighted<'_, T>| -> usize {
             self.frames.iter().map(|frame| term.term.degrees_of_freedom(*frame)).sum()
         };
+        // Beside a prior weights are bare factors; elsewhere they hold the number of data already.
         let of = |term: &Weighted<'_, T>| match self.gaussian {
             Some(_) => term.weight * count(term) as f64,
             None => term.weight,
@@ -286,6 +289,7 @@ pub fn bounded(
     mut geometry: Geometry,
     inside: impl Fn(&Free, f64) -> f64,
 ) -> Geometry {
+    // Before the bounds: beyond the pole another position angle has to be brought inside its own.
     let inclination = geometry.get(Parameter::Inclination);
     let pole = if inclination < 0.0 { 0.0 } else { PI };
     if !(0.0..=PI).contains(&inclination) && crosses_pole(free, pole) {

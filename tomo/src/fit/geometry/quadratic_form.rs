@@ -78,6 +78,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         for place in places {
             let there = self.beside(from, responses, &(columns * &place))?;
             if let Some((there, part)) = there {
+                // A bound shortens the way: the value is that of the place that was looked at.
                 seen.places.push(place * part);
                 seen.values.push(there.value);
             }
@@ -106,12 +107,14 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         let (mean, lowest) = (mean_of(&middles), mean_of(&lowest));
         let mut moved = &inverse * &form.uncertain * &inverse;
         if middles.len() > 1 {
+            // Variance of a mean, Σ/(n (n − 1)), wider since so few have to tell the scatter.
             for middle in &middles {
                 let away = middle - &mean;
                 moved += &away * away.transpose() * (few(count) / (count * (count - 1.0)));
             }
         }
         if let Some(scatter) = scatter {
+            // Slopes scatter by noise, which is taken to be as large as the residuals.
             moved += sandwich_excess(scatter, form, &inverse) * inflation;
         }
         if is_wide || lowest.norm() > 1.0 {
@@ -121,6 +124,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         }
         let step = columns * &mean;
         let geometry = self.moved(&about, step.as_slice());
+        // The form is one of ξ = columns⁻¹ u, priors are in units u of scales.
         let bends = outward.transpose() * &form.bends * &outward;
         let whole = covariance(self.free, &geometry, &bends, inflation)?
             + columns * moved * columns.transpose();
@@ -131,6 +135,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
 /// Returns the sandwich covariance of the middle (White 1982, Econometrica 50, 1), from the variance of slopes, less the inverse of the
 /// form's second derivatives, in directions in which it is larger.
 fn sandwich_excess(scatter: &DMatrix<f64>, form: &Form, inverse: &DMatrix<f64>) -> DMatrix<f64> {
+    // H⁻¹ B H⁻¹ − H⁻¹ = H⁻¹ (B − H) H⁻¹ for the scatter B and the second derivatives H.
     let mut more = SymmetricEigen::new(scatter - &form.bends);
     more.eigenvalues.apply(|x| *x = x.max(0.0));
     inverse * more.recompose() * inverse
@@ -139,6 +144,7 @@ fn sandwich_excess(scatter: &DMatrix<f64>, form: &Form, inverse: &DMatrix<f64>) 
 /// Returns the factor by which the scatter of so few is too small: the variance of Student's t with n − 1 degrees of freedom,
 /// where it has one.
 fn few(count: f64) -> f64 {
+    // ν/(ν − 2) with ν = n − 1; fewer than four have no variance and take that of four.
     if count > 3.0 { (count - 1.0) / (count - 3.0) } else { 3.0 }
 }
 
@@ -178,8 +184,10 @@ pub(super) fn diagonals(n: usize) -> Vec<DVector<f64>> {
 pub(super) fn fitted(seen: &[Evaluations], n: usize) -> Option<Form> {
     let pairs: Vec<(usize, usize)> = (0..n).flat_map(|a| (0..=a).map(move |b| (a, b))).collect();
     let lattices = seen.len();
+    // Other rays, voxels and pixels move the bowl and its depth; all are taken to bend it alike.
     let (first_bend, unknowns) = (lattices * (1 + n), lattices * (1 + n) + pairs.len());
     let count: usize = seen.iter().map(|seen| seen.values.len()).sum();
+    // What the form leaves has to tell the ripples.
     if count < unknowns + 2 {
         return None;
     }
@@ -191,6 +199,7 @@ pub(super) fn fitted(seen: &[Evaluations], n: usize) -> Option<Form> {
         rows[(row, l * (1 + n))] = 1.0;
         (0..n).for_each(|k| rows[(row, l * (1 + n) + 1 + k)] = place[k]);
         for (j, (a, b)) in pairs.iter().enumerate() {
+            // u·B·u/2 holds the product of two different parameters twice.
             let share = if a == b { 0.5 } else { 1.0 };
             rows[(row, first_bend + j)] = share * place[*a] * place[*b];
         }
@@ -202,6 +211,7 @@ pub(super) fn fitted(seen: &[Evaluations], n: usize) -> Option<Form> {
     for (j, (a, b)) in pairs.iter().enumerate() {
         (bends[(*a, *b)], bends[(*b, *a)]) = (found[first_bend + j], found[first_bend + j]);
     }
+    // Where this is no bowl its stationary point is no minimum.
     bends.clone().cholesky()?;
     let slopes = (0..lattices).map(|l| found.rows(l * (1 + n) + 1, n).into_owned()).collect();
     let uncertain = inverse.view((1, 1), (n, n)) * left;

@@ -85,6 +85,7 @@ impl Spread {
         let whole: Vec<f64> = (0..n).map(|k| covariance(k, k).sqrt()).collect();
         let correlation =
             (0..n * n).map(|k| covariance(k / n, k % n) / (whole[k / n] * whole[k % n])).collect();
+        // No parameter is less known than before the data.
         let sigma: Vec<f64> =
             free.iter().zip(&whole).map(|(free, x)| x.min(free.prior.deviation())).collect();
         let open = free.iter().zip(&sigma).map(|(free, sigma)| free.is_open(*sigma)).collect();
@@ -101,6 +102,7 @@ impl Spread {
         let bends = DMatrix::from_row_slice(n, n, &form.bends);
         let inflation = (1.0 + 2.0 * form.ripple) * reduced_chi2.max(1.0);
         let covariance = covariance(free, &best.geometry, &bends, inflation)?;
+        // Errors grow with the inflation, the way to the lowest point does not.
         let lowest = -&covariance * DVector::from_column_slice(&form.slopes) / inflation;
         let sigma = |k: usize| covariance[(k, k)].sqrt();
         let correlation = (0..n * n).map(|at| {

@@ -68,6 +68,7 @@ impl Learning {
     /// If the device fails.
     pub fn load(&self, device: &Compute, numbers: [&[f32]; 3]) -> Result<(), GpuError> {
         for ((numbers, held), buffer) in numbers.iter().zip(&self.held).zip(self.buffers()) {
+            // Most stretches begin with what the last one has left on the device.
             if held != numbers {
                 device.write(buffer, &floats(numbers))?;
             }

@@ -58,6 +58,7 @@ impl Comparisons {
                 let first = visibilities.len();
                 let compared = other.term.compared(frame)?;
                 visibilities.extend(all.frame(compared, k, first, begin[1] as usize)?);
+                // Only now does every visibility know all closure quantities that it is in.
                 for seen in &visibilities[first..] {
                     all.push(seen, k);
                 }
@@ -95,6 +96,7 @@ impl Comparisons {
             }
             Compared::Scan { sky, seen, with } => (sky, seen, with),
         };
+        // All terms share one table of places.
         if *self.sky.get_or_insert(sky) != sky {
             return None;
         }
@@ -132,11 +134,13 @@ impl Comparisons {
         is_phase: bool,
         seen: &mut [Seen],
     ) {
+        // Counted from the first of its frame: kernels have room for the frames of a piece alone.
         let begin = self.counts()[1] as usize - before;
         let count = scan.data.len();
         for (k, (legs, datum)) in scan.legs.iter().zip(&scan.data).enumerate() {
             let of_legs = range(&self.legs, legs.len());
             self.closures.extend([of_legs.start, of_legs.end, begin as u32, count as u32]);
+            // The scan's inverse covariance is appended below, row after row.
             let row = (self.precision.len() + k * count) as u32;
             self.closures.extend([row, term as u32, datum.to_bits(), u32::from(is_phase)]);
             for (visibility, sign) in legs {

@@ -26,6 +26,7 @@ impl FallTable {
         let Table { cells, last, ends } = flow.numbers();
         let mut numbers = Vec::with_capacity(CELL * (cells.len() + 1));
         for (start, per_time, [radius, azimuth]) in &cells {
+            // Times in the table may be large beside their differences, which a float would lose.
             numbers.extend(two_floats(*start));
             numbers.extend([*per_time as f32, 0.0]);
             numbers.extend(radius.iter().chain(azimuth).map(|x| *x as f32));

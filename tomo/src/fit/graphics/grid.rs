@@ -128,6 +128,7 @@ impl Binding<'_> {
         points: usize,
     ) -> Result<Vec<Task>, GpuError> {
         let first = &uniforms[0];
+        // The largest slope comes first: it sets the scale of the whole numbers that are added.
         let mut tasks =
             vec![self.bind(4, first, &[10], 1)?, self.bind(5, first, &[0, 1, 2, 9, 10], points)?];
         for level in uniforms {
@@ -166,6 +167,7 @@ impl Voxels {
         let block = &device.uniform(&words(&[0, points.room as u32, 0, 0]))?;
         let (slopes, peak) = (&device.storage(4 * points.room as u64)?, &device.storage(4)?);
         let sums = [peak, &device.storage(8 * levels.parameters() as u64)?];
+        // Kernels of voxels are not bound to rows.
         let rows = slopes;
         let binding = Binding {
             device,

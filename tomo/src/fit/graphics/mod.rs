@@ -59,6 +59,8 @@ impl From<GpuError> for Error {
 /// # Errors
 /// If it refuses, or its limits are too small.
 pub fn open(adapter: &Adapter) -> Result<Compute, GpuError> {
+    // Slabs of the network's products take 12 KiB, its workgroups have 256 lanes, and `pull` and
+    // `open` of visibilities bind 8 storage buffers.
     let needs =
         Needs { invocations: 256, workgroup_bytes: 12288, buffers: 8, buffer_bytes: 1 << 24 };
     Compute::open(adapter, needs)
@@ -176,6 +178,7 @@ impl GraphicsFit {
     fn load(&mut self, stretch: &Stretch<'_, f32>, from: &Progress<f32>) -> Result<(), GpuError> {
         let Self { device, pixels, visibilities, learning, events, .. } = self;
         let model = &stretch.objective.model;
+        // An axis that is learnt changes the weights of nodes; nothing else of them changes.
         if self.loaded_for != Some(stretch.axis) {
             pixels.load(device, nodes::nodes(model, !*events))?;
             if let Some(axis) = &pixels.axis {
@@ -214,6 +217,7 @@ impl StepDevice<f32> for GraphicsFit {
         from: &Progress<f32>,
     ) -> Result<Taken<f32>, Error> {
         self.load(stretch, from)?;
+        // If a step fails, nobody knows what the device holds.
         self.learning.hold([&[]; 3]);
         let Self { device, pixels, learning, turning, .. } = &*self;
         let mut pending = Vec::with_capacity(stretch.draws.len());
@@ -234,6 +238,7 @@ impl StepDevice<f32> for GraphicsFit {
             _ => (Vec::new(), 0),
         };
         let records = read.pop().unwrap_or_default();
+        // Buffers may be longer than what was asked for.
         read.iter_mut().for_each(|numbers| numbers.truncate(from.parameters.len()));
         let [parameters, first, second] = [0, 1, 2].map(|k| core::mem::take(&mut read[k]));
         self.learning.hold([&parameters, &first, &second]);

@@ -85,6 +85,7 @@ impl Binding<'_> {
             Ok((bound, [groups as u32, matrices.len() as u32]))
         };
         let mut tasks = vec![task(0, 0, &[0, 1, 3, 4, 6], each)?, task(1, 0, &[1, 6], 1)?];
+        // X and the next X take turns, so that nothing is copied.
         for k in 0..Muon::ITERATIONS {
             tasks.push(task(2, k % 2, &[1, 2, 6], square)?);
             tasks.push(task(3, 0, &[0, 1, 6], square)?);

@@ -93,6 +93,7 @@ impl Network {
         most: Option<usize>,
         of_places: bool,
     ) -> Result<Self, GpuError> {
+        // Activations of a block lie in one buffer, in whole tiles, as kernels write them.
         let fits = device.largest_buffer() as usize / (4 * shape.columns()) / GRAIN * GRAIN;
         if fits == 0 {
             return Err(GpuError::OutOfMemory { bytes: 4 * (shape.columns() * GRAIN) as u64 });
@@ -114,6 +115,7 @@ impl Network {
             Ok(Block { uniform, forward, backward })
         });
         let blocks = blocks.collect::<Result<_, GpuError>>()?;
+        // Slopes change buffers at every layer.
         Ok(Self { stride, blocks, memory, of_inputs: shape.hidden % 2 })
     }
 
@@ -189,6 +191,7 @@ impl Memory {
             layers: layers.collect::<Result<_, _>>()?,
             rows: storage(shape.columns() * stride)?,
             slopes: [storage(widest)?, storage(widest)?],
+            // A sum for each span of points, added up in order: the same bytes whoever is first.
             parts: storage(shape.parameters() * stride.div_ceil(SPAN))?,
             behind_units: behind_units.transpose()?,
         })
@@ -232,6 +235,7 @@ impl Binding<'_> {
         for (turn, (k, layer)) in layers[..last].iter().enumerate().rev().enumerate() {
             let tiles = tiling.right(layer.outputs) * tiling.left(layer.inputs - 1);
             tasks.push((self.bind(5, k, turn, &[0, 1, 3, 6, 10, 12])?, [tiles, spans]));
+            // Slopes before the first layer serve given inputs, or places.
             if k > 0 || shape.is_given() || self.memory.behind_units.is_some() {
                 let groups = [tiling.left(stride), tiling.right(layer.units)];
                 tasks.push((self.bind(6, k, turn, &[0, 1, 3, 5, 6, 10, 11])?, groups));

@@ -207,6 +207,7 @@ impl Pixels {
             | flag(self.axis.is_some(), 16);
         let (falling, [least, largest]) =
             self.fall.as_ref().map_or((0, [0.0; 2]), |fall| (fall.cells as u32, fall.limits));
+        // Not used without its flag, but nothing may be divided by 0.
         let (cells, half) = how.mask.unwrap_or((1, 1.0));
         let per_length = cells as f32 / (2.0 * half);
         let task = [

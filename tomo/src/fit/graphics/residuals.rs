@@ -20,6 +20,7 @@ impl GraphicsFit {
         match (&stretch.draws[k], &stretch.objective.data.image) {
             (Drawn::Pixels(pairs), Some(image)) => {
                 let model = &stretch.objective.model;
+                // Pairs stand for all rays; pixels without one are in the mean, but always zero.
                 let rays = model.rays() as f64 / model.pixels() as f64;
                 let variance = f64::from(image.term.inverse_variance());
                 let scale = rays * variance / pairs.len() as f64;
@@ -81,8 +82,10 @@ impl GraphicsFit {
             let variance = image.term.inverse_variance();
             let scale = 1.0 / objective.data_of(&*image.term, frames.len());
             let factor = (image.weight * scale) as f32;
+            // Pixels without a ray are in no pair, but their data count.
             let dark = frames.iter().map(|frame| self.in_the_dark(&image.term, *frame)).sum();
             let scale = scale * f64::from(variance);
+            // In floats and in this order, as the processor has it.
             ((factor + factor) * variance, Squares { scale, dark, weight: image.weight })
         });
         let slope = image.map_or(0.0, |(slope, _)| slope);

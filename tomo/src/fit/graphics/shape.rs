@@ -67,6 +67,7 @@ pub struct Tiling {
 impl Tiling {
     /// Returns the tiling for layers so wide: no wider than they are, where that can be.
     pub fn of(width: usize) -> Self {
+        // Of 64 lanes on the left a slab of 16 would be four fours a lane: the shader fetches two.
         let (right_lanes, slab) = match width {
             0..=32 => (4, 8),
             33..=64 => (8, 16),

@@ -25,6 +25,7 @@ impl Objective<f32> {
         let rays = self.model.rays();
         let all: Vec<_> = frames.par_iter().zip(light.par_chunks(rays)).map(of_frame).collect();
         let mut slopes = Vec::with_capacity(light.len());
+        // Added up in the order of the frames, whatever thread was first.
         for (own, terms) in all {
             slopes.extend(own);
             loss.terms.iter_mut().zip(terms).for_each(|(sum, own)| *sum += own);

@@ -43,6 +43,7 @@ impl Visibilities {
     ) -> Result<Option<Self>, GpuError> {
         let Some(all) = Comparisons::new(objective) else { return Ok(None) };
         let ([seen, closures], rays) = (all.most(), objective.model.rays());
+        // `look` has a workgroup for each visibility, every kernel a row of them for each frame.
         if seen > MOST || frames > MOST || rays == 0 {
             return Ok(None);
         }

@@ -76,6 +76,7 @@ pub fn encode(state: &State<f32>, settings: &str) -> Result<Vec<u8>, Error> {
     };
     let text =
         toml_file::write(&header).map_err(|error| CheckpointError::Header(error.to_string()))?;
+    // The sum of all bytes is known last, and needs a place from the beginning.
     let mut tensors = vec![(CHECKSUM.to_owned(), Dtype::U32, vec![0; 4])];
     push("now", &state.now, &mut tensors);
     if let Some(good) = &state.good {
@@ -153,6 +154,7 @@ fn push(of: &str, progress: &Progress<f32>, tensors: &mut Vec<Tensor>) {
     double("axis", &progress.axis.vector());
     double("axis.first", &progress.axis_adam.first);
     double("axis.second", &progress.axis_adam.second);
+    // Exact below 2⁵³.
     double("adam.steps", &[progress.adam.steps as f64, progress.axis_adam.steps as f64]);
     double("caution", &[progress.caution, progress.loss]);
 }
@@ -173,6 +175,7 @@ pub fn header(bytes: &[u8]) -> Result<Header, Error> {
 /// # Errors
 /// If it is none, damaged, or one of another fit.
 pub fn decode(bytes: &[u8], start: &State<f32>) -> Result<State<f32>, Error> {
+    // First of all: damaged bytes may still be tensors of the right size.
     check(bytes)?;
     let header = header(bytes)?;
     let tensors = SafeTensors::deserialize(bytes).map_err(CheckpointError::from)?;
@@ -211,6 +214,7 @@ fn progress(
     let mask = |start: &Occupancy| {
         let mut mask = start.clone();
         mask.brightness = single("brightness", mask.brightness.len())?;
+        // Which cells may shine follows from their brightness.
         mask.mark();
         Ok::<_, CheckpointError>(mask)
     };
@@ -218,6 +222,7 @@ fn progress(
         step,
         parameters: single("parameters", count)?,
         adam,
+        // Normalised once more, it could differ in its last bits.
         axis: Axis::exact([axis[0], axis[1], axis[2]])
             .map_err(|error| CheckpointError::Header(error.to_string()))?,
         axis_adam,

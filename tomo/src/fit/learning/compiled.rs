@@ -44,6 +44,7 @@ macro_rules! in_precision {
                 frames: &[usize],
                 masked: bool,
             ) -> Result<Frames<$number>, Error> {
+                // Frame by frame: all of them may be more than memory holds.
                 Frames::made(frames.len(), self.objective.model.pixels(), |sink| {
                     frames.iter().try_for_each(|frame| sink(&self.predict(now, &[*frame], masked)))
                 })

@@ -96,6 +96,7 @@ pub struct DeviceRunner<T> {
 impl<T: Float> DeviceRunner<T> {
     /// A stretch ends at multiples of `pause` steps and at `end`.
     pub fn new(device: Box<dyn StepDevice<T>>, pause: u64, end: u64) -> Self {
+        // The first stretch is one step, which tells how many fit into the next.
         Self { device, pause: pause.max(1), end, pace: 1 }
     }
 

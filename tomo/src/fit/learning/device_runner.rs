@@ -36,6 +36,8 @@ impl<T: Float> Trainer<'_, T> {
     /// Returns the number of steps to take at once.
     fn stretch(&self, delegate: &DeviceRunner<T>, step: u64) -> u64 {
         let to_multiple = |of: u64| of - step % of;
+        // Where a state is looked at, kept or compared with all data, it has to be here: a device
+        // gives it back at the end of a stretch alone.
         let pauses = [delegate.pause, self.training.keep_every.max(1), COMPARED];
         let mut count = pauses.into_iter().map(to_multiple).fold(u64::MAX, u64::min);
         if let Some(plan) = self.training.occupancy {
@@ -47,6 +49,7 @@ impl<T: Float> Trainer<'_, T> {
             count = count.min(next);
         }
         let most = delegate.pace.min(delegate.device.most() as u64);
+        // A step that takes longer than half a second is a stretch of its own.
         count.min(delegate.end.saturating_sub(step)).min(most).max(1)
     }
 
@@ -69,11 +72,13 @@ impl<T: Float> Trainer<'_, T> {
                 return Ok(step_back(state, loss.total, step)?);
             }
             state.now.loss = loss.total;
+            // Of later steps only losses are known; stretches end at multiples of `keep_every`.
             if step == begin && step.is_multiple_of(self.training.keep_every.max(1)) {
                 state.good = Some(Box::new(state.now.clone()));
             }
         }
         let now = &mut state.now;
+        // An axis that is learnt has stretches of one step (`StepDevice::most`): this is its rate.
         self.turn(now, of_axis);
         now.step += losses.len() as u64;
         now.adam.steps += losses.len() as u64;

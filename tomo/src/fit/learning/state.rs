@@ -106,6 +106,7 @@ pub(in crate::fit) fn step_back<T: Float>(
         return Err(diverged);
     }
     state.setbacks += 1;
+    // In the kept state, too: from there the next divergence halves rates once more.
     good.caution *= 0.5;
     state.now = (**good).clone();
     Ok(Outcome::SteppedBack { loss, to: good.step, caution: good.caution })

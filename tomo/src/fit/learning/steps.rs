@@ -29,6 +29,7 @@ pub struct Place<'a, T> {
 
 impl<T: Float> Trainer<'_, T> {
     pub(in crate::fit) fn advance(&mut self, state: &mut State<T>) -> Result<Outcome, Error> {
+        // Taken out while it reads this trainer, and put back even if it fails.
         if let Some(mut delegate) = self.device.take() {
             let outcome = self.delegated(&mut delegate, state);
             self.device = Some(delegate);
@@ -40,6 +41,7 @@ impl<T: Float> Trainer<'_, T> {
         let (step, occupancy) = (now.step, self.mask(now));
         let place = Place { parameters: &now.parameters, axis: now.axis, occupancy, step };
         let loss = self.loss(place, &mut of_axis);
+        // Before a state is kept no loss is too large, unless it is no number.
         let calm = state.good.as_ref().map_or(f64::INFINITY, |good| good.loss);
         let finite = loss.total.is_finite() && of_axis.iter().all(|slope| slope.is_finite());
         if !finite || loss.total > self.training.divergence * calm {
@@ -47,6 +49,7 @@ impl<T: Float> Trainer<'_, T> {
             return Ok(step_back(state, loss.total, step)?);
         }
         now.loss = loss.total;
+        // Before the step is taken: it is these parameters that have this loss.
         if now.step.is_multiple_of(self.training.keep_every.max(1)) {
             state.good = Some(Box::new(now.clone()));
         }
@@ -112,6 +115,7 @@ impl<T: Float> Trainer<'_, T> {
 
     /// Draws the pairs or frames of a step.
     pub(in crate::fit) fn choose(&mut self, step: u64) {
+        // Of seed and step alone: a fit that is resumed, or goes back, draws the same.
         let mut random = Pcg64::seed_from_u64(mix(self.training.seed, step, 0));
         let Self { objective, training, observed, pairs, frames, .. } = self;
         match training.batch {
@@ -142,6 +146,7 @@ impl<T: Float> Trainer<'_, T> {
             None => adam.step(rate, gradient, &mut now.adam, parameters),
         }
         self.representation.project(&mut now.parameters);
+        // The step is counted last: the rates of parameters and axis are those of its number.
         self.turn(now, of_axis);
         now.step += 1;
     }
@@ -151,6 +156,7 @@ impl<T: Float> Trainer<'_, T> {
         let Training { adam, axis_rate: Some(axis_rate), .. } = &self.training else { return };
         let mut moved = now.axis.vector();
         let rate = self.part(now, 0) * axis_rate.rate(now.step);
+        // Adam's step leaves the sphere; the axis is the direction in which it ends.
         adam.step(rate, &of_axis, &mut now.axis_adam, &mut moved);
         now.axis = Axis::new(moved).unwrap_or(now.axis);
     }
@@ -158,6 +164,7 @@ impl<T: Float> Trainer<'_, T> {
     /// Part of the rates that step number `ahead` from here takes.
     fn part(&self, now: &Progress<T>, ahead: u64) -> f64 {
         let step = now.step + ahead;
+        // The first step moves already, and without a ramp at the full rate.
         ((step + 1) as f64 / (self.training.ramp + 1) as f64).min(1.0) * now.caution
     }
 
@@ -169,7 +176,8 @@ impl<T: Float> Trainer<'_, T> {
 
 /// A seed for what a step draws.
 fn mix(seed: u64, step: u64, purpose: u64) -> u64 {
-    // SplitMix64's finaliser (Steele, Lea & Flood 2014).
+    // SplitMix64's finaliser (Steele, Lea & Flood 2014): seeds and steps in a row give unrelated
+    // streams. Two bits tell four purposes apart.
     let mut x = seed ^ step.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ purpose << 62;
     x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);

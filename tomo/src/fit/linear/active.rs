@@ -28,6 +28,7 @@ impl Active {
         for (k, _) in is_active.iter().enumerate().filter(counts) {
             column[k] = node.len() as u32;
             node.push(k as u32);
+            // Pixels of a quiescent image belong to no cell.
             if k >= nodes {
                 continue;
             }

@@ -34,6 +34,7 @@ impl Certificate {
     pub(super) fn bounds(x: &[f64], gradient: &[f64], upper: f64) -> (f64, f64) {
         let (mut gap, mut violation) = (0.0, 0.0f64);
         for (x, g) in x.iter().zip(gradient) {
+            // ⟨g, s⟩ is least over the box where s = 0 for g ≥ 0, and s = upper for g < 0.
             gap += g * x + upper * (-g).max(0.0);
             let wrong = if *x <= 0.0 {
                 (-g).max(0.0)

@@ -83,6 +83,7 @@ impl Change {
 
     /// Values at all knots of a field that is the same at all times.
     pub(super) fn steady(&self, field: &[f64]) -> Vec<f64> {
+        // Births add up: what is there at the first knot stays.
         let share = |knot: usize| if knot > 0 && self.is_born() { 0.0 } else { 1.0 };
         let knots = (0..self.knots.count).map(share);
         knots.flat_map(|share| field.iter().map(move |x| share * x)).collect()
@@ -112,6 +113,7 @@ impl Change {
         }
         let nodes = x.len() / self.knots.count;
         if self.is_born() {
+            // What is there from the beginning has no price.
             return births(factor, &x[nodes..], prices, &mut gradient[nodes..]);
         }
         let epsilon = SMOOTH * upper;
@@ -119,6 +121,7 @@ impl Change {
         for k in nodes..x.len() {
             let difference = x[k] - x[k - nodes];
             let root = difference.hypot(epsilon);
+            // Less ε, so that a steady field costs nothing.
             sum += root - epsilon;
             gradient[k] += factor * difference / root;
             gradient[k - nodes] -= factor * difference / root;

@@ -93,6 +93,7 @@ impl<'a, T: Float> Data<'a, T> {
         gradient: &mut [T],
     ) -> Option<(String, f64)> {
         let value = |data: &Weighted<'a, T>| {
+            // Only the value is wanted: with weight 0 the gradient gets nothing.
             let value = data.term.value_and_gradient(frame, image, T::zero(), gradient);
             (data.term.name().to_owned(), value)
         };

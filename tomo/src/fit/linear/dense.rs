@@ -26,6 +26,7 @@ impl<T: Float + Default> Operator<'_, T> {
     /// Rows to which all rays add.
     pub fn fluxes_of(&self, frame: usize) -> Rows<T> {
         let columns = self.active.count();
+        // Rays pass the same nodes: a row for each ray would hold a column many times.
         let mut sums = vec![T::zero(); self.pixels * columns];
         let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
         let mut weights = [T::zero(); STENCIL];
@@ -42,6 +43,7 @@ impl<T: Float + Default> Operator<'_, T> {
             }
         });
         let mut rows = Rows::default();
+        // No column counts where all nodes are dark; chunks of length 0 panic.
         for (pixel, row) in sums.chunks_exact(columns.max(1)).enumerate() {
             rows.push_dense(pixel as u32, row);
         }

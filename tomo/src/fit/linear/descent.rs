@@ -122,14 +122,20 @@ impl<'a, 'b> Descent<'a, 'b> {
             let Parts { free, leaving } = self.parts();
             let steepest: Vec<f64> = free.iter().zip(&leaving).map(|(a, b)| a + b).collect();
             let mut direction = pairs.direct(&steepest);
+            // Second derivatives couple numbers: one at its bound may be led out of the box. Cut
+            // off by the projection alone, the step need not lead downhill (Bertsekas 1982).
             self.hold(&mut direction);
+            // What was taken out may have been all that led downhill.
             if dot(&direction, &steepest) <= 0.0 {
                 pairs.clear();
                 direction.clone_from(&steepest);
             }
+            // An L-BFGS direction has the length of a Newton step; a gradient has no such length.
             let step = if pairs.is_empty() { self.first_step(&direction) } else { 1.0 };
             let (y, gradient) = (self.y.clone(), self.gradient.clone());
             if !self.project(step, &direction) {
+                // Pairs that no longer fit may be why no step helps: once more without them. Where
+                // the gradient itself does not help, only rounding is left.
                 if pairs.is_empty() {
                     return Ending::Rounding;
                 }
@@ -156,11 +162,13 @@ impl<'a, 'b> Descent<'a, 'b> {
     /// The best step against a direction as far as the gradient a little way along it tells.
     fn first_step(&mut self, direction: &[f64]) -> f64 {
         let length = dot(direction, direction).sqrt();
+        // A small part of the field, and a length above 0 where it is dark.
         let reach = 1e-2 * dot(&self.y, &self.y).sqrt().max(1.0) / length;
         let (mut moved, mut there) = (self.y.clone(), Vec::new());
         add(&mut moved, -reach, direction);
         self.problem.value_and_gradient(&moved, &mut there);
         let bend = difference(&self.gradient, &there);
+        // Where the slope vanishes if it goes on falling as it does over `reach`.
         let step = reach * dot(&self.gradient, direction) / dot(&bend, direction);
         // Where the function bends down, no step is best: one as long as was looked ahead.
         if step.is_finite() && step > 0.0 { step } else { reach }

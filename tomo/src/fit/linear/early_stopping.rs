@@ -80,6 +80,8 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             let (x, gradient) = (&round.least.x, &round.gradient);
             let [inside, outside] =
                 [true, false].map(|inside| violation(x, gradient, &is_active, inside));
+            // Others need not satisfy the conditions better than those that count; where iterations
+            // ran out, these may still improve.
             let is_done = outside <= inside && round.ending != Ending::Exhausted;
             shines = x.iter().zip(gradient).map(|(x, g)| *x > 0.0 || *g < -inside).collect();
             least = round.least;
@@ -103,6 +105,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let shines = first.x.iter().map(|x| *x > SHINES * most).collect();
         let active = self.active(&self.beside_those(shines));
         let settings = settling();
+        // Prices change from round to round, nodes do not: the matrix is made once.
         let operator = Operator::new(self.walk(), active, self.frames, settings.memory);
         let mut watch = |_: &LinearProgress<'_>| ControlFlow::Continue(());
         let mut run = Run::new(self, &settings, &mut watch);

@@ -75,7 +75,7 @@ impl Around {
     pub fn spot(&self, spots: Spots, k: usize) -> Vec<f64> {
         let (circle, place) = (k / spots.on_each, k % spots.on_each);
         let radius = (circle as f64 + 1.0) / (spots.circles as f64 + 1.0);
-        // Every other circle is turned by half a place.
+        // Every other circle is turned by half a place, so that spots fill the gaps between others.
         let turn = (place as f64 + 0.5 * (circle % 2) as f64) / spots.on_each as f64;
         let (sin, cos) = (TAU * turn).sin_cos();
         self.field(|[h, u, v]| {

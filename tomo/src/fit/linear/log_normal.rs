@@ -72,6 +72,7 @@ impl<T: Float + Default> Posterior<'_, '_, T> {
         let mut slopes = Vec::new();
         let of_data = self.objective.value_and_gradient(&emission, &mut slopes);
         for (slope, e) in slopes.iter_mut().zip(&emission) {
+            // de/d ln e = e; emission that is held at its bound does not follow its logarithm.
             *slope *= if *e < self.upper { *e } else { 0.0 };
         }
         let share = 1.0 / self.objective.data.count as f64;
@@ -125,6 +126,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
     ) -> Result<LinearSolution<T>, Error> {
         self.check(settings)?;
         self.check_prior(prior.count())?;
+        // Beside a prior every datum counts as its error says, here as beside a Gaussian one.
         let data = self.data()?.together(self.frames);
         let operator = Operator::new(self.walk(), self.all(), self.frames, settings.memory);
         let terms = self.penalised(&data);
@@ -136,6 +138,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         place.value = posterior.value_and_gradient(&place.white, &mut place.state.numbers[..count]);
         let (start, start_slope) = (place.value, place.slope());
         posterior.objective.finite(start, &posterior.emission(&place.white))?;
+        // The gradient is in the state already: the first step need not evaluate it again.
         place.state.value = Some(start);
         let ending = posterior.descend(&mut place, settings, watch);
         let emission = posterior.emission(&place.white);

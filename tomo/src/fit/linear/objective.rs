@@ -50,6 +50,8 @@ impl Penalised<'_> {
     fn add_curvature(&self, direction: &[f64], out: &mut [f64]) {
         if let Some(at) = self.priors.iter().position(|p| p.regulariser == Regulariser::Smoothness)
         {
+            // The gradient of a quadratic form at a direction is its second derivative times it.
+            // What is no such form, or is added elsewhere, is left out.
             let change = Change { weight: 0.0, ..self.change };
             let smoothness = Self {
                 priors: &self.priors[at..=at],
@@ -68,6 +70,7 @@ impl Penalised<'_> {
     /// Returns the objective of values at all nodes and knots; those on fields are the means over time of a field that
     /// changes, sums over what is born. Adds slopes.
     pub fn value_and_gradient(&self, x: &[f64], slopes: &mut [f64]) -> f64 {
+        // Before the slices that end where the parameters of the image begin.
         let of_image = self.quiescent.map_or(0.0, |image| image.penalty(x, slopes));
         let fields = self.shape.count() * self.change.knots.count;
         let (x, slopes) = (&x[..fields], &mut slopes[..fields]);
@@ -103,6 +106,7 @@ impl<'a, 'b, T: Float + Default> Objective<'a, 'b, T> {
         data: &'b Data<'a, T>,
         terms: &'b Penalised<'b>,
     ) -> Self {
+        // For products with second derivatives, which only of quadratic data are constant.
         let dark = if data.is_quadratic() { operator.dark(data) } else { None };
         Self { operator, data, terms, dark, evaluations: 0 }
     }
@@ -147,6 +151,8 @@ impl<'a, 'b, T: Float + Default> Objective<'a, 'b, T> {
         else {
             return squares;
         };
+        // Squares of columns know neither errors nor weights of the data. Alone their scale hardly
+        // matters; beside second derivatives of a prior it does.
         let mut random = Pcg64::seed_from_u64(0);
         let signs: Vec<T> =
             squares.iter().map(|_| T::of(if random.random() { 1.0 } else { -1.0 })).collect();
@@ -161,6 +167,7 @@ impl<'a, 'b, T: Float + Default> Objective<'a, 'b, T> {
         if self.terms.is_empty() {
             return 0.0;
         }
+        // Penalties couple neighbours: those that do not count enter as dark ones.
         let all = self.operator.active.expand(x);
         let mut slopes = vec![0.0; all.len()];
         let value = self.terms.value_and_gradient(&all, &mut slopes);

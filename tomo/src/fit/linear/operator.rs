@@ -178,6 +178,8 @@ impl<'a, T: Float + Default> Operator<'a, T> {
     /// kept.
     pub fn curvature(&self, data: &Data<'_, T>, dark: Option<&[T]>, direction: &[T]) -> Vec<f64> {
         let nothing = vec![T::zero(); if dark.is_none() { self.pixels } else { 0 }];
+        // The gradient of quadratic data is affine in the image: less that of a dark image, it is
+        // the second derivative times the image.
         let link = |k: usize, image: &[T], slopes: &mut [T]| {
             let frame = self.frames[k];
             data.value(frame, image, slopes);
@@ -215,6 +217,7 @@ impl<'a, T: Float + Default> Operator<'a, T> {
 
     /// Returns the slopes with respect to the nodes that count, from those with respect to pixels, frame after frame.
     pub fn adjoint(&self, slopes: &[T]) -> Vec<f64> {
+        // Only the way back is wanted: the images that go with it are not looked at.
         let dark = vec![T::zero(); self.active.count()];
         let link = |k: usize, _: &[T], out: &mut [T]| {
             out.copy_from_slice(&slopes[k * self.pixels..(k + 1) * self.pixels]);
@@ -249,6 +252,7 @@ impl<'a, T: Float + Default> Operator<'a, T> {
             let frame = self.frames[k];
             if let Some((name, value)) = data.not_finite(frame, image, slopes) {
                 let mut first = first.lock().unwrap_or_else(PoisonError::into_inner);
+                // Threads take frames in any order; the earliest is always the one that is named.
                 if first.as_ref().is_none_or(|(earlier, ..)| frame < *earlier) {
                     *first = Some((frame, name, value));
                 }
@@ -277,10 +281,12 @@ impl<'a, T: Float + Default> Operator<'a, T> {
             match held {
                 Held::Kept(rows) => add(rows),
                 Held::Made => self.each_row(*frame, &mut Buffers::default(), &mut add),
+                // Frames without rows are left out: norms only scale the steps.
                 Held::Walked => {}
             }
         }
         if let Some(quiescent) = &self.walk.model.quiescent {
+            // A pixel that does not move enters every frame with the same factor.
             let square = self.frames.len() as f64 * quiescent.unit() * quiescent.unit();
             quiescent.of_mut(&mut sums).fill(square);
         }
@@ -291,6 +297,8 @@ impl<'a, T: Float + Default> Operator<'a, T> {
 fn total<T: Float>(pieces: Vec<(f64, Vec<T>)>, count: usize) -> Vec<f64> {
     let mut sums = vec![0.0; count];
     const SHARE: usize = 8192;
+    // A thread adds all pieces for its own nodes, in the order of frames: the same bits on any
+    // number of threads.
     sums.par_chunks_mut(SHARE).enumerate().for_each(|(k, sums)| {
         for (_, piece) in &pieces {
             let piece = &piece[k * SHARE..k * SHARE + sums.len()];

@@ -65,6 +65,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
     pub(super) fn active(&self, is_active: &[bool]) -> Active {
         let allowed = self.allowed();
         let mut is_active = is_active.to_vec();
+        // A quiescent image behind the knots may be long enough for another chunk.
         let knots = is_active.chunks_exact_mut(allowed.len()).take(self.change.knots.count);
         knots.flat_map(|knot| knot.iter_mut().zip(&allowed)).for_each(|(x, may)| *x &= *may);
         Active::new(&is_active, &self.voxels.corners(), self.beside())
@@ -133,6 +134,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         self.gaussian.map_or(Ok(()), |gaussian| self.check_prior(gaussian.count()))?;
         let positive = |x: f64| x.is_finite() && x > 0.0;
         check("upper", upper, positive(upper), "above 0")?;
+        // Descent and certificate have one bound for all numbers.
         let of_image = self.model.quiescent.as_ref().map_or(upper, |image| image.most);
         check("most of the quiescent image", of_image, of_image == upper, "upper")?;
         check("flux", flux.unwrap_or(1.0), flux.is_none_or(positive), "above 0")?;

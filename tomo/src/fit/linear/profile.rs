@@ -55,6 +55,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         iterations: usize,
     ) -> Result<Profile, Error> {
         let data = self.data()?;
+        // Nodes at a bound stay there when numbers change a little.
         let shines: Vec<bool> = x.iter().map(|x| *x > 0.0 && *x < self.upper).collect();
         let operator = Operator::new(self.walk(), self.active(&shines), self.frames, usize::MAX);
         let here = operator.active.gather(x);
@@ -82,6 +83,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             let follows = dot(&taken[a], &absorbed[b]) + dot(&absorbed[a], &left[b]);
             product(&tangents[a], &moved.bent[b]) - follows
         };
+        // The form is symmetric but for rounding.
         let bends = (0..n * n).map(|k| 0.5 * (bend(k) + bend(k % n * n + k / n))).collect();
         let response = |absorbed: &Vec<f64>| {
             let moved: Vec<f64> = absorbed.iter().map(|x| -x).collect();
@@ -140,12 +142,14 @@ fn solved(objective: &mut dyn Convex, b: &[f64], iterations: usize) -> (Vec<f64>
     for _ in 0..iterations {
         objective.curvature(&p, &mut product);
         let bend = dot(&p, &product);
+        // No residual is left but rounding, or no curvature along the direction.
         if bend <= 0.0 || rz <= 0.0 {
             break;
         }
         let step = rz / bend;
         add(&mut x, step, &p);
         add(&mut r, -step, &product);
+        // A step adds this to xᵀ M x: directions are conjugate.
         let gained = step * rz;
         absorbed += gained;
         if gained < ENOUGH * absorbed {

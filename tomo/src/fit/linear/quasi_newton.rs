@@ -42,6 +42,7 @@ impl Pairs {
             all.map(|((a, b), free)| if *free { a * b } else { 0.0 }).sum()
         };
         let curvatures: Vec<f64> = self.0.iter().map(|(s, b)| product(s, b)).collect();
+        // Over the numbers that are free now a pair may have no positive curvature any more.
         let useful = |k: &usize| curvatures[*k] > 0.0;
         let mut direction = gradient.to_vec();
         let mut parts = vec![0.0; self.0.len()];
@@ -52,6 +53,7 @@ impl Pairs {
         }
         if let Some(last) = (0..self.0.len()).rev().find(useful) {
             let bend = &self.0[last].1;
+            // Scale of the first matrix, from the newest pair (equation 7.20).
             let scale = curvatures[last] / product(bend, bend);
             direction.iter_mut().for_each(|d| *d *= scale);
         }

@@ -45,6 +45,7 @@ impl Voxels {
 
     /// Returns the shape that penalties see.
     pub fn shape(&self) -> Shape {
+        // Fewer than two nodes are refused by `field`; until then nothing is divided by 0.
         let spacing = |k: usize| (self.high[k] - self.low[k]) / (self.nodes[k].max(2) - 1) as f64;
         Shape { nodes: self.nodes, spacing: [0, 1, 2].map(spacing) }
     }
@@ -116,9 +117,11 @@ impl<T: Float> Geometry<T> {
         let (mut corner, mut within) = (0, [T::zero(); 3]);
         for k in 0..3 {
             let u = (point[k] - self.low[k]) * self.per_length[k];
+            // Written so that a coordinate that is not a number lies outside.
             if !(u >= T::zero() && u <= self.cells[k]) {
                 return None;
             }
+            // The far face belongs to the last cell.
             let cell = u.to_u32().map_or(0, |cell| cell as usize).min(self.last[k]);
             within[k] = u - T::of(cell as f64);
             corner = corner * self.nodes[k] + cell;
@@ -188,8 +191,11 @@ impl<'a, T: Float> Walk<'a, T> {
             return true;
         }
         let of_knot = first + knot as f64 * spacing;
+        // The light of a frame left over a span of times, one for each node, which the hat or ramp
+        // of the knot has to meet.
         let [earliest, latest] =
             [1, 0].map(|k| (self.model.times[frame] - self.delays[k]).double());
+        // Before the first knot and after the last one emission stays as it is there.
         let begun = knot == 0 || latest > of_knot - spacing;
         let over = allowed == Allowed::Any && knot + 1 < count && earliest > of_knot + spacing;
         begun && !over
@@ -203,10 +209,13 @@ impl<'a, T: Float> Walk<'a, T> {
         buffers: &mut Buffers<T>,
         ray: &mut impl FnMut(u32, &[Place<T>]),
     ) {
+        // A field of births says where matter is at the time of its knot, other fields where it is
+        // at the reference time.
         let label = T::of(self.knots.label_time(knot));
         let starts = &self.model.starts;
         let mut first = 0;
         while first < self.model.rays() {
+            // Whole rays, as many as fit into a block; a longer one is a block of its own.
             let after = starts.partition_point(|start| *start <= starts[first] + BLOCK) - 1;
             let next = after.max(first + 1);
             self.pull(starts[first]..starts[next], self.model.times[frame] - label, buffers);
@@ -251,6 +260,7 @@ impl<'a, T: Float> Walk<'a, T> {
         if self.model.delay.is_empty() {
             angles.extend(rates.iter().map(|rate| *rate * time));
         } else {
+            // −Ω (t − delay): `rate` is −Ω, `phase` is Ω · delay.
             let phases = rates.iter().zip(&self.model.phase[range.clone()]);
             angles.extend(phases.map(|(rate, phase)| *rate * time + *phase));
         }

@@ -46,6 +46,7 @@ impl<'a, T: Float + Default> Operator<'a, T> {
     fn largest(&self, frames: &[usize], room: usize) -> usize {
         let points = self.walk.model.points() * self.corners.len();
         let bound = points.saturating_mul(size_of::<T>() + 4);
+        // A frame is measured by making its rows: not where even the bound fits.
         if bound.saturating_mul(GROWTH * frames.len()) <= room {
             return bound;
         }
@@ -57,8 +58,11 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         let (mut bytes, mut kept) = (0, self.bytes());
         let mut rest = frames;
         while !rest.is_empty() {
+            // Rows may all be empty, and room is divided by their size.
             let growing = GROWTH * (*largest).max(1);
             let together = (room.saturating_sub(kept) / growing).min(rest.len());
+            // Rows without room count against the budget as well: it alone decides where walks
+            // begin, and with them the last bits.
             if together == 0 {
                 bytes += rest.par_iter().map(|frame| self.bytes_of(*frame)).sum::<usize>();
                 self.rows.extend(rest.iter().map(|_| Held::Made));
@@ -85,6 +89,7 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         self.walk.frame(frame, wanted, &mut Buffers::default(), |pixel, places| {
             rows.push(pixel, places, &self.active, &self.corners, degree, &mut place);
         });
+        // Vectors grow ahead of their length, which is all that `bytes` counts.
         rows.columns.shrink_to_fit();
         rows.entries.shrink_to_fit();
         rows

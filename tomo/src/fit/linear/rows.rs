@@ -49,6 +49,8 @@ impl<T: Float> Rows<T> {
                 if column == NONE || entry == T::zero() {
                     continue;
                 }
+                // `place` is never cleared: what earlier rows left in it lies before `start`, or
+                // another column stands there now.
                 let known = place[column as usize] as usize;
                 if known >= start && self.columns.get(known) == Some(&column) {
                     self.entries[known] += entry;

@@ -62,10 +62,12 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
     /// go on.
     pub fn image_first(&mut self, data: &Data<'_, T>) -> bool {
         let problem = self.problem;
+        // Other data have no slope in the dark: a round image is among their initial fields.
         if problem.beside() == 0 || !data.is_convex() {
             return true;
         }
         let nodes = vec![false; problem.unknowns()];
+        // No node counts: there are no rows to keep.
         let operator = Operator::new(problem.walk(), problem.active(&nodes), problem.frames, 0);
         let terms = problem.penalised(data);
         let mut objective = Objective::new(&operator, data, &terms);
@@ -117,7 +119,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         };
         let each: &mut Each<'_> = &mut each;
         let LinearSettings { tolerance, settled, .. } = *self.settings;
-        // A part of the standard deviation of χ².
+        // χ² of N data scatters by √(2 N), √(2/N) of itself: `settled` is a part of that.
         let settled = settled * (2.0 / objective.data.count as f64).sqrt();
         let stop = Stop { iterations, tolerance, settled };
         let scaled = Scaled::new(objective, self.problem.upper);
@@ -136,6 +138,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
             (false, _) => coarse.stride.div_ceil(2),
         };
         let frames: Vec<usize> = self.problem.frames.iter().copied().step_by(stride).collect();
+        // A Gaussian prior belongs to the nodes of the fine grid.
         let problem =
             LinearProblem { voxels, frames: &frames, priors: &[], gaussian: None, ..*self.problem };
         let data = problem.data()?;
@@ -157,6 +160,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         };
         self.lit = lit.map_or(Ok(Vec::new()), |lit| refined(&lit))?;
         let x = refined(&x)?;
+        // Parameters of a quiescent image have another unit: they do not say what is bright.
         let fields = &x[..x.len() - operator.active.beside];
         let least = self.settings.threshold * fields.iter().fold(0.0f64, |most, x| most.max(*x));
         let bright: Vec<bool> = fields.iter().map(|x| *x > least).collect();
@@ -188,6 +192,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
             return Ok(());
         }
         let problem = self.problem;
+        // Rows of all nodes are not worth their memory for a single evaluation.
         let operator = Operator::new(problem.walk(), problem.all(), problem.frames, 0);
         let terms = problem.penalised(data);
         let mut objective = Objective::new(&operator, data, &terms);
@@ -210,6 +215,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         let active = problem.active(is_active);
         let operator = Operator::new(problem.walk(), active, problem.frames, settings.memory);
         self.bytes = self.bytes.max(operator.bytes());
+        // The first round does not know yet where births are: all cost the same.
         let prices = match self.round {
             0 | 1 => Vec::new(),
             _ => problem.change.prices(x, problem.voxels.shape()),
@@ -225,20 +231,24 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
             *x = operator.active.expand(&inner);
             return Ok(Some(self.cancelled(core::mem::take(x), operator.active.count())));
         }
+        // Value and gradient below have to be those of the field that is returned.
         self.rescale(&objective, &mut inner)?;
         *x = operator.active.expand(&inner);
         let (value, gradient) = objective.everywhere(&inner);
+        // Nodes that must stay dark are no part of the box: their slopes would widen the gap.
         let gradient = problem.only_allowed(gradient);
         self.evaluations += objective.evaluations;
         let (upper, value) = (problem.upper, objective.finite(value, &inner)?);
         let (gap, violation) = Certificate::bounds(x, &gradient, upper);
         let convex = data.is_convex();
+        // A dark field has no slope where data are not convex: the lit one gives the scale.
         let slope = if convex { dark_slope } else { self.at_lit[1] };
         // As long as those that count violate the conditions, others need not satisfy them any better.
         let inside = Certificate::bounds(&inner, &operator.active.gather(&gradient), upper).1;
         let least = -inside.max(settings.admission * slope);
         let outside = |k: &usize| !is_active[*k] && gradient[*k] < least;
         let admitted: Vec<bool> = (0..x.len()).map(|k| outside(&k)).collect();
+        // A descent that ran out of iterations goes on in another round, with new nodes or without.
         let none = !admitted.iter().any(|new| *new) && ending != Ending::Exhausted;
         if none || self.round >= settings.rounds {
             let certificate = Certificate { value, dark, gap, violation, dark_slope, upper };
@@ -251,6 +261,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
             )));
         }
         let fields = x.len() - problem.beside();
+        // Neighbours of light count, so that it can spread; all other dark nodes are dropped.
         let shining = x[..fields].iter().zip(&admitted).map(|(x, new)| *x > 0.0 || *new);
         *is_active = dilated(shining.collect(), problem.voxels.nodes, 1);
         is_active.resize(x.len(), true);

@@ -22,6 +22,7 @@ impl<'a> Scaled<'a> {
 
     pub fn to(&self, y: &[f64]) -> Vec<f64> {
         let x = y.iter().zip(&self.root).map(|(y, root)| y / root);
+        // Division may round a number at its bound to one beyond it.
         x.map(|x| x.clamp(0.0, self.upper)).collect()
     }
 

@@ -37,7 +37,8 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         if !run.image_first(&data) {
             return Ok(run.cancelled(run.dark(self.unknowns()), 0));
         }
-        // A prior has something to say of every node.
+        // A prior has something to say of every node: none is left out at first. Data that are not
+        // convex need a lit field all the same.
         let coarse = settings.coarse.filter(|_| self.gaussian.is_none() || !data.is_convex());
         let coarse = coarse.or((!data.is_convex()).then_some(LIT));
         let (mut x, mut is_active) = match coarse {
@@ -58,6 +59,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             let field: Vec<f64> = carried.emission.iter().map(|e| e.double()).collect();
             x = self.change.steady(&field);
             x.extend(carried.quiescent.iter().map(|x| x.double()));
+            // Light at nodes that do not count would be lost.
             is_active.iter_mut().zip(&x).for_each(|(active, x)| *active |= *x > 0.0);
         }
         run.reference(&data)?;
@@ -87,6 +89,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
     /// # Panics
     /// If the field has another number of values.
     pub fn least_from(&self, start: Option<&[f64]>, iterations: usize) -> Result<Least, Error> {
+        // Values of many similar problems are compared: each takes all of its iterations.
         let settings = LinearSettings { coarse: None, tolerance: 0.0, ..LinearSettings::default() };
         self.check(&settings)?;
         let data = self.data()?;
@@ -131,11 +134,13 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             let allowed = "as many as the nodes at all knots";
             return Err(Error::out_of_range("values", emission.len() as f64, allowed));
         }
+        // Dark nodes add nothing to an image.
         let shines: Vec<bool> = emission.iter().map(|x| *x != T::zero()).collect();
         let data = self.data()?;
         let operator = Operator::new(self.walk(), self.active(&shines), self.frames, 0);
         let x = operator.active.gather(emission);
         let (mut slopes, mut sum) = (vec![T::zero(); self.model.pixels()], 0.0);
+        // Some frames at a time: a movie may be larger than memory.
         for (k, frames) in self.frames.chunks(TOGETHER).enumerate() {
             let images = operator.some_images(&x, k * TOGETHER..k * TOGETHER + frames.len());
             for (frame, image) in frames.iter().zip(images.chunks_exact(slopes.len())) {

@@ -42,6 +42,7 @@ impl<T: Float + Default> Run<'_, '_, '_, T> {
     ) -> Result<Vec<(f64, Vec<f64>)>, Error> {
         let around = Around::new(&objective.operator.voxels(), self.problem.axis);
         let seen = objective.operator.seen();
+        // Closure quantities are not defined in the dark: any lit field is better there.
         let dark = match objective.data.is_scale_free() {
             true => f64::INFINITY,
             false => objective.nothing().0,
@@ -52,17 +53,20 @@ impl<T: Float + Default> Run<'_, '_, '_, T> {
             let mut shape = objective.terms.change.steady(&shape);
             shape.extend_from_slice(image);
             let mut shape = objective.operator.active.gather(&shape);
+            // Where no ray passes data have no slope: light would stay there as it was put.
             shape.iter_mut().zip(&seen).for_each(|(x, seen)| *x *= f64::from(u8::from(*seen)));
             self.scaled(objective, &shape)
         };
         let wide = around.wide().into_iter().map(|shape| scaled(shape, &beside));
         let mut wide = wide.collect::<Result<Vec<_>, _>>()?;
+        // What does not move may explain the data alone.
         if let Some(image) = quiescent {
             wide.push(scaled(around.dark(), &image.round())?);
         }
         let spot = |k: usize| scaled(around.spot(trials.spots, k), &beside);
         let spots = (0..trials.spots.count()).map(spot);
         let spots = spots.collect::<Result<Vec<_>, _>>()?;
+        // A dark field whose χ² is not a number is not the better one.
         let lit = |start: &(f64, Vec<f64>)| start.0 < dark || dark.is_nan();
         let mut spots: Vec<_> = spots.into_iter().flatten().filter(lit).collect();
         spots.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -87,6 +91,7 @@ impl<T: Float + Default> Run<'_, '_, '_, T> {
         let top = self.problem.upper / largest;
         let scale = if objective.data.is_scale_free() {
             let missing = || LinearError::NoFlux(objective.data.names());
+            // These data do not feel the scale: a start that the bound keeps fainter is as good.
             (self.problem.flux.ok_or_else(missing)? / flux).min(top)
         } else {
             let mut gradient = Vec::new();
@@ -114,6 +119,7 @@ fn newton(top: f64, mut slope: impl FnMut(f64) -> f64) -> f64 {
         // Never dark: there amplitudes have no slope.
         scale = next.clamp(1e-9 * top, top);
         flat = slope(scale);
+        // Held at the same end again: there is no secant through one point.
         if scale == before {
             break;
         }

@@ -56,6 +56,8 @@ impl ChangePrice {
         let at = || Coordinates::txyz(t, x, y, z);
         field.representation.eval_recorded(field.parameters, at(), values, workspace);
         let pairs = t.len() / 2;
+        // A pair stands for its part of the volume and of all spacings of knots. Those left out
+        // count as well: nothing changes there.
         let factor = self.weight * volume * (self.knots.count - 1) as f64 / PAIRS as f64;
         slopes.clear();
         slopes.resize(t.len(), T::zero());
@@ -112,6 +114,7 @@ impl ChangePrice {
         let Knots { first, spacing, count, .. } = self.knots;
         let steps = match self.linear {
             true => random.random_range(0..count - 1) as f64,
+            // The later time of a pair is a spacing on, and still before the last knot.
             false => random.random::<f64>() * (count - 2) as f64,
         };
         first + steps * spacing

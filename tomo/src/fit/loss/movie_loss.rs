@@ -65,6 +65,7 @@ impl<T: Float> Objective<T> {
             let scale = 1.0 / self.data_of(term, frames.len());
             let mut chi2 = 0.0;
             for (frame, image) in frames.iter().zip(movie.images()) {
+                // χ² does not depend on the weight; 0 adds no gradient.
                 chi2 += term.value_and_gradient(*frame, &image?, T::zero(), &mut none);
             }
             let value = scale * chi2;

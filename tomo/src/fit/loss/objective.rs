@@ -113,6 +113,8 @@ impl<T: Float> Objective<T> {
 
     /// Real data of each kind in a typical frame times `frames`: what χ² is divided by.
     pub(in crate::fit) fn data_of(&self, term: &dyn FrameTerm<T>, frames: usize) -> f64 {
+        // Frames count by the mean of their data, not by their own: the loss of random frames is
+        // then on average that of all data.
         let all: usize = (0..term.frames()).map(|frame| term.degrees_of_freedom(frame)).sum();
         let observed = self.observed().len().max(1);
         (all as f64 / observed as f64 * frames as f64).max(1.0)
@@ -159,6 +161,7 @@ impl<T: Float> Objective<T> {
         let Buffers { batch, workspace, of_points, of_weights, .. } = buffers;
         batch.set(pairs.iter().copied());
         batch.gather_field(&self.model, field);
+        // Both closures below read the batch while values are written.
         let mut values = core::mem::take(&mut batch.values);
         values.resize(batch.points(), T::zero());
         let residual = |group: usize, values: &[T]| {
@@ -168,6 +171,7 @@ impl<T: Float> Objective<T> {
             pixel - term.pixel(frame as usize, self.model.pixel[ray as usize] as usize)
         };
         let link = |groups: Range<usize>, values: &[T], out: &mut [T]| {
+            // Groups come in blocks: `values` and `out` begin with the first point of theirs.
             let first = batch.starts[groups.start];
             for group in groups {
                 let range = batch.starts[group]..batch.starts[group + 1];
@@ -189,6 +193,7 @@ impl<T: Float> Objective<T> {
             let range = ends[0]..ends[1];
             let left = residual(group, &values[range.clone()]).double();
             total += left * left;
+            // d(loss)/d(weight) of a node is the slope of its pixel times its emission.
             for k in range.filter(|_| shifted) {
                 let node = batch.columns.node[k] as usize;
                 of_weights[node] += slope.double() * left * values[k].double();
@@ -224,6 +229,7 @@ impl<T: Float> Objective<T> {
                     term.value_and_gradient(frame, &buffers.image, factor, &mut buffers.of_image);
                 loss.terms[k] += scales[k] * value;
             }
+            // All terms share the image: their slopes add up, and go back through the field once.
             self.back(field, gradients, buffers);
         }
         let weights = self.terms().map(|(_, weight)| weight);
@@ -251,6 +257,8 @@ impl<T: Float> Objective<T> {
         for (group, (ray, _)) in batch.pairs.iter().enumerate() {
             let pixel = self.model.pixel[*ray as usize] as usize;
             let range = batch.starts[group]..batch.starts[group + 1];
+            // Polarised factors have the redshift of their own law, and a known axis: weights have
+            // no slope with respect to it.
             if let Some(planes) = &self.model.planes {
                 for k in range {
                     let slope = planes.slope(of_image, pixel, batch.columns.node[k]);

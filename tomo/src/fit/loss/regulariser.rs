@@ -93,6 +93,7 @@ impl Regulariser {
         let plane = shape.nodes[1] * shape.nodes[2];
         let of_plane = |(i, out): (usize, &mut [T])| match self {
             Self::TotalVariation { epsilon } => {
+                // F(s) = √(s + ε²) − ε of the squared slope s, and 2 F′ = 1/√(s + ε²).
                 let slope = |square: f64| (square + epsilon * epsilon).sqrt();
                 let norm = |square| (slope(square) - epsilon, 1.0 / slope(square));
                 Differences { values, shape, norm }.plane(i, scale, out)

@@ -66,6 +66,7 @@ impl<T: Float> FrameTerm<T> for ScanTerm<T> {
         let Some(Scan { transform, term }) = &self.scans[frame] else {
             return Some(Compared::Nothing);
         };
+        // Devices sum one image directly; several, for Stokes parameters, stay on the processor.
         let (sky, pulse, uv) = transform.direct().filter(|_| transform.frames() == 1)?;
         let of_pixel = |uv: [f64; 2]| (uv, pulse.transform(uv, sky.pixel_rad));
         let seen = uv.into_iter().map(of_pixel).collect();

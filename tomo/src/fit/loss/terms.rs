@@ -98,6 +98,7 @@ impl<T: Float> ImageTerm<T> {
             return range("image sigma", noise_sigma, "above 0");
         }
         for image in movie.images() {
+            // As the fit sees it: a double beyond the largest single is infinite there.
             if let Some(bad) = image?.iter().find(|pixel| !T::of(**pixel).is_finite()) {
                 return range("movie pixel", *bad, "finite numbers");
             }
@@ -119,6 +120,7 @@ impl<T: Float> ImageTerm<T> {
 
     /// A datum; no number, where it cannot be read ([`FrameTerm::fault`]).
     pub fn pixel(&self, frame: usize, pixel: usize) -> T {
+        // A loss returns no errors: a NaN ends the fit, and `fault` gives the first reason.
         T::of(self.movie.pixel(frame, pixel).unwrap_or_else(|error| {
             let _ = self.fault.set(error.to_string());
             f64::NAN

@@ -151,6 +151,7 @@ impl Quiescent {
             if !self.signed[pixel / self.pixels] {
                 for (k, x) in all[first..first + self.pixels].iter_mut().enumerate() {
                     let square = away(k % side).powi(2) + away(k / side).powi(2);
+                    // 1/(2σ²) = 8 for a σ of a quarter.
                     *x = self.most * (-8.0 * square).exp();
                 }
             }
@@ -168,6 +169,8 @@ impl Quiescent {
 
     /// The second derivative of its penalties times a direction, added to that of all parameters of a field.
     pub(super) fn bend(&self, direction: &[f64], out: &mut [f64]) {
+        // Smoothness is quadratic: its gradient at a direction is its second derivative times that.
+        // Sparsity is linear in the box and has none.
         for prior in self.priors.iter().filter(|p| p.regulariser == Regulariser::Smoothness) {
             self.one(prior, direction, out);
         }
@@ -175,6 +178,7 @@ impl Quiescent {
 
     fn one<T: Float>(&self, prior: &Prior, parameters: &[T], gradient: &mut [T]) -> f64 {
         let (side, spacing) = (self.pixels.isqrt(), self.spacing);
+        // One layer of thickness 1 makes an integral over the screen of that over a volume.
         let shape = Shape { nodes: [1, side, side], spacing: [1.0, spacing, spacing] };
         // Of the brightness in M of emission: a factor for each power of it.
         let unit = self.unit() / self.jy_per_pixel;

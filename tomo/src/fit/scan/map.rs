@@ -37,6 +37,7 @@ fn direction([u, v]: [f64; 2]) -> Option<Axis> {
     }
     let t = v.asin();
     let sine = ((2.0 * t + (2.0 * t).sin()) / PI).clamp(-1.0, 1.0);
+    // A pole is at every longitude.
     let longitude = if t.cos() > 0.0 { PI * u / (2.0 * t.cos()) } else { 0.0 };
     let (s, (sin, cos)) = ((1.0 - sine * sine).sqrt(), longitude.sin_cos());
     Axis::new([s * cos, s * sin, sine]).ok()
@@ -96,6 +97,7 @@ impl AxisScan {
     fn between(&self, axis: Axis, logs: &[f64]) -> f64 {
         let mut nearest = [(f64::INFINITY, 0.0); NEAREST];
         for (point, log) in self.map.iter().zip(logs) {
+            // Squares of chords, above 0 so that a pixel on a lattice point has its value.
             let square = (2.0 - 2.0 * point.axis.dot(axis)).max(1e-12);
             if square < nearest[NEAREST - 1].0 {
                 nearest[NEAREST - 1] = (square, *log);

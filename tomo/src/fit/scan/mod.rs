@@ -147,9 +147,11 @@ impl<T: Float + Default> Scanner<'_, T> {
     }
 
     fn loss(&self, axis: Axis, effort: Effort) -> Result<Option<AxisLoss>, Error> {
+        // Relaxed: neither the flag nor the count hands anything else from thread to thread.
         if self.cancelled.load(Ordering::Relaxed) {
             return Ok(None);
         }
+        // Redshifts depend on the axis: threads that share the model cannot weigh it for theirs.
         let mut own = None;
         if self.problem.model.is_shifted() {
             own.insert(self.problem.model.clone()).weigh(axis);
@@ -172,6 +174,7 @@ impl<T: Float + Default> Scanner<'_, T> {
         };
         let loss = problem.least(effort.iterations)?.value;
         let solved = self.solved.fetch_add(1, Ordering::Relaxed) + 1;
+        // Pattern searches may take more than was expected of them.
         if !(self.watch)(solved, self.expected.max(solved)) {
             self.cancelled.store(true, Ordering::Relaxed);
         }
@@ -223,6 +226,7 @@ fn search<T: Float + Default>(
         problem,
         watch,
         solved: AtomicUsize::new(0),
+        // A candidate takes its own point and a hexagon for each length of steps; moves add more.
         expected: settings.directions + settings.candidates * (7 + 6 * settings.halvings),
         cancelled: AtomicBool::new(false),
     };
@@ -235,6 +239,7 @@ fn search<T: Float + Default>(
         Refinement { scanner: &scanner, effort: settings.fine, halvings: settings.halvings };
     let mut found = Vec::new();
     for candidate in candidates {
+        // A lattice point stands for what lies within half a spacing of it.
         match refinement.run(candidate, 0.5 * settings.distance())? {
             Some(refined) => found.push(refined),
             None => return Ok(None),
@@ -300,6 +305,7 @@ fn candidates(map: &[AxisLoss], count: usize, distance: f64) -> Vec<Axis> {
     let opposite = |axis: &Axis| axis.dot(first) < 0.0;
     let other = order.iter().find(|point| opposite(&point.axis));
     if let Some(other) = other.filter(|_| !chosen.iter().any(opposite)) {
+        // The worst makes room: a minimum near the antipode of the axis is usual.
         chosen.pop();
         chosen.push(other.axis);
     }

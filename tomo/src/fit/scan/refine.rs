@@ -30,6 +30,7 @@ impl<T: Float + Default> Refinement<'_, '_, T> {
                     return Ok(None);
                 };
                 let differences: Vec<f64> = losses.iter().map(|at| at.loss - best.loss).collect();
+                // Axes move on the tangent plane, where the corners are tan(step) away.
                 lowest =
                     minimum(&differences, step.tan(), level).map(|along| moved(best.axis, along));
                 let least = losses.into_iter().min_by(|a, b| a.loss.total_cmp(&b.loss));
@@ -41,6 +42,7 @@ impl<T: Float + Default> Refinement<'_, '_, T> {
             step *= 0.5;
         }
         let Some(lowest) = lowest else { return Ok(Some(best)) };
+        // The paraboloid is a guess, which counts only if the loss there is less.
         let losses = self.scanner.losses(&[lowest], self.effort)?;
         Ok(losses.map(|losses| if losses[0].loss < best.loss { losses[0] } else { best }))
     }
@@ -48,6 +50,7 @@ impl<T: Float + Default> Refinement<'_, '_, T> {
 
 /// Directions of the hexagon of a level: every other one is turned by half a side.
 fn turn(k: usize, level: usize) -> f64 {
+    // Steps of one length and the next then look along twelve directions in place of six.
     core::f64::consts::PI * (2 * k + level % 2) as f64 / 6.0
 }
 
@@ -70,6 +73,7 @@ fn moved(axis: Axis, [x, y]: [f64; 2]) -> Axis {
 /// Returns the minimum of g·u + u·H·u/2, which has these values at the corners of a hexagon of radius `radius`;
 /// nothing if it has none inside.
 fn minimum(values: &[f64], radius: f64, level: usize) -> Option<[f64; 2]> {
+    // Modes 0, 1 and 2 of the six values around the hexagon: a paraboloid has no others.
     let (mut slope, mut mean, mut across) = ([0.0; 2], 0.0, [0.0; 2]);
     for (k, value) in values.iter().enumerate() {
         let (sin, cos) = turn(k, level).sin_cos();

@@ -20,6 +20,7 @@ pub struct Steps {
 impl Steps {
     /// All of them.
     pub fn values(&self) -> Vec<f64> {
+        // Whole steps still count if rounding leaves a little less than the last one.
         let count = ((self.to - self.from) / self.step + 1e-9).floor();
         let count = if count.is_finite() { count.clamp(-1.0, 1e5) as i64 } else { -1 };
         (0..=count).map(|k| self.from + k as f64 * self.step).collect()

@@ -78,6 +78,7 @@ impl PriorSettings {
     }
 
     fn median(self) -> f64 {
+        // Quantiles of directions are those of angles in radians.
         let unit = match self {
             Self::Isotropic(_) => core::f64::consts::PI / 180.0,
             _ => 1.0,

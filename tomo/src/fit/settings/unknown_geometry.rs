@@ -31,6 +31,7 @@ fn free(
     let ([low, high], [least, most], unit) = (parameter.range(), prior.bounds(), parameter.unit());
     let outside = [least, most]
         .into_iter()
+        // An end in degrees may be beyond the range in radians by a rounding.
         .find(|x| x.is_finite() && !(low - 1e-9..=high + 1e-9).contains(x));
     if let Some(bad) = outside {
         let allowed = format!("{} to {}", low / unit, high / unit);

@@ -82,6 +82,7 @@ pub fn scan_band(
         if !watch(count) {
             return Ok(None);
         }
+        // One entry for all position angles, which share the rows.
         let Flow { inclination_deg, rotation_factor } = *flow;
         let key = journal::key(("band", inclination_deg.to_bits(), rotation_factor.to_bits()));
         let kept = journal.recall(key).and_then(|numbers| BandGeometry::of_numbers(&numbers));
@@ -150,6 +151,7 @@ fn ln_bayes_factor(
         prior += direction(geometry.inclination_deg).exp();
     }
     let without = without_flare(rows, &[data.to_vec()], &backgrounds(settings))?[0];
+    // sin i in both sums: their ratio is the mean evidence over the prior.
     Ok(most + (with / prior).ln() - without)
 }
 
@@ -337,6 +339,8 @@ fn rows(
     let minutes = curve.hours.iter().map(|hour| 60.0 * (hour - curve.hours[0])).collect();
     let sampling = Sampling { minutes, scales };
     let count = curve.parameters.len();
+    // What was not measured has a row and a value of 0: used, it changes no probability; unused, it
+    // would count among the data that judge.
     let used = |k: usize| curve.fitted[k / count] || curve.data[k].is_none();
     let used = (0..curve.data.len()).map(used).collect();
     Ok(CurveRows::of(&model, axis, grid(&file, settings), sampling, used))
@@ -345,6 +349,7 @@ fn rows(
 /// Three times as many nodes round the axis as away from it, and layers twice as far apart.
 fn grid(file: &FitFile, settings: &BandSettings) -> PolarGrid {
     let (radius, rings) = (file.region.r_max, settings.nodes);
+    // Beyond three scale heights the envelope is below 1.2 %.
     let height = file.region.z_width.unwrap_or(radius).min(3.0 * settings.height).min(radius);
     let apart = 2.0 * radius / (rings - 1) as f64;
     let layers = (2.0 * height / apart).ceil() as usize + 1;

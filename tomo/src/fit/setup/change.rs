@@ -27,9 +27,11 @@ pub fn emission_times(instrument: &Instrument, motion: &Motion) -> [f64; 2] {
         false => delays.iter().fold(none, |bound, delay| of(bound, *delay)),
     };
     let (least, most) = (bound(f64::min, f64::INFINITY), bound(f64::max, f64::NEG_INFINITY));
+    // Light of the first frame with the longest delay left first.
     let first = motion.times.iter().fold(f64::INFINITY, |first, time| first.min(*time)) - most;
     let last = motion.times.iter().fold(f64::NEG_INFINITY, |last, time| last.max(*time)) - least;
     let from = motion.injection.map_or(first, |injection| injection.time.max(first));
+    // An injection after the last light leaves no time, rather than a negative one.
     [from - motion.reference, last.max(from) - motion.reference]
 }
 

@@ -41,6 +41,7 @@ impl CoarseView {
     /// Every n-th row and column of images.
     fn thinned(file: &FitFile, measured: &FitData, every: usize) -> Result<Self> {
         let n = file.screen.pixels;
+        // Half a step in: the lattice stays about the middle of the screen.
         let places: Vec<usize> = (every / 2..n).step_by(every).collect();
         let kept: Vec<usize> = places
             .iter()
@@ -68,6 +69,7 @@ impl CoarseView {
             pixels,
             width: spacing(&file.screen)? * n,
             width_of: WidthOf::Edges,
+            // The light of a pixel goes with its area.
             jy_per_pixel: file.screen.jy_per_pixel * (n / pixels as f64).powi(2),
             ..file.screen.clone()
         };

@@ -45,6 +45,7 @@ impl Curve {
         let of = |k: usize| {
             let [flux, sigma] = self.data[k].filter(|_| self.fitted[k / count] == fitted)?;
             let [background, deviation] = self.background_at(k);
+            // The background is known up to its deviation, which counts like noise.
             Some([flux - background, sigma.hypot(deviation)])
         };
         StokesCurveTerm::new(count, (0..self.data.len()).map(of).collect())

@@ -86,6 +86,7 @@ pub(super) fn fine_images(
         times: &times,
     };
     let mut images = model(&drawn, &|x| truth.at(x))?;
+    // The light of a pixel goes with its area.
     let jy = file.screen.jy_per_pixel / (FINER * FINER) as f64;
     images.iter_mut().flatten().for_each(|x| *x *= jy);
     Ok(images)

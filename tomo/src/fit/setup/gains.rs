@@ -33,6 +33,7 @@ pub(super) fn priors(
         ),
     }
     let names: Vec<String> = observation.stations.iter().map(|s| s.name.clone()).collect();
+    // A station without Stokes I has no part in losses of total intensity.
     let observing = match is_polarized(losses) {
         true => observing(observation),
         false => observing(&observation.total_intensity()),

@@ -72,6 +72,7 @@ impl Glyph {
             center,
             right: cross(up, axis),
             up,
+            // The height that was asked for is that of the letter without its margin.
             height: height * rows as f64 / tall as f64,
             half_thickness: 0.5 * thickness,
             softness,
@@ -92,12 +93,14 @@ impl Glyph {
     pub fn at(&self, point: [f64; 3], turned: f64) -> f64 {
         let x = rotate(self.axis, -turned, point);
         let offset = core::array::from_fn(|c| x[c] - self.center[c]);
-        // Edges along the axis are as soft as those of the letter, up to a rational form of the error function.
+        // Edges along the axis are as soft as those of the letter: a step blurred by a Gaussian.
         let depth = (self.half_thickness - dot(offset, self.axis).abs()) / self.softness;
+        // Four deviations outside 3e-5 is left, as at the margin of the letter.
         if depth < -4.0 {
             return 0.0;
         }
         let unit = self.rows as f64 / self.height;
+        // The middle of pixel k is at k + ½.
         let column = dot(offset, self.right) * unit + 0.5 * self.columns as f64 - 0.5;
         let row = -dot(offset, self.up) * unit + 0.5 * self.rows as f64 - 0.5;
         self.amplitude * self.value(column, row) * 0.5 * (1.0 + libm::erf(depth / 2f64.sqrt()))

@@ -147,6 +147,7 @@ pub(super) fn even_times(key: &str, frames: usize, [from, to]: [f64; 2]) -> Resu
     if !(from.is_finite() && to.is_finite() && (frames == 1 || to > from)) {
         refuse!("{key}: from = {from}, to = {to} are not allowed: from must be below to");
     }
+    // A single frame is at `from`.
     let step = (to - from) / (frames.max(2) - 1) as f64;
     Ok((0..frames).map(|k| from + step * k as f64).collect())
 }

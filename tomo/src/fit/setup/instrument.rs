@@ -70,6 +70,7 @@ impl Instrument {
             Sampling::Gauss { order, split } => order as f64 * f64::from(split),
             Sampling::EqualMinoTime { per_ray } => per_ray as f64,
         };
+        // So many nodes may be asked for that even a few rays are too much.
         let block = || format!("region.nodes: {each} nodes or more on each ray of a block");
         memory::afford(block, memory::nodes(each * TRIAL.min(pixels) as f64, 0.0))?;
         let chosen = spread(file.screen.pixels);
@@ -109,6 +110,7 @@ impl Instrument {
             );
         }
         let jy = file.screen.jy_per_pixel;
+        // Before weights are in Jy: opacities are per M of the way.
         if let Some(medium) = file.effects.absorption {
             lines.absorb(opacity(medium));
         }
@@ -173,6 +175,7 @@ fn spread(side: usize) -> Vec<usize> {
         // Few of each row: every one by the golden section further on than the one before.
         step += ((GOLDEN * side as f64) as usize + side - least % side) % side;
     }
+    // A step that shares a divisor with the side would miss columns.
     while common(step, side) > 1 {
         step += 1;
     }
@@ -219,9 +222,11 @@ pub(super) fn upright(file: &FitFile) -> impl Fn([f64; 2]) -> [f64; 2] + use<> {
 /// If their number is out of range, or rays have no mean.
 pub(super) fn ring(file: &FitFile) -> Result<Option<RingRays>> {
     let Some(count) = file.screen.ring_rays else { return Ok(None) };
+    // Nodes of a pixel's rays are one list: each ray would dim the next.
     if file.effects.absorption.is_some() {
         refuse!("screen.ring_rays and effects.absorption exclude each other");
     }
+    // Polarised factors are those of a ray through one place of the pixel.
     if file.polarization.is_some() {
         refuse!("screen.ring_rays and polarization exclude each other");
     }

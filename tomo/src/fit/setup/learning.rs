@@ -121,6 +121,7 @@ fn chosen_network(chosen: &settings::Representation, paper: NetworkSettings) -> 
         degree,
         width,
         hidden_layers,
+        // Fewer layers have no place for the paper's skip.
         skip_after: paper.skip_after.filter(|layer| *layer <= hidden_layers),
         length_scale,
         time_scale,
@@ -202,6 +203,7 @@ fn price(file: &FitFile, times: [f64; 2]) -> Result<Option<ChangePrice>> {
         return Ok(None);
     }
     let Change { knots, weight, .. } = change(file, times)?;
+    // The network takes the time as a coordinate; all others are linear between the knots.
     let linear = *kind != Kind::Bhnerf;
     Ok(Some(ChangePrice { weight, knots, linear, region: file.region.limits() }))
 }

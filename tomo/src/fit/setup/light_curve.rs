@@ -82,6 +82,7 @@ fn prepared(mut curve: LightCurve, settings: &MeasuredCurve) -> Result<LightCurv
     if let Some(most) = settings.most_gap_s {
         curve = curve.without_gaps(most);
     }
+    // Averaging would lower them: stated errors are those of the averages.
     if let Some(sigmas) = settings.sigma {
         curve = curve.with_sigmas(checked(sigmas, "data.light-curve.sigma")?.all());
     }
@@ -93,6 +94,7 @@ fn prepared(mut curve: LightCurve, settings: &MeasuredCurve) -> Result<LightCurv
     }
     if let Some(jy) = settings.intensity {
         curve = curve.with_intensity(jy);
+        // An I that the file lacks has no error yet.
         curve = curve.with_sigmas(settings.sigma.map_or([None; 4], |sigma| sigma.all()));
     }
     if curve.samples.is_empty() {
@@ -155,6 +157,7 @@ pub(super) fn simulate(
         truth.scale(mean.jy / now);
     }
     let mut fluxes = truth.movie_through(&mut instrument.summed(&motion, &parameters)?);
+    // What does not move has fluxes of its own, which `mean_flux` does not scale.
     truth.rings.add_to_fluxes(&mut fluxes, &parameters);
     if let Some(background) = &settings.background {
         add_background(&mut fluxes, &parameters, &hours, background, file.seed)?;
@@ -182,6 +185,7 @@ fn add_background(
         roughness: matern,
     };
     let minutes: Vec<f64> = hours.iter().map(|hour| 60.0 * hour).collect();
+    // Streams of their own: background and noise of one seed are independent.
     let mut random = Pcg64Mcg::seed_from_u64(seed ^ 0xbac6_0d17);
     for (place, parameter) in parameters.iter().enumerate() {
         let normal: Vec<f64> = hours.iter().map(|_| random.sample(StandardNormal)).collect();

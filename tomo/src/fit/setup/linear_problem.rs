@@ -169,10 +169,12 @@ pub(super) fn solve_frames(
     let settings = linear(of.file)?;
     let usual = LinearSettings::default();
     let coarse = usual.coarse.filter(|_| nodes >= FINE).map(|coarse| Coarse {
+        // Few frames are thinned less, so that at least five of them are left.
         stride: coarse.stride.min(frames.len().div_ceil(8)).max(1),
         ..coarse
     });
     let coarse = match change.is_any() {
+        // Every frame: knots between those that are left out would be seen by none.
         true => Some(Coarse { nodes: nodes.min(COARSE), stride: 1, iterations: 20 }),
         false => coarse,
     };

@@ -22,6 +22,7 @@ pub(super) fn correct(
     if scattering == Some(Scattering::SgrA) {
         unscatter(observation, &ScatteringKernel::sgr_a()).within(name)?;
     }
+    // That of the source itself, which scattering has not dimmed.
     let Some(variability) = variability else { return Ok(()) };
     if is_polarized(losses) {
         refuse!(
@@ -29,6 +30,7 @@ pub(super) fn correct(
              polarimetric-ratios"
         );
     }
+    // Rows of total intensity have one product, the first.
     for row in &mut observation.rows {
         let sigma = variability.sigma(row.uv[0].hypot(row.uv[1]));
         row.noise_sigma[0] = row.noise_sigma[0].hypot(sigma);

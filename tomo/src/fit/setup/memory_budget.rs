@@ -64,6 +64,7 @@ fn least(fixed: f64, parts: &[[f64; 2]]) -> f64 {
     let taken = |limit: f64| {
         fixed + parts.iter().map(|[bytes, share]| bytes.min(share * limit)).sum::<f64>()
     };
+    // All shares together are less than 1: some limit is enough.
     while taken(high) > high {
         high *= 2.0;
     }
@@ -138,10 +139,12 @@ fn shares(file: &FitFile, nodes: f64) -> Vec<[f64; 2]> {
         (_, Start::Linear { stride, .. }) => Some(stride.max(1) as f64),
         (_, Start::Drawn) => None,
     };
+    // The data in double precision, what is found in single.
     let movies = if frames.is_finite() { [8.0, 4.0] } else { [0.0; 2] };
     let movies =
         movies.map(|bytes| [if bytes > 0.0 { bytes * frames * pixels } else { 0.0 }, MOVIE]);
     let linear = stride.map(|stride| {
+        // A number and its column for each node of the grid about a node of a ray.
         let of_frame = [(size_of::<f32>() + 4) as f64 * STENCIL as f64 * nodes, 4.0 * pixels];
         [0, 1].map(|k| [of_frame[k] * frames / stride, LINEAR[k]])
     });

@@ -236,6 +236,7 @@ pub fn axis(file: &FitFile) -> Result<(Axis, Option<Polynomial>)> {
             linear(file)?;
             let (from, to, steps) = (*rate, *last_rate, file.training.steps);
             let rate = Polynomial { from, to, steps, power: 1.0 };
+            // A rate of 0 holds the axis that the scan finds.
             let rate = (from != 0.0).then(|| rate.checked()).transpose().within("axis.scan")?;
             // Until the scan has found a better one.
             Ok((Axis::new([0.0, 0.0, 1.0])?, rate))

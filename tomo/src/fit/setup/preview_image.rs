@@ -88,6 +88,7 @@ impl PreviewView<'_> {
         let mut rays = Rays::default();
         let mut ring = Vec::new();
         for k in first..side * side {
+            // Pixels stay whole: all rays of one are averaged at once.
             if rays.alpha.len() >= AT_A_TIME {
                 break;
             }

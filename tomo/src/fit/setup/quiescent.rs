@@ -21,10 +21,12 @@ pub(super) fn quiescent(file: &FitFile, pixels: usize) -> Result<Option<Quiescen
     let image = Quiescent {
         pixels,
         signed,
+        // The linear problem has one bound for voxels and pixels.
         most: file.linear.as_ref().map_or(1.0, |linear| linear.upper),
         upper: settings.upper * unit,
         jy_per_pixel: unit,
         priors: priors(settings, &seen)?,
+        // A coarse view has fewer pixels over the same field.
         spacing: width / pixels.isqrt() as f64,
     };
     image.checked().map(Some)

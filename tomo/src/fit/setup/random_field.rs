@@ -63,6 +63,7 @@ pub fn deviation_of_prior(file: &FitFile) -> Result<Option<f64>> {
     let Some(linear) = &file.linear else { return Ok(None) };
     let Some(prior) = &linear.prior else { return Ok(None) };
     if prior.kind == FieldKind::LogNormal {
+        // Mean and variance of a log-normal number.
         let variance = prior.amplitude.powi(2);
         let mean = (prior.mean + 0.5 * variance).exp();
         return Ok(Some(mean * variance.exp_m1().sqrt()));

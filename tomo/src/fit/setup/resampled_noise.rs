@@ -20,6 +20,7 @@ impl FitData {
             let scale = |row: &mut Row, by: f64| row.noise_sigma.iter_mut().for_each(|s| *s *= by);
             observation.rows.iter_mut().for_each(|row| scale(row, factor));
             add_thermal_noise(observation, seed);
+            // Errors stay as they are stated: the noise alone is scaled.
             observation.rows.iter_mut().for_each(|row| scale(row, 1.0 / factor));
         }
         let of_pixels = |loss: &&Loss| matches!(loss.data, LossKind::Image | LossKind::LightCurve);

@@ -103,6 +103,7 @@ fn simulate(
         spoil(file, fit, seen, &mut observation)?;
     let gains = gains::priors(fit.instrument.as_ref(), &fit.loss, &observation)?;
     let leakage = leakage::unknown(fit.instrument.as_ref(), &observation)?;
+    // Rows have the hour of their scan up to rounding, which is far below 4 µs.
     let frame = |time: f64| hours.partition_point(|hour| *hour < time - 1e-9).min(hours.len() - 1);
     let of_rows = observation.rows.iter().map(|row| frame(row.time_h)).collect();
     let visibilities = Some((observation, of_rows));

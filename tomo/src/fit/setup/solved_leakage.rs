@@ -47,6 +47,7 @@ impl FitData {
             let change = largest_change(&last, &found.leakage);
             unknown.shared.set(found.leakage);
             errors = found.errors;
+            // Without gains the data beside the model stay the same: once is enough.
             if self.gains.is_none() || change < STILL {
                 break;
             }

@@ -81,6 +81,7 @@ pub fn warm_start(
             let fallen = RATE * (1.0 - step as f64 / steps as f64);
             let rate = fallen * grown(found.steps + step, &matrices);
             let parameters = &mut state.now.parameters;
+            // Without matrices these are Adam's steps.
             Muon::default().step(rate, &gradient, &matrices, &mut memory, parameters);
             representation.project(&mut state.now.parameters);
         }
@@ -230,6 +231,7 @@ fn set_nodes(activation: Activation, values: &[f32], parameters: &mut [f32]) {
                 let held = value.clamp(4.54e-5, 1.0 - 4.54e-5);
                 (held / (1.0 - held)).ln() as f32
             }
+            // The inverse of ln(1 + eˣ).
             Activation::Softplus => value.max(4.54e-5).exp_m1().ln() as f32,
             Activation::Linear => value.max(0.0) as f32,
         };

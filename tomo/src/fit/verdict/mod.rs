@@ -109,6 +109,7 @@ impl Tested {
     /// Returns whether χ² is less than a right model has: what the fit learns is noise.
     pub fn follows_noise(&self) -> bool {
         let Expected { chi2, spread, .. } = self.expected;
+        // A weight is no error, and errors that data share make χ² small about a right model, too.
         let knows_noise = !matches!(self.errors, Errors::Weight | Errors::Shared);
         knows_noise && self.statistics.chi2().is_some_and(|of| of < chi2 - FOLLOWED * spread)
     }
@@ -124,6 +125,7 @@ impl Tested {
         let square: f64 = all.iter().map(|x| (x - chi2).powi(2)).sum();
         let expected = Expected {
             chi2,
+            // The scatter of few draws may be too small by chance.
             spread: (square / (count - 1.0)).sqrt().max(self.expected.spread),
             mean: mean(&mut draws.iter().filter_map(Statistics::mean)),
             in_time: mean(&mut draws.iter().filter_map(|draw| draw.in_time.correlation())),
@@ -207,6 +209,7 @@ pub struct Verdict {
 
 impl Verdict {
     fn add(&mut self, outcome: Outcome, term: Option<usize>, fault: Fault) {
+        // Outcomes stand in the order of their gravity.
         self.outcome = self.outcome.max(outcome);
         self.reasons.push(Reason { term, fault });
     }
@@ -236,6 +239,7 @@ pub fn judge(terms: &[Tested], flux: Option<ZeroSpacing>) -> Verdict {
 fn is_missed(flux: &ZeroSpacing) -> bool {
     let allowed = (CHANCE * flux.error_jy).max(FLUX * flux.measured_jy.abs());
     let missing = (flux.model_jy - flux.measured_jy).abs();
+    // Comparisons with NaN would let it pass.
     missing > allowed || missing.is_nan()
 }
 
@@ -264,6 +268,7 @@ fn judge_structure(term: usize, tested: &Tested, verdict: &mut Verdict) {
         value.filter(|value| (value - expected).abs() > allowed)
     };
     let expected = tested.expected;
+    // Errors that data share make residuals alike about the right model, too.
     if tested.errors == Errors::Shared {
         return;
     }
@@ -286,6 +291,7 @@ fn judge_structure(term: usize, tested: &Tested, verdict: &mut Verdict) {
 fn judge_groups(term: usize, tested: &Tested, verdict: &mut Verdict) {
     let is_bad = |part: &Part, chi2: f64| {
         let chance = CHANCE * (2.0 / part.count as f64).sqrt();
+        // `worst` falls back to parts with fewer data, which are shown but not judged.
         part.count >= GROUP_COUNT && chi2 > tested.expected.chi2 + chance.max(GROUP_EXCESS)
     };
     if let Some((stations, part, chi2)) = worst(tested.statistics.groups.iter())

@@ -54,8 +54,10 @@ fn probability_of_larger(part: &Part, mean: f64, excess: f64) -> Option<f64> {
     if part.count == 0 || part.chi2.is_nan() {
         return None;
     }
+    // A gamma distribution of shape k and scale θ has the mean k θ and the deviation √k θ.
     let shape = 0.5 * part.count as f64 / (excess * excess);
     let scaled = shape * part.chi2 / (part.count as f64 * mean);
+    // The incomplete gamma function refuses infinity.
     if scaled == f64::INFINITY {
         return Some(0.0);
     }

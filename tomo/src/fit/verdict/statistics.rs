@@ -118,6 +118,8 @@ impl Statistics {
             }
             stations.iter().for_each(|k| self.stations.entry(*k).or_default().add(value));
             self.groups.entry(stations.clone()).or_default().add(value);
+            // Stations may have several data in a frame, such as real and imaginary part: their
+            // order tells which of them is the same quantity in the next frame.
             let repeat = seen.entry(stations.clone()).or_default();
             let key = (stations, *repeat);
             *repeat += 1;
@@ -140,6 +142,7 @@ impl Statistics {
         if let Some(before) = self.before.plain.get(at) {
             self.in_time.add(*before, value);
         }
+        // The first pixel of a row has no neighbour before it.
         if !at.is_multiple_of(width.max(1)) {
             self.in_space.add(now.plain[at - 1], value);
         }

@@ -178,6 +178,7 @@ fn shares(geometries: &[BandGeometry], of: fn(&BandGeometry) -> f64) -> Vec<[f64
     let mut all: Vec<[f64; 2]> = Vec::new();
     for geometry in geometries {
         let share = (geometry.ln_posterior - most).exp();
+        // Equal values are equal to the bit: they come from the same settings.
         match all.iter_mut().find(|[value, _]| *value == of(geometry)) {
             Some([_, sum]) => *sum += share,
             None => all.push([of(geometry), share]),
@@ -198,6 +199,7 @@ fn orbits(scan: &BandScan) -> Vec<Vec<f64>> {
     let all = scan.geometries.iter().flat_map(|geometry| geometry.by_radius.iter().copied());
     let most = all.fold(f64::NEG_INFINITY, f64::max);
     let of = |geometry: &BandGeometry| {
+        // Directions are spread over the sphere; the floor is for a scan of nothing but a pole.
         let prior = geometry.inclination_deg.to_radians().sin().max(1e-6);
         geometry.by_radius.iter().map(|ln| (ln - most).exp() * prior).collect()
     };
@@ -224,6 +226,7 @@ fn binned(shares: &[[f64; 2]], bins: usize) -> Vec<[f64; 2]> {
     let (Some([low, _]), Some([high, _])) = (shares.first(), shares.last()) else {
         return Vec::new();
     };
+    // A single period still needs bins of some width.
     let width = (high - low).max(1e-9 * high.abs()) / bins as f64;
     let mut all: Vec<[f64; 2]> = (0..bins).map(|k| [low + (k as f64 + 0.5) * width, 0.0]).collect();
     for [value, share] in shares {
@@ -255,6 +258,7 @@ fn quantile(shares: &[[f64; 2]], part: f64) -> f64 {
     };
     let mut below = 0.0;
     for (k, [_, share]) in shares.iter().enumerate() {
+        // Nothing can be interpolated within a share of 0.
         if below + share >= part && *share > 0.0 {
             return edge(k) + (edge(k + 1) - edge(k)) * ((part - below) / share).clamp(0.0, 1.0);
         }
@@ -272,6 +276,7 @@ fn median(shares: &[[f64; 2]], best: Option<f64>) -> Median {
 /// An interval of azimuths in degrees, its median in [0°, 360°).
 fn azimuth(Interval { median, low, high }: Interval) -> Interval {
     let [median, low, high] = [median, low, high].map(f64::to_degrees);
+    // The ends turn with the median: they may lie below 0° and above 360°.
     let turns = median.rem_euclid(360.0) - median;
     Interval { median: median + turns, low: low + turns, high: high + turns }
 }

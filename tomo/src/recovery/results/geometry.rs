@@ -227,6 +227,7 @@ fn flow_error(file: &FitFile, trials: [&Geometry; 2]) -> Result<Option<f64>, Err
         all += truth[0].powi(2) + truth[1].powi(2);
     }
     let error = (away / all).sqrt();
+    // No true velocity, no relative error.
     Ok(error.is_finite().then_some(error))
 }
 
@@ -241,6 +242,7 @@ fn own(free: &[Free], spread: &Spread) -> BTreeMap<String, PerParameter<Option<f
     let part = |error: &ModelError| {
         let moved = each(free, |k, parameter| {
             let variance = error.covariance.get(k * (free.len() + 1))?;
+            // Along directions that data leave open nothing but the prior bounds a shift.
             Some(variance.sqrt().min(free[k].prior.deviation()) / parameter.unit())
         });
         (error.source.to_owned(), moved)

@@ -138,7 +138,7 @@ impl GeometryResults {
             let each = each.iter().map(|(source, moved)| format!("{source} {moved:.4}{unit}"));
             let each = each.collect::<Vec<_>>().join(", ");
             if self.is_open(*parameter) {
-                // It may be the data that do.
+                // It may be the data that do, unless the model has more than half of the variance.
                 let is_most = whole > sigma * core::f64::consts::FRAC_1_SQRT_2;
                 return is_most.then(|| format!("the model leaves the {words} open ({each})"));
             }
@@ -192,6 +192,7 @@ impl GeometryResults {
             let [low, high] = *self.bounds.get(parameter)?;
             let range = parameter.range().map(|end| end / unit);
             let is_circle = parameter.difference(low * unit, high * unit).abs() < 1e-6;
+            // A full circle has no edge, and where the model itself ends data can ask for no more.
             let is_at = |end: f64, of_model: f64| {
                 (value - end).abs() < EDGE * (high - low)
                     && (end - of_model).abs() > 1e-6

@@ -34,6 +34,7 @@ impl<'a, T: Float> Network<'a, T> {
     /// Rectified units of a layer.
     #[inline(always)]
     fn layer<V: Lanes<T>>(weights: &[T], biases: &[T], inputs: &[V]) -> [V; WIDTH] {
+        // Loops, not `map`: what the compiler leaves of a closure lacks the instruction set.
         let mut units = [V::splat(T::zero()); WIDTH];
         for (unit, bias) in units.iter_mut().zip(biases) {
             *unit = V::splat(*bias);
@@ -181,6 +182,7 @@ fn features<T: Float, V: Lanes<T>>(
             let corners = geometry.corners::<V>(plane, &located.corner);
             inputs[level * FEATURES + feature] = interpolate(&corners, &located.within).0;
         }
+        // All grids share the box: any of them tells.
         inside = located.inside;
     }
     (inputs, inside)
@@ -261,6 +263,7 @@ impl<T: Float> Task<T> for Backward<'_, T> {
             for (lanes, kept) in all.zip(&mut kept) {
                 *lanes = V::load_or(kept, T::zero());
             }
+            // Lanes behind the last point have the cotangent 0 and add nothing to the sums.
             let slope = V::load_or(&self.cotangents[from..], T::zero()) * slope;
             let slopes = sums.backward(&network, &inputs[..count], &units, slope);
             let mut lanes = [T::zero(); MAX_LANES];

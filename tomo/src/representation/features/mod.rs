@@ -54,6 +54,7 @@ pub struct FeatureGrid {
 /// Points that one thread takes at a time.
 const SHARE: usize = 512;
 /// Points whose gradients are kept at a time.
+// Small in tests, so that a few thousand points fill several blocks.
 const BLOCK: usize = if cfg!(test) { 1000 } else { 32_768 };
 /// Features start from uniform numbers of this size.
 const FAINT: f64 = 1e-2;
@@ -225,6 +226,7 @@ impl<T: Float + Default> Memory<T> {
         let shares = at.len().div_ceil(SHARE);
         self.slopes.resize(at.len() * inputs, T::zero());
         self.network.resize(shares * each, T::zero());
+        // Even where slopes of places are not wanted: their chunks tell how long each share is.
         self.pulls.resize(at.len(), [T::zero(); 3]);
         let outputs =
             self.slopes.par_chunks_mut(SHARE * inputs).zip(self.network.par_chunks_mut(each));
@@ -267,6 +269,7 @@ impl<T: Float + Default> Memory<T> {
                 let at = at.range(share_of(share, contributions.len()));
                 dispatch(grid.instruction_set, Corners { geometry, at, contributions });
             });
+            // Both features of a level lie on the same nodes and take one order of the points.
             self.scatter.sort(geometry.nodes);
             for feature in 0..FEATURES {
                 let slope = |point: usize| self.slopes[point * inputs + level * FEATURES + feature];

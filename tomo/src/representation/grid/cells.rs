@@ -65,12 +65,14 @@ impl<T: Float> Geometry<T> {
         for ((axis, nodes), (column, within)) in
             self.axes.iter().zip(self.nodes).zip(at.columns().iter().zip(&mut within))
         {
+            // Lanes behind the last point take the first node: every grid has it.
             let x = V::load_or(&column[from..], axis.low);
             let u = (x - V::splat(axis.low)) * V::splat(axis.per_length);
             inside = V::select(u.lt(zero), zero, inside);
             inside = V::select(V::splat(axis.cells).lt(u), zero, inside);
             // A NaN is neither here nor there: it stays inside and makes the value one.
             let u = V::splat(axis.cells).min(zero.max(u));
+            // ⌊u⌋; at a node the tie may go to either cell, whose values are the same there.
             let cell = math::round(u - V::splat(T::of(0.5)));
             let cell = V::splat(axis.cells - T::one()).min(zero.max(cell));
             *within = u - cell;
@@ -89,12 +91,14 @@ impl<T: Float> Geometry<T> {
         let [_, ny, nz] = self.nodes;
         let mut numbers = [[T::zero(); MAX_LANES]; 8];
         for (lane, corner) in corner.iter().enumerate().take(V::LANES) {
+            // Neighbours along z lie side by side: four places give all eight corners.
             for (k, start) in [0, nz, ny * nz, (ny + 1) * nz].into_iter().enumerate() {
                 let pair = &parameters[corner + start..corner + start + 2];
                 numbers[2 * k][lane] = pair[0];
                 numbers[2 * k + 1][lane] = pair[1];
             }
         }
+        // A loop: a closure of `map` would be compiled without the instruction set.
         let mut corners = [V::splat(T::zero()); 8];
         for (corner, lanes) in corners.iter_mut().zip(&numbers) {
             *corner = V::load_or(lanes, T::zero());
@@ -178,6 +182,7 @@ impl<T: Float> Task<T> for Products<'_, T> {
             if let Some(values) = &mut values {
                 keep_inside(located.inside, value).store(&mut values[from..]);
             }
+            // Without the cotangent, which may be known only once all points of a ray have values.
             let weight = keep_inside(located.inside, slope);
             if let Some((coordinates, cotangents)) = &mut coordinates {
                 let weight = weight * V::load_or(&cotangents[from..], T::zero());
@@ -203,7 +208,9 @@ impl<T: Float, V: Lanes<T>> Located<T, V> {
             v.store(lanes);
         }
         for (lane, contribution) in contributions.iter_mut().enumerate() {
+            // A u32 holds the corner: grids have at most 2³⁰ nodes.
             let (corner, weight) = (self.corner[lane] as u32, lanes[3][lane]);
+            // Points that add nothing are left out of the sort; a NaN is not.
             let corner = if weight == T::zero() { NOWHERE } else { corner };
             let within = [lanes[0][lane], lanes[1][lane], lanes[2][lane]];
             *contribution = Contribution { corner, within, weight };

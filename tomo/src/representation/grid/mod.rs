@@ -112,6 +112,7 @@ impl Grid {
 
 /// A multiple of all lanes near the middle.
 fn halfway(points: usize) -> usize {
+    // Only the last share then ends with a register that is not full, the slow case.
     (points / 2).next_multiple_of(kerrlight_common::simd::MAX_LANES)
 }
 
@@ -264,6 +265,8 @@ impl<T: Float + Default> Representation<T> for Grid {
         self.check(parameters, &at, values.len());
         assert!(gradient.parameters.len() == parameters.len());
         let memory: &mut Memory<T> = workspace.of();
+        // Slopes of coordinates need cotangents while cells are at hand, cotangents all values of a
+        // ray: that takes two passes.
         if gradient.coordinates.is_none() {
             return memory.eval_vjp(self, parameters, at, groups, values, gradient.parameters);
         }

@@ -60,6 +60,7 @@ impl<T: Float + Default> Scatter<T> {
             let Some(sums) = sums.get_mut(parity * slab..) else { return };
             sums.par_chunks_mut(2 * slab).enumerate().for_each(|(k, sums)| {
                 let s = 2 * k + parity;
+                // The last chunk may be nothing but the last layer of nodes, behind all slabs.
                 let Some([from, to]) = self.starts.get(s..s + 2) else { return };
                 for index in &self.order[*from..*to] {
                     let mut contribution = self.contributions[*index as usize];
@@ -73,6 +74,7 @@ impl<T: Float + Default> Scatter<T> {
     /// Sorts indices by slab, in their order within.
     pub fn sort(&mut self, nodes: [usize; 3]) {
         let slab = slab(nodes);
+        // A counting sort keeps the order of points in a slab, and so every bit of the sums.
         let mut starts = [0; SLABS + 1];
         let of = |c: &Contribution<T>| (c.corner != NOWHERE).then(|| c.corner as usize / slab);
         for s in self.contributions.iter().filter_map(of) {

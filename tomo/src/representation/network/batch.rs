@@ -95,6 +95,8 @@ impl<T: Float + Default> Memory<T> {
         }
         let cuts = Cuts::new(at.len(), groups);
         let backward = matches!(way, Way::Both { .. });
+        // Every run uses a recording up: another batch is not the one recorded, and the way back
+        // spoils its slopes.
         let passed = self.recording.points.take() == Some(at.len());
         let recorded = match way {
             Way::Forward { recorded, .. } => recorded,
@@ -140,6 +142,7 @@ impl<T: Float + Default> Memory<T> {
             self.partial[..cuts.chunks].iter_mut().for_each(|lines| lines.resize(parameters));
         }
         let tiles = self.tiles.get_mut().unwrap_or_else(PoisonError::into_inner);
+        // A chunk holds one tile while it runs.
         let threads = rayon::current_num_threads().min(cuts.chunks);
         tiles.resize_with(tiles.len().max(threads), Tile::default);
         tiles.iter_mut().for_each(|tile| tile.resize(network, cuts.largest, backward));
@@ -199,6 +202,7 @@ impl<'a> Cuts<'a> {
         if self.groups.is_empty() {
             return point;
         }
+        // Empty groups behind the last point belong to the last chunk: the link gets every group.
         if chunk == self.chunks { self.groups.len() - 1 } else { self.group_from(point) }
     }
 
@@ -265,6 +269,7 @@ impl<T: Float + Default> Batch<'_, T> {
 
     fn chunk(&self, job: Job<'_, T>) {
         let pool = || self.tiles.lock().unwrap_or_else(PoisonError::into_inner);
+        // None is left where a link waits for other work and its thread begins one more chunk.
         let mut tile = pool().pop().unwrap_or_else(|| {
             let mut tile = Tile::default();
             tile.resize(self.network, self.cuts.largest, self.cotangents.is_some());
@@ -282,6 +287,7 @@ impl<T: Float + Default> Batch<'_, T> {
         // Tiles of about the same size.
         let wanted = points.div_ceil(points.div_ceil(POINTS).max(1));
         let mut sums = partial.first_mut().map(Lines::all);
+        // Without a group no tile overwrites what the last batch has left there.
         if let (Some(sums), 0) = (&mut sums, points) {
             sums.fill(T::zero());
         }
@@ -297,6 +303,7 @@ impl<T: Float + Default> Batch<'_, T> {
             if let Some(kept) = &mut kept {
                 core::mem::swap(*kept, &mut tile.passed);
             }
+            // A kept tile on its way back has gone forward already.
             if kept.is_none() || self.cotangents.is_none() {
                 let (at, slopes) =
                     (self.at.range(range.clone()), self.cotangents.is_some() || kept.is_some());

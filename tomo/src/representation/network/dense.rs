@@ -66,6 +66,8 @@ impl<T: Float> Task<T> for Forward<'_, T> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<T>>(self) {
+        // 6 × 2 sums, two registers of the panel and one input take 15 of 16 registers; 12 rows
+        // take 27 of 32.
         if const { V::REGISTERS < 32 } { self.by_rows::<V, 6>() } else { self.by_rows::<V, 12>() }
     }
 }
@@ -74,6 +76,7 @@ impl<T: Float> Forward<'_, T> {
     #[inline(always)]
     fn by_rows<V: Lanes<T>, const ROWS: usize>(self) {
         let width = 2 * V::LANES;
+        // Rows behind the last point are computed from what is there, and nobody reads them.
         let (rows, panels) = (self.points.next_multiple_of(ROWS), self.outputs.div_ceil(width));
         let panel = (self.inputs + 1) * width;
         assert!(
@@ -222,6 +225,7 @@ impl<T: Float> Weights<'_, T> {
     #[inline(always)]
     fn by_rows<V: Lanes<T>, const ROWS: usize>(self) {
         let width = 2 * V::LANES;
+        // Biases are the weights of one more input, a one; sums of a block behind it are dropped.
         let (rows, panels) = (self.inputs + 1, self.outputs.div_ceil(width));
         assert!(rows.next_multiple_of(ROWS) <= self.input.stride);
         assert!(self.points * self.input.stride <= self.input.numbers.len());

@@ -31,7 +31,9 @@ impl<T: Float> Task<T> for Encode<'_, T> {
                 for j in 0..self.degree {
                     let (sin, cos) = math::sin_cos::<T, V>(x);
                     put(sin, rows, stride, dimension * (1 + j) + d);
+                    // sin(· + π/2) is the cosine.
                     put(cos, rows, stride, dimension * (1 + self.degree + j) + d);
+                    // Exact: by double angles, errors of sines would grow with each octave.
                     x = x + x;
                 }
             }

@@ -66,6 +66,7 @@ impl Network {
         let forward: usize = layers.iter().map(|layer| of(layer.inputs, layer.outputs)).sum();
         let units = self.layout.rows.iter().zip(layers).skip(1);
         let back: usize = units.map(|(rows, layer)| of(rows.units, layer.outputs)).sum();
+        // The gradient of the weights takes as many as the way forward.
         [forward, 2 * forward + back]
     }
 

@@ -32,6 +32,7 @@ impl<T: Float> Task<T> for Output<'_, T> {
         let rows = self.input.numbers.chunks(self.input.stride);
         for (value, row) in self.values.iter_mut().zip(rows) {
             let mut sum = V::splat(T::zero());
+            // The bias is the weight of the one behind the units; weights behind that are zero.
             for (w, x) in self.weights.chunks_exact(V::LANES).zip(row.chunks_exact(V::LANES)) {
                 let (w, x) = (V::load_or(w, T::zero()), V::load_or(x, T::zero()));
                 sum = w.mul_add(x, sum);

@@ -33,12 +33,14 @@ impl<T: Float + Default> Packed<T> {
             panels.kernel.resize(packed_kernel(layer.inputs, layer.outputs, width));
             pack_kernel(rows, layer.outputs, width, panels.kernel.all());
             let (units, encoded) = rows.split_at(layout.rows[k].units * layer.outputs);
+            // Before the first layer are no units, only the encoded point.
             if backward && k > 0 {
                 transpose(units, layer.outputs, width, &mut panels.transposed);
             }
             if coordinates && k == 0 {
                 transpose(units, layer.outputs, width, &mut panels.encoded);
             } else if coordinates && layout.skip == Some(k) {
+                // Behind the rows of the units are those of the appended point, then the biases.
                 let encoded = &encoded[..layout.encoded * layer.outputs];
                 transpose(encoded, layer.outputs, width, &mut panels.encoded);
             }

@@ -85,6 +85,7 @@ impl<T: Float + Default> Activations<T> {
             let output = MatrixMut { numbers: after[0].all(), stride: layout.rows[k + 1].stride };
             let (inputs, outputs, panels) = (layer.inputs, layer.outputs, packed.kernel(k));
             dispatch(set, Forward { points, input, inputs, panels, outputs, output });
+            // After the layer, whose last panel writes zeros behind its units.
             append(matrix(&before[0], layout.rows[0]), after[0].all(), layout.rows[k + 1], points);
         }
         let input = matrix(&self.rows[layout.hidden().len()], layout.last_rows());
@@ -120,11 +121,13 @@ impl<T: Float + Default> Tile<T> {
         let cotangents = match cotangents {
             Cotangents::Given(all) => &all[range],
             Cotangents::Linked(link) => {
+                // Free until the way back begins.
                 let made = &mut self.cotangents[0].all()[..*points];
                 link(groups, &values.read()[..*points], made);
                 &*made
             }
         };
+        // From here on slopes are those of the loss with the output before its activation.
         for (slope, cotangent) in slopes.iter_mut().zip(cotangents) {
             *slope *= *cotangent;
         }
@@ -148,6 +151,7 @@ impl<T: Float + Default> Tile<T> {
                 let output = MatrixMut { numbers: self.encoded.all(), stride };
                 let cotangent = matrix(&self.cotangents[0], layout.rows[k + 1]);
                 let (points, units) = (self.passed.points, layout.hidden()[k].outputs);
+                // Encoded points are not rectified, and the two layers that take them add up.
                 let (panels, outputs, activations) = (packed.encoded(k), layout.encoded, None);
                 dispatch(
                     network.instruction_set,

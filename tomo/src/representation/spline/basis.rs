@@ -44,6 +44,7 @@ impl Degree {
 
     /// Distance of the first node from the middle of a grid of `nodes` along an axis, for a field of half-width 1.
     pub(crate) fn reach(self, nodes: usize) -> f64 {
+        // Of all cells, `margin` at each end are dark.
         let all = (nodes - 1) as f64;
         all / (all - 2.0 * self.margin())
     }

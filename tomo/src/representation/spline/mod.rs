@@ -77,6 +77,7 @@ impl Spline {
     /// # Errors
     /// If a number is out of its range.
     pub fn cube(nodes: usize, half_width: f64, degree: Degree) -> Result<Self, Error> {
+        // So few nodes leave no lit cell to scale by: `new` refuses them.
         if nodes < degree.taps() {
             return Self::new([nodes; 3], [-1.0; 3], [1.0; 3], degree);
         }
@@ -201,6 +202,7 @@ impl<T: Float + Default> Representation<T> for Spline {
         let count = parameters.len();
         assert!(gradient.parameters.len() == count && at.len() == cotangents.len());
         let held: &mut Vec<T> = workspace.of();
+        // Cleared first: `resize` alone would leave the sums of the last batch.
         held.clear();
         held.resize(PIECES * count, T::zero());
         let piece = at.len().div_ceil(PIECES).max(1);
@@ -208,6 +210,7 @@ impl<T: Float + Default> Representation<T> for Spline {
             let range = (k * piece).min(at.len())..((k + 1) * piece).min(at.len());
             self.add(&at.range(range.clone()), &cotangents[range], sums);
         });
+        // Piece after piece at every node: the number of threads changes no bit.
         gradient.parameters.par_iter_mut().enumerate().for_each(|(node, sum)| {
             held.iter().skip(node).step_by(count).for_each(|more| *sum += *more);
         });

@@ -30,6 +30,7 @@ const AT_LEAST: f64 = 1e-10;
 impl GainTerm {
     /// The same with gains that follow a model's visibilities in proportion, from where these are; none of amplitudes alone.
     pub fn tangent<T: Float>(self, model: &[Complex<T>]) -> Option<TangentTerm> {
+        // |V| is not linear in V: χ² of amplitudes is not quadratic.
         if self.amplitudes_only {
             return None;
         }
@@ -57,6 +58,7 @@ impl TangentTerm {
         let parts = (0..model.len()).map(data).flat_map(|miss| [miss.re, miss.im]);
         let all: Vec<f64> = parts.chain(self.priors.iter().copied()).collect();
         let all = DVector::from_vec(all);
+        // Linear least squares: gains take S (SᵀS)⁻¹ Sᵀ r off the residuals r.
         let moves = &self.inverse * self.slopes.tr_mul(&all);
         all - &self.slopes * moves
     }
@@ -80,6 +82,7 @@ impl<T: Float> DataTerm<T> for TangentTerm {
         assert_eq!(gradient.len(), self.held.len());
         let left = self.left(model);
         for ((gradient, held), k) in gradient.iter_mut().zip(&self.held).zip((0..).step_by(2)) {
+            // What is left has no part along the gains: their moves add nothing to the slope.
             let slope = 2.0 * held.conj() * Complex64::new(left[k], left[k + 1]);
             *gradient += Complex::new(T::of(slope.re), T::of(slope.im)).scale(weight);
         }

@@ -11,6 +11,7 @@ pub struct Cards {
 
 impl Cards {
     fn push(&mut self, card: &str) {
+        // FITS headers have printable ASCII alone.
         let card: String = card
             .chars()
             .map(|c| if (' '..='~').contains(&c) { c } else { '?' })

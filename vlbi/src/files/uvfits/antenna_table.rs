@@ -49,6 +49,7 @@ fn columns(
     };
     let none = || ColumnData::Singles(0, Vec::new());
     let names: Vec<String> = stations.iter().map(|station| station.name.clone()).collect();
+    // AIPS has 8 characters; longer names keep all of theirs.
     let width = names.iter().map(String::len).max().unwrap_or(0).max(8);
     let positions = stations.iter().flat_map(|s| s.position.unwrap_or_default()).collect();
     let sefd =

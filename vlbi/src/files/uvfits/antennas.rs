@@ -83,6 +83,7 @@ fn unknown_mount(table: &Table<'_>, row: usize, name: &str) -> Option<String> {
 /// unless the table says that its coordinates are left-handed.
 fn station(unit: &Unit<'_>, table: &Table<'_>, row: usize) -> Result<Option<Station>, FileError> {
     let name = table.text(row, "ANNAME").filter(|name| !name.is_empty());
+    // Names have no blanks, which separate columns in texts.
     let name = name.map(|name| name.split_whitespace().collect::<Vec<_>>().join("_"));
     let mut position = [0.0; 3];
     for (k, keyword) in ["ARRAYX", "ARRAYY", "ARRAYZ"].into_iter().enumerate() {

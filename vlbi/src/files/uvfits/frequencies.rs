@@ -26,6 +26,7 @@ pub fn channels(
     let row = table.as_ref().and_then(|table| setup_row(table, setup));
     let bands = places.iter().map(|place| place.band + 1).max().unwrap_or(1);
     let cell = |name: &str, band: usize| table.as_ref().and_then(|t| t.number(row?, name, band));
+    // One channel of one setup may lack an offset: it is at the reference frequency.
     if let (Some(table), Some(unit)) = (&table, unit)
         && (places.len() > 1 || table.rows() > 1)
         && (row.is_none() || (0..bands).any(|band| cell("IF FREQ", band).is_none()))

@@ -133,6 +133,7 @@ impl Layout {
                 .map(|(a, b)| [a, b]),
             scale: header.number("BSCALE")?.unwrap_or(1.0),
             zero: header.number("BZERO")?.unwrap_or(0.0),
+            // The standard has BLANK for whole numbers alone.
             blank: header.integer("BLANK")?.filter(|_| bits > Some(0)),
             complex_stride: complex.stride,
             weighted: complex.length == 3,
@@ -231,6 +232,7 @@ fn products(header: &Header<'_>, axis: &Axis) -> Result<([Option<usize>; 4], Bas
         (value("CRVAL", f64::NAN)?, value("CDELT", 1.0)?, value("CRPIX", 1.0)?);
     let circular = first < 0.0;
     let mut products = [None; 4];
+    // There are four products, each once: a fifth is refused, however many a header claims.
     for index in 0..axis.length.min(8) {
         let code = first + (index as f64 + 1.0 - reference) * step;
         let code = if circular { -code } else { code };

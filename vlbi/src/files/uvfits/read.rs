@@ -44,6 +44,7 @@ pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
     let reference_hz = reference_frequency(header, &layout, tables.frequency_hz)?;
     let (mut channels, unknown) = frequencies::channels(&units, &layout, reference_hz)?;
     let mut frequency_hz = reference_hz;
+    // A single channel is no list: its frequency is that of the observation.
     if let [only] = channels[..] {
         frequency_hz = only.frequency_hz;
         channels.clear();
@@ -194,6 +195,7 @@ impl Reader<'_> {
         let size = self.layout.group_size * self.layout.number_size;
         let groups = || data.chunks_exact(size).enumerate();
         let day = groups().map(|(_, group)| self.date(group)).filter(|d| d[0].is_finite());
+        // The minimum passes over NaN, and is NaN without any date: refused below.
         let day = day.map(|[day, fraction]| (day + fraction).floor()).fold(f64::NAN, f64::min);
         if !(-1e6..=1e6).contains(&day) {
             let message = format!("{} groups, none with a date near our time", self.layout.groups);

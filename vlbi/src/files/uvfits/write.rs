@@ -77,6 +77,7 @@ pub fn write(observation: &Observation) -> Result<Vec<u8>, Error> {
         // The header promises order of time and baseline.
         observation.to_mut().sort();
     }
+    // What is stored then is wavelengths, which single precision holds to the bit.
     if !several && observation.rows.iter().all(is_single_in_wavelengths) {
         facts.uv_scale = facts.frequency_hz.recip();
     }
@@ -183,6 +184,7 @@ fn group_bytes(groups: &[&[Row]], w_seconds: &[f64], facts: &Facts) -> Vec<u8> {
         let frequency_hz = facts.channels[usize::from(row.channel)].frequency_hz;
         let [u, v] = row.uv.map(|x| x / frequency_hz / facts.uv_scale);
         let baseline = 256.0 * antennas[0] + antennas[1];
+        // Single precision holds a Julian date to a quarter of a day: its fraction is stored apart.
         let day = 2_400_000.5 + f64::from(facts.mjd);
         let w = w_seconds / facts.uv_scale;
         let parameters = [u, v, w, baseline, day, row.time_h / 24.0, row.integration_s];

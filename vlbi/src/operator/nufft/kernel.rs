@@ -21,6 +21,7 @@ impl Kernel {
     /// width), the rate e^(−π√½ width) of the paper's theorem 7 with a factor that was measured.
     pub fn of_accuracy(accuracy: f64) -> Self {
         let width = width_of(accuracy);
+        // The paper's choice for twofold oversampling, a little below π w (1 − 1/4).
         Kernel { width, beta: 2.3 * width as f64 }
     }
 
@@ -31,6 +32,7 @@ impl Kernel {
         let kernel = *self;
         let value = move |k: usize| {
             let z = (first + k as f64 - at) / half;
+            // Rounding may put the ends of the kernel beyond 1.
             (kernel.beta * ((1.0 - z * z).max(0.0).sqrt() - 1.0)).exp()
         };
         (first, (0..self.width).map(value))
@@ -40,7 +42,7 @@ impl Kernel {
     pub fn transform(&self, count: usize, cells: usize) -> Vec<f64> {
         let half = 0.5 * self.width as f64;
         let step = PI / POINTS as f64;
-        // With z = sin θ the root is gone.
+        // With z = sin θ the root is gone, and the ends have no weight.
         let nodes: Vec<(f64, f64)> = (1..POINTS)
             .map(|k| (k as f64 * step - FRAC_PI_2).sin_cos())
             .map(|(sin, cos)| (sin, step * half * cos * (self.beta * (cos - 1.0)).exp()))

@@ -111,6 +111,7 @@ impl Nufft {
         for uv in frames {
             let site = |(k, uv): (usize, &[f64; 2])| operator.site(pulse, *uv, first + k);
             let mut sites: Vec<Site> = uv.par_iter().enumerate().map(site).collect();
+            // Strips find their sites by bisection, and add them in one order.
             sites.sort_by_key(|site| (site.cell, site.datum));
             operator.sites.extend(sites);
             operator.frames.push(first..first + uv.len());
@@ -139,6 +140,8 @@ impl Nufft {
     fn site(&self, pulse: Pulse, uv: [f64; 2], datum: usize) -> Site {
         let ImageGrid { width, height, pixel_rad } = self.grid;
         let turns = uv.map(|x| x * pixel_rad);
+        // Pixels lie whole pixels from the origin of the transform: whole turns a pixel change
+        // nothing. The pulse and the phase of that origin, in `factor`, see all of (u, v).
         let whole = turns.map(|x| x - x.round());
         let conjugate = whole[0] < 0.0;
         let sign = if conjugate { -1.0 } else { 1.0 };
@@ -153,6 +156,7 @@ impl Nufft {
         }
         // Pixel (width/2, height/2) is the origin of the fast transform.
         let offset = [self.grid.east(width / 2) * uv[0], self.grid.north(height / 2) * uv[1]];
+        // Less whole turns, which would cost digits of the phase.
         let factor = Complex::from_polar(
             pulse.transform(uv, pixel_rad),
             TAU * (offset[0] - offset[0].round() + offset[1] - offset[1].round()),
@@ -184,6 +188,7 @@ impl Nufft {
     /// Rows of an image, corrected and transformed: the columns that are kept, row after row.
     fn transform_rows<T: Float>(&self, image: &[T]) -> Vec<Complex<f64>> {
         let zero = Complex::new(0.0, 0.0);
+        // Columns run west and rows south: e^{+2πi(ul + vm)} is the forward transform.
         let (width, fft) = (self.grid.width, &self.along_row[0]);
         let mut result = vec![zero; self.columns * self.grid.height];
         result
@@ -227,6 +232,7 @@ impl Nufft {
                     for (k, (pixel, of_column)) in
                         image.iter_mut().zip(&self.correction[0]).enumerate()
                     {
+                        // Images are real: the transpose of their transform keeps the real part.
                         let light = row[Self::place(k, width, fft.len())].re * *of_column * *of_row;
                         *pixel += T::of(light);
                     }
@@ -251,6 +257,7 @@ impl Nufft {
                 }
                 for column in columns.chunks_exact_mut(length) {
                     fft.process_with_scratch(&mut column[..self.rows], scratch);
+                    // Kernels that reach over the end then read cells that follow each other.
                     column.copy_within(..length - self.rows, self.rows);
                 }
             },
@@ -303,6 +310,7 @@ impl Nufft {
         let mut columns = vec![Complex::new(0.0, 0.0); self.columns * length];
         columns.par_chunks_mut(STRIP * length).enumerate().for_each(|(strip, cells)| {
             let start = strip * STRIP;
+            // A site reaches width − 1 columns beyond its first one, perhaps from the strip before.
             let near = |column: usize| sites.partition_point(|site| site.cell[0] < column);
             let sites = &sites[near((start + 1).saturating_sub(width))..near(start + STRIP)];
             for site in sites {

@@ -9,6 +9,7 @@ fn exponential(x: f32) -> f32 {
     if held > 87.0 { held = 87.0; }
     if held < -87.0 { held = -87.0; }
     let n = round(held * 1.44269504);
+    // ln 2 in two parts, the first of so few bits that n times it is exact.
     let r = fma(-n, -2.12194440e-4, fma(-n, 0.693359375, held));
     var p = 1.9875691500e-4;
     p = fma(p, r, 1.3981999507e-3);
@@ -24,6 +25,7 @@ fn softplus(x: f32) -> f32 {
     let e = exponential(-abs(x));
     let s = e / (2.0 + e);
     let z = s * s;
+    // z is at most 1/9: the next term is 1e-9 of the sum.
     var p = 0.0666666667;
     p = fma(p, z, 0.0769230769);
     p = fma(p, z, 0.0909090909);

@@ -75,6 +75,7 @@ fn in_mask(place: vec3<f32>) -> bool {
     if !(all(at >= vec3<f32>(0.0)) && all(at <= vec3<f32>(most))) {
         return false;
     }
+    // The upper faces belong to the last cells.
     let cell = min(vec3<u32>(at), vec3<u32>(task.cells - 1u));
     let index = (cell.x * task.cells + cell.y) * task.cells + cell.z;
     return ((mask[index / 32u] >> (index % 32u)) & 1u) == 1u;
@@ -82,6 +83,7 @@ fn in_mask(place: vec3<f32>) -> bool {
 
 // How long after the time at a place of the table.
 fn since(at: vec2<f32>, elapsed: f32, place: u32) -> f32 {
+    // The high parts first: those of close times differ by an exact number.
     return (at.x - fall[place]) + (at.y - fall[place + 1u]) - elapsed;
 }
 
@@ -122,7 +124,7 @@ fn fallen(at: vec2<f32>, elapsed: f32) -> vec2<f32> {
     return vec2<f32>(coefficients(cell + 4u, part), coefficients(cell + 10u, part));
 }
 
-// Later than any time.
+// Later than any time, and below what stands for that at nodes whose matter stays at its radius.
 const NEVER: f32 = 1e29;
 
 // What a node is stretched by and turned by to where its matter was; a stretch of 0 where that is outside of the region.
@@ -186,6 +188,7 @@ fn sums_so_far(own: u32, lane: u32, lanes: u32) -> u32 {
         if lane >= reach {
             sum += shared_counts[lane - reach];
         }
+        // Nobody writes before all have read.
         workgroupBarrier();
         shared_counts[lane] = sum;
         workgroupBarrier();
@@ -226,6 +229,7 @@ fn collect(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
     var to = starts[pair];
     for (var begin = its.first; begin < its.last; begin += 64u) {
         let k = begin + lane;
+        // Lanes behind the last node go along: barriers need all of them.
         var point = Seen(vec4<f32>(0.0), false);
         if k < its.last {
             point = seen(k, its.time);

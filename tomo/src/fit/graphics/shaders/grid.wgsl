@@ -43,6 +43,7 @@ struct Located {
 }
 
 fn here() -> u32 {
+    // Blocks behind the last point have none: a difference of unsigned numbers must not wrap.
     return min(max(extent[0], block.first) - block.first, block.stride);
 }
 
@@ -193,6 +194,7 @@ fn largest(@builtin(global_invocation_id) at: vec3<u32>) {
 // Numbers are multiplied by 2^scale(): all points of the block may add the largest one.
 fn scale() -> i32 {
     let exponent = i32(atomicLoad(&peak) >> 23u) - 126;
+    // Sums stay below 2^61 of the 2^63 that a signed number of 64 bits has.
     return 61 - i32(32u - countLeadingZeros(block.stride)) - exponent;
 }
 
@@ -200,6 +202,7 @@ fn scale() -> i32 {
 fn fixed(x: f32, scale: i32) -> vec2<u32> {
     let bits = bitcast<u32>(abs(x));
     let exponent = i32(bits >> 23u);
+    // Floats that are not normal have no leading one to put back.
     if exponent == 0 {
         return vec2<u32>(0u);
     }
@@ -237,6 +240,7 @@ fn scatter(@builtin(global_invocation_id) at: vec3<u32>) {
                 add.y += select(0u, 1u, add.x == 0u);
             }
             let to = 2u * (level.offset + plane * size() + node(found, k));
+            // Atomics have 32 bits: who makes the low word wrap carries one into the high word.
             let before = atomicAdd(&sums[to], add.x);
             let carry = select(0u, 1u, before + add.x < before);
             atomicAdd(&sums[to + 1u], add.y + carry);
@@ -269,6 +273,7 @@ fn settle(@builtin(global_invocation_id) at: vec3<u32>) {
     }
     let back = -scale();
     let whole = f32(high) * 4294967296.0 + f32(low);
+    // In two factors, as 2^back alone may be no float.
     let sum = whole * power_of_two(back / 2) * power_of_two(back - back / 2);
     gradient[k] += select(sum, -sum, negative);
 }

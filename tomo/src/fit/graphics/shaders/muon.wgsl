@@ -73,6 +73,7 @@ fn normalise(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
         workgroupBarrier();
     }
     largest = squares[0];
+    // All have read before `squares` is used again.
     workgroupBarrier();
     let unit = select(1.0 / largest, 0.0, largest < SMALLEST);
     var sum = 0.0;
@@ -147,6 +148,7 @@ fn gram(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) l
     let at = position(group, local.xy, side);
     let x = by_rows(matrix.places[turn.current], matrix.columns);
     var sum = 0.0;
+    // X'X or XX', whichever is smaller: X(X'X) = (XX')X.
     if matrix.rows > matrix.columns {
         sum = product(transposed(x), x, vec3(side, matrix.rows, side), at, local.xy);
     } else {

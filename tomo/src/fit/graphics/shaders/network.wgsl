@@ -63,6 +63,7 @@ var<workgroup> sums: array<f32, LANES>;
 
 // Points in this block.
 fn here() -> u32 {
+    // Blocks behind the last point have none: a difference of unsigned numbers must not wrap.
     return min(max(extent[0], block.first) - block.first, block.stride);
 }
 
@@ -373,6 +374,7 @@ fn weights_back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
         }
         workgroupBarrier();
     }
+    // Every tile of inputs has seen the same slopes: one of them is enough.
     if i0 == 0u {
         keep_biases(lane, o0, seen, start + proper_inputs() * layer.outputs);
     }

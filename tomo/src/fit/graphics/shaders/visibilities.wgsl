@@ -80,7 +80,8 @@ var<workgroup> shared_sums: array<f32, 256>;
 var<workgroup> shared_uv: array<vec2<f32>, 64>;
 var<workgroup> shared_slopes: array<vec2<f32>, 64>;
 
-// exp(2 pi i (u l + v m)); whole turns are taken off before anything is rounded.
+// exp(2 pi i (u l + v m)): the fma makes up for the rounding of u l, and whole turns are taken off
+// before 2 pi rounds them.
 fn wave(uv: vec2<f32>, place: vec2<f32>) -> vec2<f32> {
     let product = uv.x * place.x;
     let turns = product + fma(uv.y, place.y, fma(uv.x, place.x, -product));
@@ -184,8 +185,10 @@ fn close(@builtin(global_invocation_id) at: vec3<u32>) {
     }
     if its.is_phase == 1u {
         residual -= round(residual / (2.0 * KERR_PI)) * (2.0 * KERR_PI);
+        // Rounding may leave a little more than half a turn.
         residual = clamp(residual, -KERR_PI, KERR_PI);
     }
+    // After the sum, which is no number where a visibility is zero.
     if is_dark(its, first) {
         residual = select(DARK, KERR_PI, its.is_phase == 1u);
     }
@@ -243,6 +246,7 @@ fn open(@builtin(global_invocation_id) at: vec3<u32>) {
 fn shine(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let ends = frames[group.y];
     let ray = group.x * 64u + lane;
+    // Lanes behind the last ray go along: barriers need all of them.
     let place = places[min(ray, task.rays - 1u)];
     var sum = 0.0;
     for (var begin = ends.x; begin < ends.y; begin += 64u) {

@@ -74,6 +74,7 @@ impl GaussianField {
         let powers: Vec<f64> = modes.bends().into_iter().map(|bend| power(&law, bend)).collect();
         let amplitudes: Vec<f64> = powers.iter().map(|power| power.sqrt()).collect();
         let share = share(&modes);
+        // B-splines average over nodes: between these only `share` of the variance is left.
         let spread = |variance: f64| law.amplitude / (share * variance).sqrt();
         let spread: Vec<f64> = modes.sum_of_squares(&powers).into_iter().map(spread).collect();
         let center = vec![law.mean; spread.len()];
@@ -148,6 +149,8 @@ impl GaussianField {
 
     /// `factor` times the second derivative of |L x|² with respect to each number, away from the edges.
     pub(super) fn diagonal(&self, factor: f64) -> Vec<f64> {
+        // Far from the edges (1 − Δ/κ²)²ᵐ has the same diagonal everywhere: its trace, which is the
+        // sum of its eigenvalues, over the number of nodes.
         let mean = self.amplitudes.iter().map(|a| a.powi(-2)).sum::<f64>() / self.count() as f64;
         self.spread.iter().map(|spread| 2.0 * factor * mean / (spread * spread)).collect()
     }
@@ -183,6 +186,7 @@ impl GaussianField {
                 let (at, index) = ([i, k / nz, k % nz], i * ny * nz + k);
                 *out = x[index];
                 for ((at, (n, stride)), weight) in at.iter().zip(around).zip(weights) {
+                    // Beyond an edge its mirror image has the same value: no difference.
                     let below = if *at > 0 { x[index] - x[index - stride] } else { 0.0 };
                     let above = if at + 1 < n { x[index] - x[index + stride] } else { 0.0 };
                     *out += weight * (below + above);

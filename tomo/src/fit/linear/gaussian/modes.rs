@@ -36,10 +36,12 @@ impl Waves {
         let n = count as f64;
         let phase = |k: usize| PI * k as f64 / n;
         let wave = |k: usize| {
+            // Σ cos² over the nodes is n for the constant wave and n/2 for all others.
             let norm = if k == 0 { n.recip().sqrt() } else { (2.0 / n).sqrt() };
             let phase = phase(k);
             (0..count).map(move |j| norm * (phase * (j as f64 + 0.5)).cos()).collect::<Vec<f64>>()
         };
+        // cos φ(j + 1) − 2 cos φj + cos φ(j − 1) = −(2 sin φ/2)² cos φj.
         let bend = |k: usize| (2.0 * (0.5 * phase(k)).sin() / spacing).powi(2);
         Self {
             count,
@@ -97,6 +99,7 @@ impl Modes {
     /// Waves half a step apart from those of the grid have no mirrors.
     pub fn between_nodes(&self, degree: Degree, power: impl Fn(f64) -> f64) -> f64 {
         let axis = |waves: &Waves| -> Vec<[f64; 2]> {
+            // Midpoint rule for the integral over all waves of a grid without edges.
             let phase = |k: usize| PI * (k as f64 + 0.5) / waves.count as f64;
             let bend = |phase: f64| (2.0 * (0.5 * phase).sin() / waves.spacing).powi(2);
             let of = |k: usize| [bend(phase(k)), autocorrelation(degree, phase(k))];
@@ -132,6 +135,7 @@ impl Modes {
     }
 
     fn through_all(&self, numbers: &[f64], sums: Sums) -> Vec<f64> {
+        // Each sum moves the last axis to the front: after three they are in order again.
         let along = |k: usize, all: &[f64]| self.axes[k].along_last(all, sums);
         along(0, &along(1, &along(2, numbers)))
     }
@@ -139,6 +143,7 @@ impl Modes {
 
 /// Σ B_{2d+1}(m) cos(m θ) over whole numbers m.
 fn autocorrelation(degree: Degree, phase: f64) -> f64 {
+    // B₃, B₅ and B₇ at 0, 1, 2 and 3; at −m they are the same as at m.
     let shares: &[f64] = match degree {
         Degree::Linear => &[4.0 / 6.0, 1.0 / 6.0],
         Degree::Quadratic => &[66.0 / 120.0, 26.0 / 120.0, 1.0 / 120.0],

@@ -57,6 +57,7 @@ fn voxels(standing: &Standing, problem: &GeometryProblem<'_, f32>) -> Result<Opt
         return Ok(None);
     }
     let effort = Effort { nodes, ..problem.effort };
+    // Splines of degree d have d + 1 taps, and errors that go with the size to that power.
     let onwards = onwards(effort.degree.taps() as f64, nodes as f64 / few as f64);
     let kind = Refinement { source: "voxels", onwards };
     standing.refined(kind, &GeometryProblem { effort, ..*problem })
@@ -85,7 +86,9 @@ fn pixels(
     }
     if seen.is_images() {
         let means = Refinement { onwards: onwards(2.0, 2.0), ..kind };
+        // The rays of the data themselves leave nothing to refine further.
         let (kind, rays) = even.map_or((means, at.rays.denser()), |even| (kind, even));
+        // The model has the panels of the search already, and `seen_through` multiplies them.
         let rays = RaySampling { panels: 1, ..rays };
         let model = seen_through(file, problem.model.clone(), rays)?;
         return standing.refined(kind, &GeometryProblem { model: &model, ..*problem });
@@ -95,6 +98,7 @@ fn pixels(
     }
     let other = seen.sampled(finer(seen.view.file.screen.pixels))?;
     other.with(unknown, view, *errors, problem.memory, |finer| {
+        // The panels of the search, not of the settings: pixels alone are to differ.
         let model = GeometryModel { split: problem.model.split, ..finer.model.clone() };
         standing.refined(kind, &GeometryProblem { model: &model, ..*finer })
     })
@@ -102,5 +106,6 @@ fn pixels(
 
 /// Returns the ratio of endless refinement to a `finer`-fold one, where errors go with this power of the size of parts.
 fn onwards(power: f64, finer: f64) -> f64 {
+    // Richardson: of an error c hᵖ one refinement removes c hᵖ (1 − f⁻ᵖ).
     1.0 / (1.0 - finer.powf(-power))
 }

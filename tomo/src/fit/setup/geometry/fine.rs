@@ -178,6 +178,7 @@ fn surely_about(
 fn valued(problem: &GeometryProblem<'_, f32>, explored: &Explored) -> Result<Sure> {
     let reduced_chi2 = problem.scale * problem.left(&explored.best)?;
     let spread = Spread::of(problem.free, &explored.samples, reduced_chi2);
+    // Values of other patience than that of the samples do not compare with theirs.
     let geometry = lower(&quick(problem), explored, spread.as_ref())?;
     Ok(Sure { geometry, spread, reduced_chi2 })
 }
@@ -207,6 +208,7 @@ pub(super) fn nearer(
     short: &Exploration,
     watch: &mut TrialWatch<'_>,
 ) -> Result<Option<Explored>> {
+    // By the data as they are: values about different volumes do not compare.
     explored.best = problem.solve_from(explored.best.geometry, &explored.best.x)?;
     for _ in 0..NEARER {
         let (anchor, geometry) = (Anchor::of(problem, &explored.best), explored.best.geometry);

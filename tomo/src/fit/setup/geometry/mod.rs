@@ -76,6 +76,7 @@ fn seen_through(file: &FitFile, model: GeometryModel, rays: RaySampling) -> Resu
         return Ok(model.seen_along(rays.lattice));
     }
     let parts = Some((spacing(&file.screen)?, rays.per_side));
+    // By the settings of the fit that follows: search, fit and draws see the same rays.
     let ring = ring(&through(file.clone(), rays))?;
     Ok(GeometryModel { parts, ring, ..model }.seen_along(rays.lattice))
 }

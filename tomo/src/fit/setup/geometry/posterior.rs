@@ -87,6 +87,7 @@ fn enveloped(
         other_voxels(effort, problem.gaussian.map_or(number, |_| SAME))
     };
     for number in 1..=LATTICES as u64 {
+        // Models of other pixels come with the panels of the settings, not those of the search.
         let split = problem.model.split;
         let mut look = |problem: &GeometryProblem<'_, f32>| {
             let model = &GeometryModel { split, ..problem.model.seen_along(number) };
@@ -136,6 +137,7 @@ impl<'a> GeometryPosterior<'a> {
         let n = sigma.len();
         let covariance =
             DMatrix::from_fn(n, n, |a, b| correlation[a * n + b] * sigma[a] * sigma[b]);
+        // Parameters that move together exactly have no Cholesky factor: they are drawn apart.
         let apart = || DMatrix::from_diagonal(&DVector::from_column_slice(sigma));
         let root = covariance.cholesky().map_or_else(apart, |factors| factors.l());
         Ok(Self {
@@ -161,6 +163,7 @@ impl<'a> GeometryPosterior<'a> {
         let normal = |_, _| random.sample::<f64, _>(StandardNormal);
         let normal = DVector::from_fn(self.free.len(), normal);
         let step = &self.root * normal;
+        // For all parameters: which of them are open then changes no draw of another.
         let shares: Vec<f64> = self.free.iter().map(|_| random.random()).collect();
         let each = self.free.iter().zip(&shares).enumerate();
         let drawn = each.fold(self.geometry, |geometry, (k, (free, share))| {

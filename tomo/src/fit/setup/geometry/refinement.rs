@@ -40,6 +40,7 @@ impl Detail<'_> {
     pub fn solved(&self, place: Place, geometry: Geometry) -> Result<Solved> {
         let best = self.through(&place, |problem| {
             let first = problem.solve(geometry)?;
+            // Once more from its own end, where the finer models begin that it is compared with.
             problem.solve_from(geometry, &first.x)
         })?;
         Ok(Solved { best, place })

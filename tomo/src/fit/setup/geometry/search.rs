@@ -58,6 +58,7 @@ pub fn find_geometry(
     let has_prior = file.linear.as_ref().is_some_and(gaussian);
     // Beside a prior of the voxels data count as their errors say.
     let scale = |reduced: f64| if has_prior { 1.0 } else { scale(reduced) };
+    // The factor weighs χ² against the priors in every value: it has to be known before them.
     let first = coarse
         .with(unknown, &search.coarse, 1.0, memory, |problem| least(problem, search.starts))?;
     let found = coarse.with(unknown, &search.coarse, scale(first), memory, |problem| {
@@ -75,6 +76,7 @@ pub fn find_geometry(
     Ok(found.map(|Detailed { sure, errors, resolution }| FoundGeometry {
         geometry: sure.geometry,
         reduced_chi2: sure.reduced_chi2 / errors,
+        // χ² goes with 1/σ².
         noise_factor: errors.powf(-0.5),
         spread: sure.spread,
         resolution,
@@ -142,6 +144,7 @@ fn beginnings(
         let solved = trials.par_iter().map(|geometry| problem.solve(*geometry));
         tried.extend(solved.collect::<core::result::Result<Vec<_>, _>>()?);
         tried.sort_by(|a, b| a.value.total_cmp(&b.value));
+        // The volumes of all others need not be in memory at a time.
         tried.truncate(starts);
         if !watch(0, tried[0].value) {
             return Ok(None);
@@ -199,6 +202,7 @@ fn or_twin(
         explored.best = other.best;
     }
     explored.samples.extend(other.samples);
+    // The quadratic form goes through the best ones: it takes them sorted.
     explored.samples.sort_by(|a, b| a.value.total_cmp(&b.value));
     Ok(Some(explored))
 }

@@ -28,6 +28,7 @@ pub(super) struct SearchData {
 const BESIDE_THE_RING: f64 = 0.8;
 
 /// Other rays that the best geometry is looked for through.
+// Six with those of the fit: Student's t widens the scatter of six by 5/3, that of four by 3.
 pub(super) const LATTICES: usize = 5;
 /// Pixels of a look through others over those of the fit, along each side: finer and wider ones.
 const RESAMPLED: [f64; LATTICES] = [1.15, 0.87, 1.25, 0.93, 1.08];
@@ -134,6 +135,8 @@ impl SearchData {
                 patience: StopRule {
                     looking: view.iterations,
                     rounds: self.rounds,
+                    // Few voxels shine: iterations over these are cheap. Without them what is left
+                    // moves the geometry by more than noise does.
                     settling: self.rounds * SETTLING * view.iterations,
                 },
             },
@@ -165,8 +168,10 @@ impl SearchData {
         let terms = terms(&data).into_iter();
         let terms: Vec<_> = match problem.gaussian {
             Some(_) => terms.collect(),
+            // What is left out of χ² is left out of the number of data that it is compared with.
             None => terms.map(|term| counted(term, problem.frames)).collect(),
         };
+        // The same geometry has another value with other pixels left out.
         let memory = problem.memory.about(key(geometry.bits()));
         work(&GeometryProblem { terms: &terms, memory, ..*problem })
     }

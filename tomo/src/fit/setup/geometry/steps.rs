@@ -27,6 +27,7 @@ impl Stepped {
 }
 
 fn lowest(all: &[Stepped]) -> Option<&Stepped> {
+    // Each end may leave out other pixels: sums over different numbers of data do not compare.
     all.iter().min_by(|a, b| a.per_datum.total_cmp(&b.per_datum))
 }
 
@@ -58,6 +59,7 @@ impl Detail<'_> {
         let from = best.geometry();
         let (place, refined) = self.refined(place, best)?;
         let about = refined.geometry();
+        // The best end has gone on to the last resolution; the others follow from where they are.
         let ends = near.iter().map(Stepped::geometry);
         let ends: Vec<Geometry> = ends.map(|end| if end == from { about } else { end }).collect();
         let Some(all) = self.each(&place, Some(&refined), &ends, watch)? else { return Ok(None) };
@@ -69,6 +71,7 @@ impl Detail<'_> {
             trial.further = polished.further;
         }
         let Some(best) = lowest(&all) else { return Ok(None) };
+        // Finer models and steps have left less than what the factor was chosen by.
         let errors = (self.scale)(best.reduced / place.errors);
         let place = Place { errors, ..place };
         let sure = self.sure(&place, best)?;

@@ -48,6 +48,7 @@ impl SearchData {
         let Some(term) = measured.tangents(problem.frames, &images)? else { return Ok(None) };
         let term = counted(Weighted { weight, term: &term }, problem.frames);
         let anchor = key((anchor.geometry.bits(), bits(&anchor.x)));
+        // The same geometry has another value about another volume.
         let memory = problem.memory.about(anchor);
         work(&GeometryProblem { terms: &[term], memory, ..*problem }).map(Some)
     }
@@ -88,6 +89,7 @@ impl FitData {
 
     /// Returns the priors of gains; amplitudes where nothing is said of them.
     fn free_phases(&self, part: &Observation) -> GainPriors {
+        // Without a spread of amplitudes stations turn phases and no more.
         let known = vec![0.0; part.stations.len()];
         let priors = || GainPriors { free_phases: true, amplitude_sigma: known };
         self.gains.clone().unwrap_or_else(priors)
