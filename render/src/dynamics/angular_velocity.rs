@@ -176,6 +176,7 @@ impl AngularVelocity {
         let Self::Table { radii, rates } = self else { return (0.0, 0.0) };
         let above = radii.partition_point(|x| *x <= r);
         let at = |k: usize| (radii.get(k).copied(), rates.get(k).copied());
+        // Below the first radius the index wraps to one that is not there.
         match (at(above.wrapping_sub(1)), at(above)) {
             ((Some(a), Some(left)), (Some(b), Some(right))) => {
                 let slope = (right - left) / (b - a);

@@ -61,6 +61,7 @@ impl Perturbation {
         let mut random = Pcg64::seed_from_u64(seed);
         let along = DVector::from_fn(radii.len(), |k, _| {
             let normal: f64 = random.sample(StandardNormal);
+            // Eigenvalues that are 0 may come out below it by rounding.
             normal * parts.eigenvalues[k].max(0.0).sqrt()
         });
         let drawn = parts.eigenvectors * along;

@@ -129,6 +129,7 @@ fn cross<T: Float, V: Lanes<T>>(a: [V; 3], b: [V; 3]) -> [V; 3] {
 fn rotate<T: Float, V: Lanes<T>>(axis: [V; 3], sin: V, cos: V, x: [V; 3]) -> [V; 3] {
     let along = (V::splat(T::one()) - cos) * dot(axis, x);
     let swirl = cross(axis, x);
+    // A loop and no `map`: in a closure the intrinsics of the instruction set become calls.
     let mut rotated = [along; 3];
     for k in 0..3 {
         rotated[k] = cos.mul_add(x[k], sin.mul_add(swirl[k], along * axis[k]));
@@ -191,11 +192,14 @@ impl<T: Float> Task<T> for Backward<'_, T> {
             let (x, g) = (load(&self.turned.points, from), load(&self.gradient, from));
             let (rest, swirl) = (one - cos, cross(x, g));
             let (along_x, along_g) = (rest * dot(axis, x), rest * dot(axis, g));
+            // Rodrigues by ξ: sin (x × g) + (1 − cos)[(ξ·x) g + (ξ·g) x].
+            // Lanes beyond the last point hold zeros and add nothing.
             for (c, sum) in sum.iter_mut().enumerate() {
                 let of = sin.mul_add(swirl[c], along_g.mul_add(x[c], along_x * g[c]));
                 *sum += of.sum().double();
             }
             if let Some(angles) = &mut self.wanted.angles {
+                // d(R x)/dangle = ξ × R x.
                 let pulled = rotate(axis, sin, cos, x);
                 add(dot(g, cross(axis, pulled)), &mut angles[from..]);
             }

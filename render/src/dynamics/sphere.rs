@@ -58,6 +58,7 @@ impl Axis {
     /// Itself and two unit vectors across it, right-handed.
     pub fn basis(self) -> [[f64; 3]; 3] {
         let n = self.0;
+        // Across its least component, where the tangent cannot vanish.
         let least = (0..3).fold(0, |k, c| if n[c].abs() < n[k].abs() { c } else { k });
         let mut unit = [0.0; 3];
         unit[least] = 1.0;

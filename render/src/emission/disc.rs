@@ -105,6 +105,7 @@ impl DiscModel {
     pub fn color(&self, r: f64, g: f64) -> [f32; 3] {
         let Some((peak, colors)) = &self.black_body else { return self.color };
         let flux = match self.plunge_at(r) {
+            // The flux that has this intensity outside of the innermost stable orbit.
             Some(_) => self.intensity(r) / self.scale,
             None => self.profile.flux(r),
         };

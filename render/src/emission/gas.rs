@@ -108,6 +108,7 @@ impl GasModel {
     #[inline(always)]
     fn metric(&self, r: f64, u: f64) -> Metric {
         let a = self.hole.spin();
+        // On the axis g^φφ has a pole and l vanishes: their product is 0 and no NaN.
         let sin2 = ((1.0 - u) * (1.0 + u)).max(1e-300);
         let (delta, sigma) = (self.hole.delta(r), self.hole.sigma(r, u));
         let across = r * r + a * a;
@@ -125,6 +126,7 @@ impl GasModel {
         let energy = area + tp * (l + lambda) - pp * l * lambda;
         // ν_em = U · energy/(ΔΣ), U = √(ΔΣ/norm).
         let g = (norm * delta * sigma).max(0.0).sqrt() / energy;
+        // False for NaN too: 0/0 may come out where nothing can move so.
         if g > 0.0 { g } else { 0.0 }
     }
 
@@ -201,6 +203,7 @@ impl Medium for GasModel {
             GasProfile::Gaussian => 1.0,
             GasProfile::PowerLaw { slope } => slope.max(1.0),
         };
+        // The density falls by a factor e over r/slope along the radius, and with σ = 1/h in cos θ.
         1.0 / self.flatness.max(falls)
     }
 

@@ -33,6 +33,7 @@ type Extent = [[f64; 2]; 3];
 impl Occupied {
     /// The bricks of a volume that turns about `axis` (a unit vector).
     pub fn new(volume: &Volume, axis: [f64; 3]) -> Self {
+        // The axis cannot be parallel to the direction in which it has its least component.
         let least = (0..3).min_by(|i, j| axis[*i].abs().total_cmp(&axis[*j].abs())).unwrap_or(0);
         let other = core::array::from_fn(|k| f64::from(u8::from(k == least)));
         let first = unit(cross(axis, other));
@@ -79,6 +80,7 @@ impl Occupied {
     fn mark(&mut self, cells: &[Extent]) {
         let [nr, nh, np] = self.count;
         let corner = |i: usize, j: usize, k: usize| (i * (nh + 1) + j) * (np + 1) + k;
+        // A layer of zeros below each axis, so that differences of sums need no special case.
         let mut sums = vec![0u32; (nr + 1) * (nh + 1) * (np + 1)];
         for cell in cells {
             let Some([radii, heights]) = self.flat(cell) else { continue };
@@ -92,6 +94,7 @@ impl Occupied {
             let mut row = 0;
             for k in 1..=np {
                 row += sums[corner(i, j, k)];
+                // A running sum along the azimuth, inclusion and exclusion across the other two.
                 let before = sums[corner(i - 1, j, k)] + sums[corner(i, j - 1, k)];
                 sums[corner(i, j, k)] = row + before - sums[corner(i - 1, j - 1, k)];
             }
@@ -191,11 +194,13 @@ impl Occupied {
     /// Azimuths about the axis along a segment; `None` if it may meet the axis.
     fn azimuths(&self, segment: &PathSegment) -> Option<[f64; 2]> {
         let [a, b] = segment.positions.map(|x| self.across.map(|e| dot(e, x)));
+        // The nearest approach of the chord to the axis, seen along the axis.
         let along = [b[0] - a[0], b[1] - a[1]];
         let square = along[0] * along[0] + along[1] * along[1];
         let part = -(a[0] * along[0] + a[1] * along[1]) / square.max(f64::MIN_POSITIVE);
         let part = part.clamp(0.0, 1.0);
         let nearest = (a[0] + part * along[0]).hypot(a[1] + part * along[1]);
+        // A point that far beside the chord is turned by asin(off/nearest) at most.
         let wide = segment.off / nearest;
         if wide >= 1.0 || wide.is_nan() {
             return None;
@@ -235,6 +240,7 @@ fn angles([low, high]: [[f64; 3]; 2], across: [[f64; 3]; 2]) -> [f64; 2] {
     let flat = |x: [f64; 3]| across.map(|e| dot(e, x));
     let center = flat(core::array::from_fn(|k| 0.5 * (low[k] + high[k])));
     let half: [f64; 3] = core::array::from_fn(|k| 0.5 * (high[k] - low[k]));
+    // From an axis outside of the ball around the box all corners are within a quarter turn.
     if center[0].hypot(center[1]) <= 1.001 * dot(half, half).sqrt() {
         return [-PI, PI];
     }

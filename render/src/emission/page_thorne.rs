@@ -55,7 +55,9 @@ impl PageThorne {
     /// Radius and value of the largest flux, by golden-section search.
     pub fn peak(&self) -> (f64, f64) {
         let golden = 0.5 * (5f64.sqrt() - 1.0);
+        // For every spin the peak lies between 1 and 2 times this radius.
         let (mut lo, mut hi) = (self.isco, 4.0 * self.isco);
+        // 0.618⁸⁰ is less than the rounding of a radius.
         for _ in 0..80 {
             let (p, q) = (hi - golden * (hi - lo), lo + golden * (hi - lo));
             if self.flux(p) > self.flux(q) { hi = q } else { lo = p }

@@ -58,6 +58,7 @@ impl SpotModel {
 
     /// Angular velocity vector of the spot's matter at radius r.
     pub fn angular_velocity(&self, r: f64) -> [f64; 3] {
+        // A rigid spot turns as a whole, at the rate of its centre.
         let r = if self.sheared_since.is_some() { r } else { self.orbit };
         self.axis.map(|x| x * self.rate(r))
     }
@@ -122,6 +123,7 @@ impl SpotModel {
 
     /// A lower bound of that distance at a radius and a height z, all in M.
     pub fn least_offset(&self, radius: f64, z: f64) -> f64 {
+        // About z matter keeps its height, and the centre is in the plane.
         let above = if self.axis[0] == 0.0 && self.axis[1] == 0.0 { z.abs() } else { 0.0 };
         (radius - self.orbit).abs().max(above)
     }

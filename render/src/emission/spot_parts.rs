@@ -47,6 +47,7 @@ impl SpotModel {
         if low >= high || when.is_some_and(|[_, to]| to < since) {
             return;
         }
+        // Shear grows with time: shells that are thin enough at the end are so before.
         let around = when.map_or(time, |[_, to]| to);
         let [least, largest] = self.turned_between([low, high], [around, around]);
         let shells = ((largest - least) / SPREAD).ceil().clamp(1.0, MOST_SHELLS);
@@ -69,7 +70,9 @@ impl SpotModel {
         parts: &mut Vec<SpotPart>,
     ) {
         let thick = self.thickness(radii);
+        // Arcs of 2 `thick`, as far across as along.
         let step = TAU / (PI * self.middle(radii) / thick).ceil().clamp(4.0, most.max(4.0));
+        // The whole turn where the angles are wound up over more than it, or not known.
         let [from, to] = turned.filter(|[a, b]| b - a < TAU).unwrap_or([0.0, TAU]);
         let count = ((to - from) / step).ceil().max(1.0);
         let width = (to - from) / count;
@@ -116,7 +119,9 @@ impl SpotModel {
         }
         let [a, b] = self.turned_between(part.radii, [from.max(since), to]);
         let [c, d] = part.angles;
+        // Angles of many turns have lost digits of the last one.
         let rounding = ROUNDING + 4.0 * f64::EPSILON * a.abs().max(b.abs());
+        // Two arcs meet where one of them begins within the other.
         let (wide, own) = (b - a + rounding, d - c + rounding);
         // Not finite where rates are not: then it may.
         wide.is_nan()
@@ -131,10 +136,12 @@ impl SpotModel {
         if self.sheared_since().is_some() {
             return true;
         }
+        // From its place in the middle of the time the centre moves by no more than this.
         let way = 0.5 * self.speed() * (to - from);
         let center = self.center(0.5 * (from + to));
         let (along, offset) = (difference(b, a), difference(center, a));
         let part = (dot(offset, along) / dot(along, along)).clamp(0.0, 1.0);
+        // A chord without length makes 0/0.
         let part = if part.is_nan() { 0.0 } else { part };
         let miss: [f64; 3] = core::array::from_fn(|k| offset[k] - part * along[k]);
         let reach = CUT_OFF * self.sigma() + way + epsilon;

@@ -90,6 +90,7 @@ impl VolumeModel {
     fn turned(&self, radii: [f64; 2], times: [f64; 2]) -> Option<[f64; 2]> {
         let rates = match &self.rotation {
             None => [0.0; 2],
+            // Not monotonic in the radius: extremes may lie between the ends.
             Some(AngularVelocity::Table { .. } | AngularVelocity::Profile(_)) => return None,
             Some(rotation) => radii.map(|r| rotation.rate(r)),
         };
@@ -119,6 +120,7 @@ impl VolumeModel {
 
     /// Returns the origin of falling matter; `None` where that is outside of the region.
     fn origin(&self, flow: &Falling, x: [f64; 3], r: f64, elapsed: f64) -> Option<[f64; 3]> {
+        // As in a fit, only what was inside of the region at the reference time is followed.
         let [stretch, angle] = flow.before(&flow.origin(r), elapsed);
         let inside =
             |region: VolumeRegion| stretch * r >= region.r_min && stretch * r <= region.r_max;
@@ -133,7 +135,9 @@ impl VolumeModel {
     /// The least and the largest radius at the reference time of matter that is between two radii between two times.
     fn labels(&self, flow: &Falling, radii: [f64; 2], times: [f64; 2]) -> [f64; 2] {
         let corner = |k: usize| flow.radius_before(radii[k & 1], times[k >> 1] - self.reference);
+        // A margin for the rounding of the table.
         let wider = |[low, high]: [f64; 2]| [low * (1.0 - 1e-9), high * (1.0 + 1e-9)];
+        // Matter neither overtakes nor turns back: extremes are at the corners.
         wider(
             [0, 1, 2, 3]
                 .map(corner)
@@ -151,6 +155,7 @@ impl VolumeModel {
         moment: Moment,
     ) -> Option<[f64; 2]> {
         let (r, u) = (nodes.radius[k], nodes.cos_theta[k]);
+        // Falling matter also shines at radii where nothing was at the reference time.
         let lit = (self.occupied.radii[0]..=self.occupied.radii[1]).contains(&r);
         if !lit && self.falling().is_none() {
             return None;
@@ -168,6 +173,7 @@ impl VolumeModel {
             return None;
         }
         let Some(index) = self.spectral_index else { return Some([emissivity, 1.0]) };
+        // Not there where matter turns about z, for whose g λ is enough.
         let polar = nodes.polar_velocity.get(k).copied().unwrap_or(0.0);
         let omega = self.angular_velocity(r);
         let g = match self.falling() {
@@ -197,6 +203,7 @@ impl Medium for VolumeModel {
     fn sphere(&self) -> f64 {
         // Somewhere outside of the horizon even where all is inside.
         let outer = self.region.map_or(f64::INFINITY, |region| region.r_max);
+        // Before the reference time falling matter was farther out than the file has light.
         let lit = if self.falling().is_some() && outer.is_finite() {
             outer
         } else {
@@ -211,6 +218,7 @@ impl Medium for VolumeModel {
     }
 
     fn quantities(&self) -> Quantities {
+        // About z the redshift is a function of λ: no momentum is needed.
         let tilted = self.axis[0] != 0.0 || self.axis[1] != 0.0;
         let moves = self.rotation.is_some() && tilted || self.falling().is_some();
         let velocity = self.spectral_index.is_some() && moves;
@@ -228,6 +236,7 @@ impl Medium for VolumeModel {
     fn four_velocity(&self, r: f64, u: f64, azimuth: f64) -> Option<[f64; 4]> {
         let n = direction(u, azimuth);
         let v = cross(self.angular_velocity(r), n);
+        // On the axis both rates are 0/0: 0 comes out.
         let sin2 = (n[0] * n[0] + n[1] * n[1]).max(1e-300);
         let rates = [-v[2] / sin2.sqrt(), (n[0] * v[1] - n[1] * v[0]) / sin2];
         let fall = self.falling().map_or(0.0, |flow| flow.rates(r)[0]);

@@ -87,6 +87,7 @@ impl<'a> Gif<'a> {
         let mut encoder =
             gif::Encoder::new(bytes, width, height, &colors).map_err(AnimationError::from)?;
         encoder.set_repeat(gif::Repeat::Infinite).map_err(AnimationError::from)?;
+        // Browsers take a tenth of a second for anything below two hundredths.
         let delay = (100.0 / f64::from(per_second.max(1))).round().max(2.0) as u16;
         Ok(Gif { encoder, palette, delay })
     }

@@ -51,6 +51,7 @@ fn exposure(bytes: &[u8]) -> Result<[f32; 3], ImageError> {
 
 /// Pixels of so many bytes each, the first three of which are sRGB.
 fn of_bytes<const N: usize>(bytes: &[u8]) -> Vec<[f32; 3]> {
+    // A byte has 256 values: a table saves a power a pixel.
     let linear: [f32; 256] = core::array::from_fn(|byte| srgb_to_linear(byte as f32 / 255.0));
     let (pixels, _) = bytes.as_chunks::<N>();
     let color = |pixel: &[u8; N]| [0, 1, 2].map(|k: usize| linear[usize::from(pixel[k])]);

@@ -70,6 +70,7 @@ fn of_png(bytes: &[u8]) -> Chunks {
             b"cICP" if content.starts_with(&[1, 13]) => return Chunks::Decided(None),
             b"cICP" => return Chunks::Decided(Some(format!("cICP = {content:?}"))),
             b"sRGB" => is_srgb = true,
+            // Writers of sRGB give its curve as an exponent of 1/2.2 as well: 45455.
             b"gAMA" if !matches!(numbers[..], [45_000..46_000]) => {
                 other.push(format!("gAMA = {:?}", scaled()));
             }

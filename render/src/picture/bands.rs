@@ -53,9 +53,11 @@ pub(super) fn render_bands(
 ) -> Result<(), Error> {
     let tiles = raster.tiles();
     let mut todo = todo.peekable();
+    // The tolerance takes a coarse picture, which a complete journal does not need.
     let tolerance = if todo.peek().is_none() { None } else { raster.tolerance()? };
     let stop = AtomicBool::new(false);
     let open: Vec<Mutex<Parts>> = (0..raster.bands()).map(|_| Mutex::default()).collect();
+    // Looked at band by band: one that is begun gets all its tiles.
     let wanted = from_fn(|| if stop.load(Ordering::Relaxed) { None } else { todo.next() });
     let order = wanted.flat_map(|band| (0..tiles).map(move |tile| (band, tile))).par_bridge();
     order.try_for_each_init(Workspace::default, |work, (band, tile)| -> Result<(), Error> {

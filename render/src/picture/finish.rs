@@ -30,6 +30,7 @@ impl Raster {
         let journal = Mutex::new(journal);
         let keep = |bands: Vec<Band>| {
             bands.iter().try_for_each(|band| {
+                // Compressed before the lock is taken: threads wait for each other only to write.
                 let bytes = self.layout.compress(band.index, &band.channels)?.concat();
                 let mut journal = journal.lock().unwrap_or_else(PoisonError::into_inner);
                 journal.append(band.index, band.tally, &bytes).map_err(exr::error::Error::from)?;

@@ -69,6 +69,7 @@ impl<F: Read + Write + Seek> Journal<F> {
             let found = Found::Bands(bands - journal.missing().len());
             return Ok((journal, found));
         }
+        // Records of the other picture may stay behind the head: the salt keeps them out.
         journal.file.rewind()?;
         journal.file.write_all(&head)?;
         Ok((journal, if length == 0 { Found::Nothing } else { Found::Other }))
@@ -133,6 +134,7 @@ impl<F: Read + Write + Seek + ?Sized> Journal<F> {
         record.extend(bytes);
         let sum = self.checksum(&record[..FRONT], bytes);
         record.extend(sum.to_le_bytes());
+        // Over what a kill has left of a record, if anything.
         self.file.seek(SeekFrom::Start(self.end))?;
         self.file.write_all(&record)?;
         self.records[band] = Some(Record { offset, length, tally });

@@ -84,6 +84,7 @@ pub(super) fn uniform(
         work.observe_at(prepared, times)?;
         let Workspace { alpha, beta, scratch, layers, .. } = &mut *work;
         layers::add_central(prepared, grid, alpha, beta, scratch, layers)?;
+        // Rings are traced in the same memory, and would overwrite what was seen.
         let mut seen = std::mem::take(&mut work.seen);
         let mut layers = std::mem::take(&mut work.layers);
         let counted = match rings {

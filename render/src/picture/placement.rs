@@ -55,6 +55,7 @@ impl Placement {
 /// orthographic.
 fn projection([width, height]: [f64; 2], perspective: bool) -> [[f64; 4]; 4] {
     let ([near, far], [x, y]) = (DEPTHS, [2.0 / width, 2.0 / height]);
+    // Looking along −z, depths of −1 at the near and 1 at the far end, as in OpenGL.
     let depth = far - near;
     let (scale, shift, toward, one) = match perspective {
         true => (-(far + near) / depth, -2.0 * far * near / depth, -1.0, 0.0),

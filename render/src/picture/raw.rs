@@ -41,6 +41,7 @@ impl Raster {
     /// Where pixels are refined there is one time, the prepared scene's.
     pub(crate) fn raw(&self, times: &[f64], progress: &Progress<'_>) -> Result<Vec<Raw>, Error> {
         let all: Vec<usize> = (0..self.bands()).collect();
+        // Bands come in any order.
         let done = Mutex::new(vec![vec![None; all.len()]; times.len()]);
         let keep = |bands: Vec<Band>| {
             let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);

@@ -156,7 +156,9 @@ impl Summary {
         }
         let area = pixel_area(scene);
         let pixels = f64::from(scene.screen.width) * f64::from(scene.screen.rows());
+        // A ray that was given up may hide the brightest light in its share of a pixel.
         let dark = tally.unresolved as f64 * pixels / (tally.rays as f64).max(1.0) * tally.largest;
+        // The file has 32-bit floats.
         let relative = scene.tracer.tolerance + f64::from(f32::EPSILON);
         let error = tally.error + dark + relative * tally.intensity;
         let jansky = scene.screen.total_flux_jy.is_some() || scene.gas.is_some();

@@ -63,6 +63,7 @@ impl Gas {
     /// The same in the direction `n` (a unit vector) of gas that changes its radius, too, with dr/dt = `fall`.
     pub fn falling(frame: &ZamoFrame, n: [f64; 3], (omega, fall): ([f64; 3], f64)) -> Option<Self> {
         let [_, polar, around] = on_sphere(frame, n, omega);
+        // Along e_t and e_r nothing of the angular motion enters: it can be 0 here.
         let [time, radial, ..] = frame.contravariant([1.0, fall, 0.0, 0.0]);
         Self::with_velocity([radial / time, polar, around])
     }
@@ -72,6 +73,7 @@ impl Gas {
     pub fn measured(&self, vector: [f64; 4]) -> [f64; 3] {
         let Gas([gamma, x, y, z]) = *self;
         let along = x * vector[1] + y * vector[2] + z * vector[3];
+        // The boost to rest without rotation: b + u [u·b/(1 + γ) − b⁰].
         let lift = along / (1.0 + gamma) - vector[0];
         [vector[1] + lift * x, vector[2] + lift * y, vector[3] + lift * z]
     }

@@ -143,6 +143,7 @@ impl PolarizationLaw {
             _ => frame.to_coordinates(gas.0),
         };
         let of = |k: usize| (field[k] + time * by[k]) / by[0];
+        // With lowered components b is not normal to u: its part along u is left out.
         let measured = gas.measured(frame.contravariant([time, of(1), of(2), of(3)]));
         measured.iter().all(|component| component.is_finite()).then_some(measured)
     }

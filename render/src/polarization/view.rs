@@ -52,8 +52,10 @@ pub fn view(
     let inverse = if square > 0.0 { 1.0 / square } else { 0.0 };
     // 2χ = 2χ_h + π.
     let direction = [(east * east - north * north) * inverse, -2.0 * north * east * inverse];
+    // e_θ of k boosted to the gas, with γk⁰ − ω for u·k.
     let polar = k[2] - u[2] * (k[0] + energy) / (1.0 + u[0]);
     let inverse = if strength > 0.0 { 1.0 / strength } else { 0.0 };
+    // |h| is |B| sin θ_B but for rounding.
     let sin_pitch = (square.sqrt() * inverse).min(1.0);
     let fine = energy > 0.0 && square.is_finite() && energy.is_finite();
     fine.then(|| SynchrotronView {

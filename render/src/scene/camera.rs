@@ -176,6 +176,7 @@ fn monotone_cubic(knots: &[[f64; 2]], x: f64, otherwise: f64) -> [f64; 2] {
     if x > last[0] {
         return [last[1], 0.0];
     }
+    // The last knot belongs to the piece before it.
     let k = knots.partition_point(|knot| knot[0] <= x).clamp(1, knots.len() - 1) - 1;
     let [x0, y0] = knots[k];
     let width = knots[k + 1][0] - x0;

@@ -342,6 +342,7 @@ impl Scene {
     pub fn parse(text: &str) -> Result<Self, Error> {
         let scene: Scene = toml_file::read(text).map_err(SceneError::Syntax)?;
         let table = sources::with_own_names(toml_file::read(text).map_err(SceneError::Syntax)?);
+        // Ranges first: the later checks take each value to be in its own.
         let ranges = Self::keys().check(&table).map_err(Invalid::from);
         ranges.and_then(|()| check::check(&scene)).map_err(|invalid| invalid.locate(text))?;
         Ok(scene)

@@ -90,6 +90,7 @@ impl PreparedScene {
         let position = point.cartesian();
         let velocity = self.velocity(origin, &point);
         let along = rates(hole, &point, ray.lambda.value);
+        // Without slow light all matter is seen at the time of observation, whatever the delay.
         let slow = if self.optics.slow_light { 1.0 } else { 0.0 };
         let column =
             |by: [f64; 3], delay: f64| core::array::from_fn(|k| by[k] + slow * velocity[k] * delay);

@@ -124,9 +124,11 @@ impl ChordBound {
         if gap <= 0.0 {
             return f64::INFINITY;
         }
+        // cos²θ ≤ 1 in S².
         let speed = (1.0 + w2 * (2.0 * a2 + w * (self.cubic + w * self.quartic))).sqrt();
         let pull = 2.0 + self.drag * w;
         let f = self.spin * w2 * w * pull / gap;
+        // |d(Δ/r²)/dw| = 2 (1 − a²w) ≤ 2.
         let slope =
             self.spin * w2 * ((6.0 + 4.0 * self.drag * w) / gap + 2.0 * w * pull / (gap * gap));
         flat + speed * (2.0 * f + w * slope) + f * f / w.max(f64::MIN_POSITIVE)

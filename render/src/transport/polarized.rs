@@ -102,6 +102,7 @@ pub(super) fn share(stokes: &Stokes) -> [f64; 3] {
 /// Covariant momentum of the arriving photon at (r, cos θ), from dw/dτ and d cos θ/dτ of the
 /// backward ray.
 fn momentum(hole: &Kerr, [r, u]: [f64; 2], [w_rate, u_rate]: [f64; 2], lambda: f64) -> [f64; 4] {
+    // On the axis d cos θ/dτ is 0 as well: no NaN.
     let sin = ((1.0 - u) * (1.0 + u)).sqrt().max(1e-150);
     [-1.0, w_rate * r * r / hole.delta(r), u_rate / sin, lambda]
 }

@@ -158,6 +158,7 @@ impl PreparedScene {
         BlockRequest {
             crossings: self.disc.as_ref().map_or(0, Disc::crossings),
             all_crossings: self.disc.is_some(),
+            // dw/dτ tells whether light of plunging matter moves outward; its g depends on it.
             rates: self.optics.polarization.is_some() || self.has_plunging_disc(),
             exit: self.sky.is_some() || self.optics.wanted.exit || self.optics.wanted.footprint,
             beams: self.optics.lensing && self.sky.as_ref().is_some_and(Sky::is_averaged),

@@ -64,6 +64,7 @@ impl Quadrature {
             // ∫P_k = (P_{k+1} − P_{k−1})/(2k + 1).
             before += 0.5 * coefficient * (basis[k + 1] - basis[k - 1]);
         }
+        // The polynomial may overshoot, but no part is brighter than the whole.
         whole - before.clamp(0.0, whole)
     }
 
@@ -84,6 +85,7 @@ impl Quadrature {
         for i in 0..gains.len() {
             let terms = self.rule.cumulative(i).iter().zip(&rates);
             let part: f64 = terms.map(|(factor, rate)| factor * rate).sum();
+            // The interpolating polynomial may dip below 0.
             depths.push(*depth + part.max(0.0));
         }
         *depth += gains.iter().sum::<f64>();
@@ -129,6 +131,7 @@ pub(super) fn integrate(
         for (i, (gain, g)) in gains.iter().zip(redshift).enumerate() {
             light.intensity += gain;
             light.shift += g * gain;
+            // By light per length: a long panel is not brighter for its length.
             if *gain > most * weights[i] {
                 (most, brightest) = (gain / weights[i], Some(start + i));
             }

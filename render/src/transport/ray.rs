@@ -160,6 +160,7 @@ impl RayVisitor for Sum<'_> {
 
     fn needs_path(&self, ray: &Ray) -> PathUse {
         let PreparedScene { meshes, media, spots, optics, .. } = self.scene;
+        // A ray that is traced step by step has its path for spots as well.
         let meets_mesh = meshes.as_ref().is_some_and(|meshes| meshes.need_path(optics, ray));
         if meets_mesh || media.need_path(ray) {
             return PathUse::Instead;
@@ -204,10 +205,12 @@ impl RayVisitor for Sum<'_> {
         crossings: &[PlaneCrossing],
         path: Option<PathOfRay<'_>>,
     ) -> Result<(), Error> {
+        // A path beside the closed form serves spots alone: media of cells have their rays stepped.
         if let (Some(path), true) = (path, ray.stepped) {
             self.add_cells(number, ray, path);
         }
         self.meter.switch(Part::Surfaces);
+        // Discs and meshes look the same at all times.
         let mut still = self.accumulator(number, ray, crossings);
         self.add_surfaces(number, ray, crossings, path, &mut still);
         self.meter.switch(Part::Sky);
@@ -331,6 +334,7 @@ impl<'a> Sum<'a> {
     /// Light of the sky.
     #[inline(always)]
     fn sky(&mut self, ray: &TracedRay) -> [f32; 3] {
+        // Taken away, so that no later ray uses it.
         let beam = self.sources.beam.take();
         self.scene.sky.as_ref().map_or([0.0; 3], |sky| sky.light(ray, beam.as_ref()))
     }

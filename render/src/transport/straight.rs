@@ -57,6 +57,7 @@ impl Line {
     fn place(&self, s: f64) -> (f64, Place) {
         let [x, y, z] = self.at(s);
         let radius = x.hypot(y).hypot(z);
+        // From infinity the delay is lim (t_o − t) − r_o, that is −s.
         let start = if self.ends[0].is_finite() { self.ends[0] } else { 0.0 };
         let place = Place { radius, azimuth: y.atan2(x) + self.azimuth, delay: start - s };
         (z / radius, place)
@@ -65,6 +66,7 @@ impl Line {
     /// The crossing of the equatorial plane.
     fn crossing(&self) -> Option<PlaneCrossing> {
         let s = -self.origin[2] / self.direction[2];
+        // Edge-on s is infinite, or NaN within the plane: no crossing.
         let inside = s.is_finite() && s < self.ends[0] && s > self.ends[1];
         let (_, Place { radius, azimuth, delay }) = self.place(s);
         let mino_time = self.parameter(s);
@@ -166,6 +168,7 @@ impl Sum<'_> {
             let crossing = line.crossing();
             let opaque = crossing.as_ref().filter(|crossing| self.is_opaque_at(crossing));
             let ray = line.traced(&ray, usize::from(crossing.is_some()), opaque);
+            // Crossings of every straight ray are numbered from 0.
             self.sources.media.forget_crossings();
             self.add_media_along(&line, k, &ray, crossing.as_slice(), &mut columns);
             self.take(k, &ray, crossing.as_slice(), None)?;

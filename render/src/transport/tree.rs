@@ -42,6 +42,7 @@ impl Tree {
     /// The hierarchy of `boxes`, all of them within the radii `shell` about the origin.
     pub fn new(boxes: &[Bounds], shell: [f64; 2]) -> Self {
         let outward = |[low, high]: &Bounds| {
+            // Outward, so that no box loses anything to 32 bits.
             let low = low.map(|x| (x as f32).next_down());
             let high = high.map(|x| (x as f32).next_up());
             Aabb::new(Vec3A::from(low), Vec3A::from(high))
@@ -139,6 +140,7 @@ pub fn enters(ray: &Ray, radius: f64) -> bool {
     // W falls from 1 to its least value at the barrier: if that is below 0, the ray turns
     // where W vanishes.
     let barrier = ray.potential.barrier.filter(|barrier| barrier.height < 0.0);
+    // W is known to rounding: in doubt the ray enters.
     barrier.is_none_or(|barrier| barrier.w >= outermost && ray.potential.value(outermost) > -1e-9)
 }
 
@@ -304,6 +306,7 @@ impl Walk<'_> {
             }
             count <= most
         };
+        // A chord that the ray may leave by as much as its radius says nothing of where it is.
         if epsilon < reach {
             self.tree.near(ends.map(|node| node.position), epsilon, found);
         } else {

@@ -85,6 +85,7 @@ impl Ensemble {
     /// If a ratio is not finite.
     pub fn signal_to_noise(&self) -> Result<Volume, Error> {
         let ratio = |(mean, deviation): (&f32, &f32)| {
+            // Where all volumes agree the ratio would be infinite: it ends at 1e6.
             if *mean == 0.0 { 0.0 } else { mean / deviation.max(1e-6 * mean.abs()) }
         };
         let values = self.mean.values().iter().zip(self.deviation.values()).map(ratio).collect();
@@ -181,6 +182,7 @@ fn feature(volumes: &[Volume], nodes: &[usize], peak: f64) -> Feature {
         let squares: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
         [mean, (squares / (values.len() as f64 - 1.0)).sqrt()]
     };
+    // Angles from that of the mean centroid: their mean is not torn apart at ±π.
     let turned = |p: &[f64; 4]| (p[1].atan2(p[0]) - ahead + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
     let [turn, spread] = of(&turned);
     Feature {

@@ -187,6 +187,7 @@ impl Volume {
             if !(0.0..=last).contains(&place) {
                 return 0.0;
             }
+            // The last node belongs to the cell before it.
             let first = place.floor().min(last - 1.0);
             (cell[axis], part[axis]) = (first as usize, place - first);
         }

@@ -59,6 +59,7 @@ fn header(fields: &[Field], first: &Field) -> String {
     let [x, y, z] = volume.low();
     let [dx, dy, dz]: [f64; 3] =
         core::array::from_fn(|k| (volume.high()[k] - volume.low()[k]) / last[k] as f64);
+    // Each field is preceded by its length in 64 bits.
     let block = 8 + 4 * volume.values().len();
     let array = |(k, field): (usize, &Field)| {
         let (name, offset) = (field.name, k * block);

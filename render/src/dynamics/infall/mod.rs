@@ -196,6 +196,7 @@ impl Family {
             let [fall, turn] = flow.rates(r);
             [r, fall, turn]
         };
+        // Rates are smooth in the root of the depth below the orbit, not in the depth.
         let below = move |part: Along| -> Point<Along> {
             let [fall, turn] = flow.rates_below(part * half.sqrt());
             [isco - half * part * part, fall, turn]
@@ -213,6 +214,7 @@ impl Family {
         }
         let below = Way { marks: self.below(), at: Box::new(below), rough: !self.is_eternal() };
         let inside = Way { marks: falling(geometric(1e-7, 1.0)), at: Box::new(near), rough: false };
+        // Times count from half-way to the horizon: a plunge from the orbit may take for ever.
         Ok(match self.is_still() {
             true => Trajectory::new(&[below, inside], 1),
             false => Trajectory::new(&[outside, below, inside], 2),

@@ -102,6 +102,7 @@ impl Profile {
         if falls {
             ways.reverse();
         }
+        // Times count from the middle: next to it they are short, and so exact.
         Trajectory::new(&ways, ways.len() / 2)
     }
 }

@@ -156,6 +156,7 @@ impl Way<'_> {
         rule.iter().fold([0.0; 2], |[time, azimuth], (place, weight)| {
             let mark = from + (to - from) * place;
             let [radius, fall, turn] = (self.at)(Along::parameter(mark, 0));
+            // dt = dr/v.
             let step = radius.slope[0] * (weight * (to - from)) / fall.value;
             [time + step, azimuth + turn.value * step]
         })
@@ -163,6 +164,7 @@ impl Way<'_> {
 
     fn knot(&self, mark: f64) -> Knot {
         let [radius, fall, turn] = (self.at)(Along::parameter(mark, 0));
+        // d/dt = v/(dr/dmark) d/dmark.
         let per_mark = fall.value / radius.slope[0];
         Knot {
             radius: radius.value,

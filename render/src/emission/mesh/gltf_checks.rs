@@ -93,6 +93,7 @@ fn beyond(what: &str, k: usize) -> Result<(), MeshError> {
 /// Returns whether so many items of this size lie in a view.
 fn holds(view: &gltf::buffer::View<'_>, offset: usize, count: usize, size: usize) -> bool {
     let step = view.stride().unwrap_or(size);
+    // The last item takes its own size, not a whole stride.
     let reach = count.saturating_sub(1).checked_mul(step);
     let end = reach.and_then(|reach| reach.checked_add(offset)?.checked_add(size));
     step >= size && end.is_some_and(|end| end <= view.length())

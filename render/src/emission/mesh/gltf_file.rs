@@ -39,6 +39,7 @@ pub(super) fn decode(bytes: &[u8], resources: &Resources<'_>) -> Result<MeshFile
         return Err(MeshError::Content("it holds no scene".to_owned()));
     };
     let mut nodes: Vec<_> = scene.nodes().map(|node| (node, IDENTITY)).collect();
+    // Nodes are taken from the end: reversed, triangles keep the order of the file.
     nodes.reverse();
     while let Some((node, parent)) = nodes.pop() {
         let own = node.transform().matrix().map(|column| column.map(f64::from));

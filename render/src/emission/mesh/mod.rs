@@ -86,6 +86,7 @@ impl Triangle {
     fn texture_at(&self, x: [f64; 3]) -> [f32; 2] {
         let area = |k: usize| {
             let (p, q) = (self.corners[(k + 1) % 3], self.corners[(k + 2) % 3]);
+            // A point on a seam may lie outside by rounding.
             dot(self.normal, cross(difference(p, x), difference(q, x))).max(0.0)
         };
         let areas = [area(0), area(1), area(2)];

@@ -115,6 +115,7 @@ fn once<T>(line: &Line<'_>, place: &mut Option<T>, said: T) -> Result<(), MeshEr
 /// Returns whether a statement that is not read would show something of the surface that is not there, or hide
 /// something.
 fn changes_light(keyword: &str, line: &Line<'_>) -> bool {
+    // The last word, since `d -halo` has its number there.
     let number = || line.words().last().and_then(|word| word.parse::<f64>().ok());
     match keyword {
         "d" => number() != Some(1.0),
@@ -130,6 +131,7 @@ fn color(line: &Line<'_>) -> Result<[f32; 3], MeshError> {
         return Err(line
             .fails(format!("{} {kind} is not read: three numbers are expected", line.keyword())));
     }
+    // NaN stands for numbers that are not given.
     let color = line.numbers_up_to(line.keyword(), 1..=3, [f64::NAN; 3])?;
     if color[1].is_nan() != color[2].is_nan() {
         return Err(line.fails(format!("{}: one number or three are expected", line.keyword())));

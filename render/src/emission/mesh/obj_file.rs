@@ -143,6 +143,7 @@ impl Reader {
             let index: Option<i64> = part.parse().ok();
             let found = index.and_then(|k| match k {
                 1.. => usize::try_from(k - 1).ok(),
+                // 0 comes out as `count`, which is refused below.
                 _ => count.checked_sub(usize::try_from(k.unsigned_abs()).ok()?),
             });
             found.filter(|k| *k < count).ok_or_else(|| {

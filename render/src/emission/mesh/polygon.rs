@@ -49,6 +49,7 @@ pub(super) fn cut(corners: &[[f64; 3]]) -> Result<Cut, Uncut> {
     if corners.len() == 3 {
         return Ok(Cut { triangles: vec![[0, 1, 2]], flat: true });
     }
+    // From the first corner: far from the origin areas would lose their digits.
     let edges: Vec<[f64; 3]> = corners.iter().map(|x| difference(*x, corners[0])).collect();
     let size2 = edges.iter().map(|x| dot(*x, *x)).fold(0.0, f64::max);
     let normal = (1..edges.len() - 1).map(|k| cross(edges[k], edges[k + 1]));
@@ -64,6 +65,7 @@ pub(super) fn cut(corners: &[[f64; 3]]) -> Result<Cut, Uncut> {
             dot(area, area).sqrt() <= NO_AREA * size2
         };
         let nothing = (1..edges.len() - 1).all(on_a_line);
+        // Without an area either all corners lie on one line, or parts of both signs cancel.
         return if nothing {
             Ok(Cut { triangles: vec![], flat: true })
         } else {
@@ -99,6 +101,7 @@ fn plane(points: &[Point]) -> Result<Vec<[usize; 3]>, Uncut> {
     let parts = || (1..points.len() - 1).map(|k| (k, area(points[0], points[k], points[k + 1])));
     let nothing = NO_AREA * parts().map(|(_, part)| part).sum::<f64>();
     if parts().all(|(_, part)| part >= -nothing) {
+        // Parts of one sign that sweep a whole turn wind around the first corner.
         let angle = |k: usize, part: f64| {
             let [p, q] = [k, k + 1].map(|k| [0, 1].map(|c: usize| points[k][c] - points[0][c]));
             part.max(0.0).atan2(p[0] * q[0] + p[1] * q[1])
@@ -150,10 +153,12 @@ fn is_ear(ear: [usize; 3], rest: &[usize], points: &[Point], nothing: f64) -> bo
     let [a, b, c] = ear.map(|k| points[k]);
     let own = area(a, b, c);
     if own <= nothing {
+        // A corner of a straight side may go at once; one that turns inward may not.
         return own >= -nothing;
     }
     let inside = |k: &usize| {
         let p = points[*k];
+        // By place, since an outline may pass through a corner twice.
         let corner = p == a || p == b || p == c;
         !corner && area(a, b, p) >= 0.0 && area(b, c, p) >= 0.0 && area(c, a, p) >= 0.0
     };

@@ -76,6 +76,7 @@ impl Beam {
 
     /// The weight of a direction over that of the middle; 0 out of reach.
     pub fn weight(&self, direction: [f64; 3]) -> f64 {
+        // The tangent plane does not tell the far hemisphere from the near one.
         if dot(direction, self.direction) <= 0.0 {
             return 0.0;
         }
@@ -90,6 +91,7 @@ impl Beam {
         let s = x.hypot(y);
         let right = if s > 0.0 { [y / s, -x / s, 0.0] } else { [0.0, -1.0, 0.0] };
         let across: [f64; 2] = core::array::from_fn(|k| dot(self.axes[k], right) * self.spread[k]);
+        // Axes are unit vectors tangent to the sky: what is not across is along.
         let along: [f64; 2] = core::array::from_fn(|k| {
             (1.0 - dot(self.axes[k], right).powi(2)).max(0.0).sqrt() * self.spread[k]
         });

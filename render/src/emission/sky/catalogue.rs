@@ -114,6 +114,7 @@ impl Line<'_> {
         let lat = self.needed(1, [-90.0, 90.0], "an angle in [-90, 90]")?.to_radians();
         let magnitude = self.number(2, [-30.0, 40.0], "a magnitude in [-30, 40]")?;
         let Some(magnitude) = magnitude else { return Ok(Err(Odd::Magnitude)) };
+        // Any finite number is read: one out of range leaves out its star, not the file.
         let index = self.number(3, [f64::MIN, f64::MAX], "a colour index B - V")?;
         if index.is_some_and(|index| !COLOR_INDEX.contains(&index)) {
             return Ok(Err(Odd::ColorIndex));

@@ -25,6 +25,7 @@ impl Cells {
     /// The number of the cell that holds a direction.
     pub fn holding(&self, [x, y, z]: [f64; 3]) -> usize {
         let azimuth = y.atan2(x).rem_euclid(TAU) / TAU;
+        // The remainder of a tiny negative angle may be rounded to a whole turn.
         let sector = ((azimuth * self.sectors as f64) as i64).min(self.sectors - 1);
         (self.ring(z) * self.sectors + sector) as usize
     }
@@ -46,6 +47,7 @@ impl Cells {
         let azimuth = y.atan2(x).rem_euclid(TAU) / TAU;
         // So much azimuth is spanned; all of it next to a pole.
         let sin = least.sin().min(most.sin());
+        // A cap spans asin(sin(across)/sin θ) of azimuth, and asin x ≤ 1.6 x, the factor below.
         let reach = if sin > across.sin() { across.sin() / sin } else { 4.0 };
         let width = self.sectors as f64;
         let from = ((azimuth - reach / TAU * 1.6) * width).floor() as i64;

@@ -175,6 +175,7 @@ impl Panorama {
         let levels = (1.5 * PI / self.height as f64 / wide).log2();
         let level = (-levels).floor().clamp(0.0, self.coarser.len() as f64) as usize;
         let level = level.checked_sub(1).map_or(self, |k| &self.coarser[k]);
+        // At least half a pixel wide, or it might fall between pixels.
         level.average(&beam.at_least(wide).widened(0.5 * PI / level.height as f64))
     }
 
@@ -194,6 +195,7 @@ impl Panorama {
             let half = if sin > 1.2 * across { (across / sin).asin() * 1.2 } else { PI };
             self.average_row(beam, row, [azimuth - half, azimuth + half], &mut sum, &mut total);
         }
+        // The beam may miss the centres of all pixels.
         if total > 0.0 { sum.map(|c| (c / total) as f32) } else { self.color(beam.direction()) }
     }
 
@@ -216,6 +218,7 @@ impl Panorama {
         let first = column(to).floor() as i64;
         let count = ((column(from).ceil() as i64) - first + 1).min(self.width as i64);
         let start = TAU * (0.5 - (first as f64 + 0.5) / width);
+        // Columns are a rotation apart, which costs less than a sine and a cosine each.
         let (turn_sin, turn_cos) = (-TAU / width).sin_cos();
         let (mut y, mut x) = start.sin_cos();
         for k in first..first + count {

@@ -110,8 +110,10 @@ struct Star {
 impl Star {
     /// Adds its light, `part` of its peak brightness.
     fn shine(&self, part: f64, color: &mut [f32; 3]) {
+        // Of a copy, so that every ray draws the same numbers.
         let mut random = Hash(self.random.0);
         // Counts of stars fall with brightness as for a uniform Euclidean population.
+        // 1e-3 keeps the brightest at a hundred times the faintest.
         let luminosity = self.brightness * 0.05 * (random.unit() + 1e-3).powf(-2.0 / 3.0);
         let warmth = random.unit();
         let tint = [0.7 + 0.3 * warmth, 0.85, 1.0 - 0.45 * warmth];

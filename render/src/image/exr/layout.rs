@@ -272,6 +272,7 @@ impl Layout {
         )?;
         let mut channels = vec![Vec::with_capacity(rows.len() * width); order.len()];
         let (values, _) = bytes.as_chunks::<4>();
+        // A row of pixels lies there channel after channel.
         for (k, line) in values.chunks_exact(width).enumerate() {
             let channel = &mut channels[order[k % order.len()]];
             channel.extend(line.iter().map(|bytes| f32::from_ne_bytes(*bytes)));
@@ -289,6 +290,7 @@ impl Layout {
         attributes: &Attributes,
         bands: impl FnOnce(&mut dyn FnMut(usize, Vec<Vec<u8>>) -> Result<()>) -> Result<()>,
     ) -> Result<()> {
+        // `write_file` takes a `dyn FnMut`, which cannot consume `bands`, and calls it once.
         let mut bands = Some(bands);
         let mut once = |write: &mut WriteBand<'_>| bands.take().map_or(Ok(()), |give| give(write));
         self.write_file(&mut out, attributes, &mut once)

@@ -101,6 +101,7 @@ impl Cut {
     pub(super) fn contrast_with(&self, side: [i32; 2], neighbor: &Light) -> f64 {
         let mut contrast = 0.0f64;
         for cell in self.cells.iter().filter(|cell| cell.is_at_border()) {
+            // Outermost rays lie a quarter of their cell inside of the border.
             let reach = 0.5 - 0.25 * 0.5f64.powi(cell.level as i32) - 1e-9;
             let outermost = |place: &[f64; 2]| {
                 place.iter().zip(side).all(|(x, d)| d == 0 || x * f64::from(d) >= reach)

@@ -64,6 +64,7 @@ impl Adaptive<'_> {
         for ((cut, middle), seen) in cuts.iter_mut().zip(&middles).zip(seen.chunks_exact(4)) {
             cut.add([0.0; 2], 0, middle, seen);
         }
+        // One level of all pixels at a time, so that their rays fill blocks.
         while !cuts.is_empty() {
             let mut going = Vec::with_capacity(cuts.len());
             for mut cut in cuts {
@@ -174,6 +175,7 @@ impl Adaptive<'_> {
                 let center = seen[place(column, row)];
                 let neighbor = |dx: isize, dy: isize| {
                     let to = |k: usize, d: isize, range: &Range<usize>| {
+                        // At the edge of the picture a pixel is its own neighbour.
                         k.saturating_add_signed(d).clamp(range.start, range.end - 1)
                     };
                     &light[place(to(column, dx, &wide), to(row, dy, &high))]

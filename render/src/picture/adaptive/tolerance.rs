@@ -54,6 +54,7 @@ fn allowed(mut errors: Vec<(f64, f64)>, sum: f64) -> f64 {
     errors.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut left = sum;
     let mut weights: f64 = errors.iter().map(|(_, weight)| weight).sum();
+    // Errors below the common share leave the rest of theirs to the larger ones.
     for (error, weight) in errors {
         let share = left / weights;
         if error > share {

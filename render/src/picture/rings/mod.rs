@@ -161,6 +161,7 @@ impl RingStrata {
         }
         let turn = (y.atan2(x) / TAU).rem_euclid(1.0) * f64::from(POINTS);
         let near = self.curve.get(turn as usize % self.curve.len()).copied().unwrap_or(0.0);
+        // Beyond size/width from the curve an image is wider than the square.
         (x.hypot(y) - near).abs() > 2.0 * size * (1.0 + 1.0 / self.width()) + SLACK
     }
 
@@ -180,6 +181,7 @@ impl RingStrata {
         if !plane.is_finite() || self.only_on_curve && !plane.is_near(corners) {
             return take(&part, None);
         }
+        // Strata that are twice as wide bear parts that are twice as large.
         let deepest = DEEPEST.saturating_sub(self.coarseness.log2() as u32);
         if level < deepest && plane.is_bent(self.coarseness) && plane.is_near(corners) {
             return part.quarters().into_iter().for_each(|quarter| self.cut(quarter, take));

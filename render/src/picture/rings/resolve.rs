@@ -65,6 +65,7 @@ impl Resolver {
     /// The same with strata as much wider as it takes for their rays to be no more than those of a grid.
     fn within(self, grid: &Grid) -> Self {
         let most = (grid.width * grid.height * grid.side * grid.side) as u64;
+        // A sample of rows first: only near the limit are all of them counted.
         let few = self.rays(grid, grid.height.div_ceil(SAMPLED));
         if few as f64 * SURE < most as f64 || self.rays(grid, 1) <= most {
             return self;
@@ -184,6 +185,7 @@ impl Resolver {
         jobs: &mut Vec<Job>,
         work: &mut Workspace,
     ) -> Result<(), Error> {
+        // Bit 0 alone: the first crossing, of matter that does not plunge.
         let hidden = |seen: &RayResult| seen.outcome == Outcome::Surface && seen.disc_images == 1;
         let asked = |job: &&Job| seen.get(job.square).is_some_and(hidden);
         work.clear();

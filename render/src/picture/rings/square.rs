@@ -21,6 +21,7 @@ impl Plane {
         let slope = [0.5 * ((b - a) + (d - c)), 0.5 * ((c - a) + (d - b))];
         let mean = 0.25 * (a + b + c + d);
         let bend = (mean - middle).abs().max(0.25 * (a - b - c + d).abs());
+        // `max` drops a NaN: the last term brings it back for `is_finite`.
         Plane { middle, slope, bend: bend + 0.0 * mean }
     }
 
@@ -65,6 +66,7 @@ impl Plane {
             let share = up_to - below;
             if share < LEAST {
                 match strata.last_mut() {
+                    // The last one has no next.
                     Some(before) if last => before.1 += share,
                     _ => {}
                 }

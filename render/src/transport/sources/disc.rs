@@ -140,6 +140,7 @@ impl Disc {
         let r = crossing.radius;
         let g = match optics.spectral_index {
             Some(_) => {
+                // The backward ray falls where light moves outward.
                 let outward = crossing.rates[0] > 0.0;
                 self.model.redshift(r, &Photon { lambda, eta, outward })
             }
@@ -147,6 +148,7 @@ impl Disc {
         };
         let stokes = seen.polarized.map(|polarized| polarized.of_disc(&self.model, crossing));
         let boost = match stokes {
+            // g^{3+α} is in it, with the field and the slant.
             Some(stokes) => stokes.i,
             None => optics.spectral_index.map_or(1.0, |index| g.powf(3.0 + index)),
         };

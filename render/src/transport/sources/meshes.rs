@@ -158,6 +158,7 @@ impl Cut<'_> {
     fn piece(&self, [start, end]: [&Node; 2], depth: u32, hits: &mut Vec<Hit>) {
         let sagitta = self.bound.sagitta([&start.point, &end.point]);
         let (from, to) = (self.triangle.height(start.position), self.triangle.height(end.position));
+        // 0 counts as above: a root at the end of a piece is found once, not twice.
         let changes = (from >= 0.0) != (to >= 0.0);
         if !changes && from.abs().min(to.abs()) > sagitta {
             return;
@@ -203,6 +204,7 @@ impl Cut<'_> {
         let mut node = Node::at(self.path, a);
         for _ in 0..100 {
             let time = if to == from { 0.5 * (a + b) } else { (a * to - b * from) / (to - from) };
+            // The last two points need not be in order, and rounding may lead out of them.
             let inside = time > a.min(b) && time < a.max(b);
             node = Node::at(self.path, if inside { time } else { 0.5 * (a + b) });
             let height = self.triangle.height(node.position);

@@ -96,6 +96,7 @@ impl<'a> Marcher<'a> {
         let [a, b, towards] = self.frame;
         let origin: [f64; 3] = core::array::from_fn(|k| right * a[k] + up * b[k]);
         let Some([far, near]) = self.inside(origin, towards) else { return 0.0 };
+        // The ball ends a ray on its near side.
         let ball = self.hole_radius.powi(2) - right * right - up * up;
         let far = if ball > 0.0 { far.max(ball.sqrt()) } else { far };
         if near <= far {

@@ -180,6 +180,7 @@ impl Cells<'_> {
         nodes.clear();
         emission.clear();
         for (number, panel) in panels.iter_mut().enumerate() {
+            // From here on it is known under its new number.
             if let Some(old) = panel.known.replace(number) {
                 let range = old * order..(old + 1) * order;
                 nodes.extend(&before.0, range.clone());

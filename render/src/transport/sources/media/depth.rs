@@ -36,6 +36,7 @@ impl DepthProfile {
         self.depths.extend_from_slice(depths);
         self.rates.clear();
         let places = nodes.radius.iter().zip(nodes.cos_theta).zip(&emission.absorption);
+        // dD/dτ = κ Σ.
         let rate = |((r, u), k): ((&f64, &f64), &f64)| k * (r * r + (spin * u).powi(2));
         self.rates.extend(places.take(count).map(rate));
     }

@@ -294,6 +294,7 @@ impl Media {
         }
         scratch.profile.clear();
         if medium.absorbs() {
+            // What absorbs does not change: all times have the depths of the first.
             let total = scratch.lights_of(m, seen.number)[first..].first().map_or(0.0, |l| l.depth);
             let depths = &scratch.sums.depths;
             scratch.profile.set(optics.hole.spin(), nodes, &emission, depths, total);

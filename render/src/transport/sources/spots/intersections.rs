@@ -60,6 +60,7 @@ impl Meeting<'_> {
     fn times(&self, ends: [&Node; 2]) -> [f64; 2] {
         let [early, late] =
             [ends[1], ends[0]].map(|node| self.seen.optics.emission_time(self.time, &node.point));
+        // Delays are taken to be as uncertain as positions.
         let error = self.bound.error(self.bound.reach(ends.map(|node| &node.point)));
         [early - error, late + error]
     }
@@ -79,6 +80,7 @@ impl Meeting<'_> {
             let part = &tree.parts[leaf as usize];
             let spot = &self.spots.models[part.spot as usize];
             let when = if slow { self.times(ends) } else { [self.time; 2] };
+            // Without slow light the tree is of this very time.
             (!slow || spot.shines_from(part, when))
                 && spot.comes_near(ends.map(|node| node.position), epsilon, when)
         };

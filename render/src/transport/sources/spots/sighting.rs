@@ -110,16 +110,20 @@ impl Sighting<'_> {
     fn may_meet_between(&self, before: &mut Seen, now: &mut Seen, last: bool) -> bool {
         let [low, high] = self.spot.shell();
         let starts = before.node == 0 && before.at.radius < high;
+        // A falling ray that is inside of the shell does not come back.
         let ends = last && now.at.radius < high && !(self.falls && now.at.radius <= low);
         let may = |apart: [f64; 2], length: f64| {
             let (gap, reach) = (END_GAP * length, self.spot.reach());
+            // By the triangle inequality the way between comes as near as (d₁ + d₂ − length)/2.
             apart[0] + apart[1] <= 2.0 * reach + length
                 || starts && apart[0] - gap <= reach
                 || ends && apart[1] - gap <= reach
         };
         let sheared = self.spot.sheared_length([before.at, now.at]);
+        // A node stands for half of the way to either neighbour, about.
         let weights = self.nodes.weight[before.node] + self.nodes.weight[now.node];
         let longest = 0.5 * weights * self.spot.stretch();
+        // Bounds first: few nodes come so near that their positions are worth a sine.
         if !may([before.least, now.least], SLACK * (longest + sheared)) {
             return false;
         }

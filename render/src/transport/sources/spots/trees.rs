@@ -45,6 +45,7 @@ impl SpotSpans {
         let own = |spot: &SpotModel| CUT_OFF * spot.sigma() / spot.speed();
         let mut own: Vec<f64> = spots.iter().map(own).collect();
         own.sort_by(f64::total_cmp);
+        // With two parts a spot in each, the spans of the usual delays have MOST_SPAN_PARTS.
         let least = USUAL_DELAYS * 2.0 * spots.len() as f64 / MOST_SPAN_PARTS;
         let length =
             (OWN_SIZES * own[own.len() / 2]).clamp(least.max(0.25), LONGEST_SPAN.max(least));
@@ -65,6 +66,7 @@ impl SpotSpans {
         }
         drop(trees);
         let mut trees = self.trees.write().unwrap_or_else(PoisonError::into_inner);
+        // Another thread may have made it between the two locks.
         if trees.len() >= MOST_SPANS && !trees.contains_key(&number) {
             // Time goes on.
             trees.pop_first();
