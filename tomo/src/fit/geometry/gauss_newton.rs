@@ -11,6 +11,7 @@ use crate::Error;
 use crate::fit::linear::{Profile, Voxels};
 use crate::fit::{Batch, Field, ForwardModel};
 use crate::representation::Workspace;
+use core::f64::consts::PI;
 use kerrlight_common::simd::Float;
 use nalgebra::{DMatrix, DVector};
 
@@ -140,8 +141,8 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
             let ([low, high], here) = (free.bounds(), from.get(free.parameter));
             let step = step * free.parameter.scale();
             let bound = if step > 0.0 { high } else { low };
-            let goes_on = free.is_circle()
-                || free.parameter == Parameter::Inclination && crosses_pole(self.free, bound);
+            let is_pole = free.parameter == Parameter::Inclination && [0.0, PI].contains(&bound);
+            let goes_on = free.is_circle() || is_pole && crosses_pole(self.free, bound);
             if goes_on || step == 0.0 { 1.0 } else { ((bound - here) / step).max(0.0) }
         };
         self.free.iter().zip(step).map(part).fold(1.0, f64::min)

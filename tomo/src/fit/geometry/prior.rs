@@ -1,6 +1,8 @@
 //! Priors of parameters of the geometry.
 
 use crate::Error;
+use core::f64::consts::{PI, SQRT_2};
+use statrs::function::erf::erfc_inv;
 
 /// A probability density.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,22 +53,17 @@ impl Prior {
         }
     }
 
-    /// Slope and second derivative of its penalty by differences of half width `width` inside its bounds.
+    /// Slope and second derivative of its penalty. Next to a pole, where they grow without bound, they are those `width` away
+    /// from it.
     pub(super) fn curve(&self, x: f64, width: f64) -> [f64; 2] {
-        let [low, high] = self.bounds();
-        // Wider differences would let the bounds of the clamp below cross, which panics.
-        let width = width.min(0.25 * (high - low));
-        if width <= 1e-9 * (1.0 + x.abs()) {
-            return [0.0; 2]; // as good as fixed
+        match *self {
+            Prior::Uniform { .. } => [0.0; 2],
+            Prior::Normal { mean, sigma } => [(x - mean) / (sigma * sigma), sigma.powi(-2)],
+            Prior::Isotropic { low, high } => {
+                let x = x.clamp(low, high).clamp(width, PI - width);
+                [-1.0 / x.tan(), x.sin().powi(-2)]
+            }
         }
-        // One width from a bound at least: beyond it the penalty is infinite.
-        let x = x.clamp(low + width, high - width);
-        // Rounding must not lead across a bound.
-        let [before, here, after] =
-            [x - width, x, x + width].map(|x| self.penalty(x.clamp(low, high)));
-        let slope = (after - before) / (2.0 * width);
-        // Densities are log-concave: a second derivative below 0 is rounding.
-        [slope, ((after - 2.0 * here + before) / (width * width)).max(0.0)]
     }
 
     /// Its standard deviation.
@@ -91,7 +88,11 @@ impl Prior {
     pub fn quantile(&self, share: f64) -> f64 {
         match *self {
             Prior::Uniform { low, high } => low + (high - low) * share,
-            Prior::Normal { mean, sigma } => mean + sigma * normal(share),
+            Prior::Normal { mean, sigma } => {
+                // Within six standard deviations: a share of 0 or 1 has no quantile.
+                let share = share.clamp(1e-9, 1.0 - 1e-9);
+                mean - sigma * SQRT_2 * erfc_inv(2.0 * share)
+            }
             Prior::Isotropic { low, high } => {
                 // Directions in space are uniform in cos i.
                 (low.cos() + (high.cos() - low.cos()) * share).clamp(-1.0, 1.0).acos()
@@ -124,37 +125,9 @@ impl Prior {
     }
 }
 
-/// The quantile of the standard normal distribution.
-fn normal(share: f64) -> f64 {
-    let share = share.clamp(1e-6, 1.0 - 1e-6);
-    // A logistic curve within 0.02 of it, and Newton's steps from there.
-    let start = (share / (1.0 - share)).ln() / 1.702;
-    (0..6).fold(start, |x, _| {
-        let below = 0.5 * libm::erfc(-x * core::f64::consts::FRAC_1_SQRT_2);
-        let density = (-0.5 * x * x).exp() / core::f64::consts::TAU.sqrt();
-        x - (below - share) / density
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// ln sin θ has the slope cot θ and the second derivative −1/sin²θ, however narrow the bounds are.
-    #[test]
-    fn exact_curves_of_narrow_priors() {
-        for range in [1.0, 0.03, 1e-3] {
-            let prior = Prior::Isotropic { low: 0.5, high: 0.5 + range };
-            let x = 0.5 + 0.5 * range;
-            let [slope, second] = prior.curve(x, 0.02);
-            assert!((slope * x.tan() + 1.0).abs() < 1e-3, "{range}: {slope}");
-            assert!((second * x.sin().powi(2) - 1.0).abs() < 1e-2, "{range}: {second}");
-            assert_eq!(Prior::Uniform { low: 0.5, high: 0.5 + range }.curve(x, 0.03), [0.0; 2]);
-        }
-        assert_eq!(Prior::Uniform { low: 0.5, high: 0.5 }.curve(0.5, 0.03), [0.0; 2]);
-        let normal = Prior::Normal { mean: 0.0, sigma: 2.0 }.curve(1.0, 0.02);
-        assert!((normal[0] - 0.25).abs() < 1e-9 && (normal[1] - 0.25).abs() < 1e-9, "{normal:?}");
-    }
 
     /// Shares of the probability by a sum over the density.
     #[test]
@@ -173,7 +146,7 @@ mod tests {
             };
             let deviation = (moment(2) - moment(1).powi(2)).sqrt();
             assert!((prior.deviation() / deviation - 1.0).abs() < 1e-3, "{prior:?}: {deviation}");
-            for share in [0.025, 0.1, 0.5, 0.8, 0.975] {
+            for share in [1e-3, 0.025, 0.1, 0.5, 0.8, 0.975, 0.999] {
                 let found = below(prior.quantile(share)) / below(15.0);
                 assert!((found - share).abs() < tolerance, "{prior:?}: {share} {found}");
             }
@@ -182,28 +155,47 @@ mod tests {
 
     #[test]
     fn exact_quantiles_of_a_direction_share_the_sphere() {
-        let whole = Prior::Isotropic { low: 0.0, high: core::f64::consts::PI };
+        let whole = Prior::Isotropic { low: 0.0, high: PI };
         assert!((whole.quantile(0.25) - 0.5f64.acos()).abs() < 1e-12);
         assert_eq!(Prior::Uniform { low: -1.0, high: 3.0 }.quantile(0.5), 1.0);
         assert!(whole.penalty(-0.1).is_infinite());
     }
 
+    /// Quantiles of the normal distribution (Abramowitz & Stegun 1972, table 26.5): far out, too.
+    #[test]
+    fn exact_normal_quantiles() {
+        let normal = Prior::Normal { mean: 1.0, sigma: 2.0 };
+        for (share, expected) in
+            [(1e-4, -3.719_016_485), (1e-3, -3.090_232_306), (0.025, -1.959_963_985)]
+        {
+            assert!((normal.quantile(share) - (1.0 + 2.0 * expected)).abs() < 1e-8, "{share}");
+            assert!(
+                (normal.quantile(1.0 - share) - (1.0 - 2.0 * expected)).abs() < 1e-8,
+                "{share}"
+            );
+        }
+        assert!(normal.quantile(0.0) < -10.0 && normal.quantile(1.0) > 12.0);
+    }
+
+    /// Slopes and second derivatives are those of differences; next to a pole they are those a width away.
     #[test]
     fn exact_priors_curve_like_their_densities() {
-        let [slope, bend] = Prior::Normal { mean: 0.3, sigma: 0.2 }.curve(0.5, 1e-3);
-        assert!((slope - 5.0).abs() < 1e-9 && (bend - 25.0).abs() < 1e-6, "{slope} {bend}");
-        // 0.25 + 0.1 - 0.1 is below 0.25.
-        for (low, x) in [(0.0, 1.0), (0.25, 0.25)] {
-            assert_eq!(Prior::Uniform { low, high: 1.0 }.curve(x, 0.1), [0.0, 0.0]);
+        let priors = [
+            Prior::Normal { mean: 0.3, sigma: 0.2 },
+            Prior::Isotropic { low: 0.0, high: PI },
+            Prior::Isotropic { low: 0.499, high: 0.501 },
+            Prior::Uniform { low: 0.0, high: 1.0 },
+        ];
+        for prior in priors {
+            let (x, step) = (0.5, 1e-4);
+            let [before, here, after] = [x - step, x, x + step].map(|x| prior.penalty(x));
+            let [slope, bend] = prior.curve(x, 0.02);
+            assert!((slope - (after - before) / (2.0 * step)).abs() < 1e-5, "{prior:?}: {slope}");
+            let second = (after - 2.0 * here + before) / (step * step);
+            assert!((bend - second).abs() < 1e-4 * (1.0 + bend), "{prior:?}: {bend}");
         }
-        for degrees in 1..90 {
-            let low = f64::from(degrees).to_radians();
-            let [slope, bend] = Prior::Isotropic { low, high: 3.0 }.curve(low, 0.02);
-            assert!(slope.is_finite() && bend.is_finite(), "{degrees}");
-        }
-        let isotropic = Prior::Isotropic { low: 0.0, high: core::f64::consts::PI };
-        let [slope, bend] = isotropic.curve(1.0, 1e-3);
-        assert!((slope + 1.0 / 1f64.tan()).abs() < 1e-5);
-        assert!((bend - 1.0 / 1f64.sin().powi(2)).abs() < 1e-4);
+        let isotropic = Prior::Isotropic { low: 0.0, high: PI };
+        assert_eq!(isotropic.curve(1e-3, 0.02), isotropic.curve(0.02, 0.02));
+        assert_eq!(isotropic.curve(PI, 0.02), isotropic.curve(PI - 0.02, 0.02));
     }
 }

@@ -61,12 +61,20 @@ impl Free {
         }
     }
 
+    /// The value below which a part `share` of the prior's probability lies, within the bounds.
+    pub fn quantile(&self, share: f64) -> f64 {
+        let value = self.prior.quantile(share);
+        let [low, high] = self.bounds();
+        // A bell curve goes on where the parameter has no values.
+        if (low..=high).contains(&value) { value } else { self.mirrored(value) }
+    }
+
     /// −ln of the prior's density at a value up to a constant, infinite where it is not possible.
     pub fn penalty(&self, value: f64) -> f64 {
         self.prior.penalty(self.near_prior(value))
     }
 
-    /// Slope and second derivative of that by differences of half width `width`.
+    /// Slope and second derivative of that; `width` is the distance that is kept from a pole.
     pub(super) fn curve(&self, value: f64, width: f64) -> [f64; 2] {
         self.prior.curve(self.near_prior(value), width)
     }
@@ -188,7 +196,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
             let share = |d: usize| (0.5 + k as f64 * root.powi(-(d as i32 + 1))).fract();
             let free = self.free.iter().enumerate();
             free.fold(self.known, |geometry, (d, free)| {
-                geometry.with(free.parameter, free.prior.quantile(share(d)))
+                geometry.with(free.parameter, free.quantile(share(d)))
             })
         };
         (0..count).map(start).collect()
@@ -380,6 +388,19 @@ mod tests {
             assert!((found[0] - expected[0]).abs() < 1e-9, "{from:?}: {found:?}");
             assert!((found[1] - expected[1]).abs() < 1e-9, "{from:?}: {found:?}");
         }
+    }
+
+    /// Starts and draws of a spin whose prior goes on beyond 1 are spins.
+    #[test]
+    fn exact_quantiles_lie_within_the_bounds() {
+        let prior = Prior::Normal { mean: 0.95, sigma: 0.1 };
+        let free = Free { parameter: Parameter::Spin, prior };
+        let [low, high] = free.bounds();
+        for k in 0..=1000 {
+            let share = f64::from(k) / 1000.0;
+            assert!((low..=high).contains(&free.quantile(share)), "{share}");
+        }
+        assert_eq!(free.quantile(0.2), prior.quantile(0.2));
     }
 
     #[test]

@@ -164,6 +164,26 @@ fn of_hot_spot<'a>(
     }
 }
 
+/// Steps end at the bounds of an inclination, but at a pole only where a position angle is known: beyond it they go on.
+#[test]
+fn exact_bounds_shorten_steps() {
+    let model = screen(20, 12);
+    let part = |low: f64, turns: f64| {
+        let uniform =
+            |parameter, low, high| Free { parameter, prior: Prior::Uniform { low, high } };
+        let free = [
+            uniform(Parameter::Inclination, low, 1.5),
+            uniform(Parameter::PositionAngle, -PI * turns, PI * turns),
+        ];
+        let problem = of_hot_spot(&model, &free, &[]);
+        let from = Geometry::new(0.0, low + 0.01);
+        problem.part_within(&from, &[-1.0, 0.0]) * Parameter::Inclination.scale()
+    };
+    assert!((part(0.05, 1.0) - 0.01).abs() < 1e-12);
+    assert!((part(0.0, 0.5) - 0.01).abs() < 1e-12);
+    assert_eq!(part(0.0, 1.0), Parameter::Inclination.scale());
+}
+
 /// Images of a volume through pixels that are means leave residuals through single rays that point all the way to the means.
 #[test]
 fn exact_residuals_point_to_the_model_that_made_the_data() {

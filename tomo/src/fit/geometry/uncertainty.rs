@@ -1,7 +1,7 @@
 //! Errors of a geometry: a quadratic form through the values of geometries near the best one.
 
 use super::covariance::covariance;
-use super::{Free, Geometry, ModelError, ModelErrors, Sample};
+use super::{Free, Geometry, ModelError, ModelErrors, Sample, bounded};
 use nalgebra::{DMatrix, DVector};
 
 /// Errors from the values near the best geometry.
@@ -113,10 +113,9 @@ impl Spread {
         let geometry = (0..n).fold(best.geometry, |geometry, k| {
             // Not beyond the geometries that were evaluated.
             let step = lowest[k].clamp(-form.reach[k], form.reach[k]) * unit(k);
-            let [low, high] = free[k].bounds();
-            let value = best.geometry.get(free[k].parameter) + step;
-            geometry.with(free[k].parameter, value.clamp(low, high))
+            geometry.with(free[k].parameter, best.geometry.get(free[k].parameter) + step)
         });
+        let geometry = bounded(free, geometry, Free::inside);
         Some(Self {
             geometry,
             sigma: (0..n).map(|k| sigma(k) * unit(k)).collect(),
@@ -187,6 +186,7 @@ impl Form {
 mod tests {
     use super::*;
     use crate::fit::geometry::{Parameter, Prior};
+    use core::f64::consts::PI;
 
     /// A step along the first parameter widens it alone; one along both makes errors that are nearly those of the step.
     #[test]
@@ -249,6 +249,24 @@ mod tests {
         assert!((found.sigma[1] - (a / determinant).sqrt()).abs() < 1e-9);
         assert!((found.correlation[1] + b / (a * c).sqrt()).abs() < 1e-9);
         assert!(Spread::of(&free, &samples[..5], 1.0).is_none());
+    }
+
+    /// A lowest point beyond south lies on the other side of it, not at the end of the prior.
+    #[test]
+    fn exact_lowest_points_go_on_around_the_circle() {
+        let whole = Prior::Uniform { low: -PI, high: PI };
+        let free = [Free { parameter: Parameter::PositionAngle, prior: whole }];
+        let sample = |k: usize| {
+            let angle = PI - 0.03 + 5e-4 * f64::from(k as u32);
+            let geometry = Geometry::new(0.0, 1.0).with(Parameter::PositionAngle, angle);
+            Sample { geometry, value: 0.5 * ((angle - 181f64.to_radians()) / 0.01).powi(2) }
+        };
+        let mut samples: Vec<Sample> = (0..60).map(sample).collect();
+        samples.sort_by(|a, b| a.value.total_cmp(&b.value));
+        let found = Spread::of(&free, &samples, 1.0).unwrap();
+        let angle = found.geometry.get(Parameter::PositionAngle).to_degrees();
+        // No farther than geometries were looked at.
+        assert!((-180.0..-179.0).contains(&angle), "{angle}");
     }
 
     /// Values that do not depend on the spin.

@@ -64,7 +64,7 @@ impl FitFile {
         let mut random = Pcg64::seed_from_u64(self.seed ^ DRAWN);
         for (parameter, key, quantity) in self.quantities_mut() {
             let Some(prior) = quantity.prior() else { continue };
-            let drawn = free((parameter, key, prior))?.prior.quantile(random.random());
+            let drawn = free((parameter, key, prior))?.quantile(random.random());
             *quantity = Quantity::Value(drawn / parameter.unit());
         }
         Ok(())

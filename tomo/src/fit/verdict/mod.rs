@@ -289,20 +289,19 @@ fn judge_structure(term: usize, tested: &Tested, verdict: &mut Verdict) {
 }
 
 fn judge_groups(term: usize, tested: &Tested, verdict: &mut Verdict) {
-    let is_bad = |part: &Part, chi2: f64| {
+    // Each part has a limit of its own: the worst of all need not be beyond its.
+    let is_bad = |part: &Part| {
         let chance = CHANCE * (2.0 / part.count as f64).sqrt();
-        // `worst` falls back to parts with fewer data, which are shown but not judged.
-        part.count >= GROUP_COUNT && chi2 > tested.expected.chi2 + chance.max(GROUP_EXCESS)
+        let limit = tested.expected.chi2 + chance.max(GROUP_EXCESS);
+        part.count >= GROUP_COUNT && part.per_datum().is_some_and(|chi2| chi2 > limit)
     };
-    if let Some((stations, part, chi2)) = worst(tested.statistics.groups.iter())
-        && is_bad(part, chi2)
-    {
+    let groups = tested.statistics.groups.iter().filter(|(_, part)| is_bad(part));
+    if let Some((stations, _, chi2)) = worst(groups) {
         let stations = stations.clone();
         verdict.add(Outcome::Unexplained, Some(term), Fault::Group(stations, chi2));
     }
-    if let Some((frame, part, chi2)) = worst(tested.statistics.frames.iter().enumerate())
-        && is_bad(part, chi2)
-    {
+    let frames = tested.statistics.frames.iter().enumerate().filter(|(_, part)| is_bad(part));
+    if let Some((frame, _, chi2)) = worst(frames) {
         verdict.add(Outcome::Unexplained, Some(term), Fault::Frame(frame, chi2));
     }
 }

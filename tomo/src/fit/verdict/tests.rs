@@ -98,6 +98,18 @@ fn exact_what_is_wrong_is_named() {
     assert_eq!(verdict(Statistics::default(), Errors::Known).outcome, Outcome::Unexplained);
 }
 
+/// A baseline with few data, within what chance gives it, hides none with many that is beyond.
+#[test]
+fn exact_each_baseline_is_judged_by_its_own_limit() {
+    let mut statistics = Statistics::default();
+    statistics.groups.insert(vec![0, 1], Part { count: 30, chi2: 30.0 * 2.25 });
+    statistics.groups.insert(vec![0, 2], Part { count: 500, chi2: 500.0 * 2.1 });
+    let mut found = Verdict { outcome: Outcome::Explained, reasons: vec![] };
+    judge_groups(0, &Tested::gaussian(statistics, Errors::Known), &mut found);
+    let faults: Vec<&Fault> = found.reasons.iter().map(|reason| &reason.fault).collect();
+    assert_eq!(faults, [&Fault::Group(vec![0, 2], 2.1)]);
+}
+
 /// Errors of calibration last: only their size is judged.
 #[test]
 fn exact_calibration_may_be_correlated_in_time() {

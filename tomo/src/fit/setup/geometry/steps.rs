@@ -73,8 +73,14 @@ impl Detail<'_> {
         let Some(best) = lowest(&all) else { return Ok(None) };
         // Finer models and steps have left less than what the factor was chosen by.
         let errors = (self.scale)(best.reduced / place.errors);
+        let is_same = errors == place.errors;
         let place = Place { errors, ..place };
-        let sure = self.sure(&place, best)?;
+        let again = match is_same {
+            true => None,
+            // Values and derivatives of another factor do not compare.
+            false => Some(self.stepped(&place, best.geometry(), &best.polished.best)?),
+        };
+        let sure = self.sure(&place, again.as_ref().unwrap_or(best))?;
         let resolution = Resolution { rays: place.even.unwrap_or(place.at.rays), ..place.at };
         Ok(Some(Detailed { sure, errors, resolution }))
     }
