@@ -65,7 +65,9 @@ impl Model {
         let factors = stokes.map_or(Ok(Vec::new()), |(law, parameters)| {
             let sin_inclination = place.inclination().sin();
             let screen = [alpha.to_vec(), beta.to_vec()];
-            let view = PolarizedView { law, axis, sin_inclination, screen, position_angle: 0.0 };
+            let position_angle = 0.0;
+            let view =
+                PolarizedView { law, axis, sin_inclination, screen, position_angle, unit: None };
             let factors = view.factors(&lines, hole, &motion.velocity)?;
             let of = |p: &StokesParameter| factors.iter().map(|stokes| stokes.get(*p)).collect();
             Ok::<_, Error>(parameters.iter().map(of).collect())

@@ -145,11 +145,11 @@ impl LightCurve {
         self
     }
 
-    /// Sets this I (Jy) at all times.
+    /// Sets this I (Jy) at all times, with this error, or without one with that of the I that was there.
     #[must_use]
-    pub fn with_intensity(mut self, jy: f64) -> Self {
+    pub fn with_intensity(mut self, jy: f64, sigma_jy: Option<f64>) -> Self {
         for sample in &mut self.samples {
-            let sigma_jy = sample.stokes[0].and_then(|flux| flux.sigma_jy);
+            let sigma_jy = sigma_jy.or_else(|| sample.stokes[0].and_then(|flux| flux.sigma_jy));
             sample.stokes[0] = Some(Flux { jy, sigma_jy });
         }
         self

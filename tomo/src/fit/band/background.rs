@@ -64,7 +64,10 @@ impl Background {
     /// If a number of it is out of its range.
     pub fn drawn(self, minutes: &[f64], normal: &[f64]) -> Result<Vec<f64>, Error> {
         let background = self.checked()?;
-        let scale = background.constant.hypot(background.variation).max(f64::MIN_POSITIVE);
+        if background.is_none() {
+            return Ok(vec![0.0; minutes.len()]);
+        }
+        let scale = background.constant.hypot(background.variation);
         let entry = |a: usize, b: usize| {
             // Smooth processes have covariances that are singular to rounding.
             let own = if a == b { 1e-10 } else { 0.0 };

@@ -356,3 +356,9 @@ fn impossible_backgrounds_are_refused() {
     let none = BandPrior { backgrounds: Vec::new(), ..prior() };
     assert!(evidence(&curve, &[vec![0.0; 30]], &none).is_err());
 }
+
+/// A background as faint as the ranges of settings allow is nothing, without an error.
+#[test]
+fn exact_no_background_is_dark() {
+    assert_eq!(Background::NONE.drawn(&[0.0, 1.0], &[0.1, 0.2]).unwrap(), [0.0, 0.0]);
+}

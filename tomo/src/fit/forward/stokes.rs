@@ -25,6 +25,8 @@ pub struct PolarizedView {
     pub screen: [Vec<f64>; 2],
     /// Position angle of the spin on the sky, radians east of north.
     pub position_angle: f64,
+    /// Unit of |b|, where it is not to be that of the nodes that are seen: a mean field depends on them.
+    pub unit: Option<f64>,
 }
 
 impl PolarizedView {
@@ -45,11 +47,8 @@ impl PolarizedView {
             return Err(Error::out_of_range("polarization", lines.points() as f64, allowed));
         }
         // The unit may be the mean field of all nodes: no factor is known before all are seen.
-        let views: Vec<Vec<Option<SynchrotronView>>> = (0..lines.rays())
-            .into_par_iter()
-            .map(|ray| self.along(lines, ray, hole, velocity))
-            .collect();
-        let unit = self.unit(views.iter().flatten().flatten());
+        let views = self.views(lines, hole, velocity);
+        let unit = self.unit.unwrap_or_else(|| self.unit_of(views.iter().flatten().flatten()));
         let of = |seen: &Option<SynchrotronView>| {
             seen.map_or(Stokes::default(), |seen| self.law.stokes(&seen, unit))
         };
@@ -57,8 +56,22 @@ impl PolarizedView {
         Ok(views.iter().flatten().map(|seen| of(seen).turned(self.position_angle)).collect())
     }
 
-    /// Returns the unit of |b|.
-    fn unit<'a>(&self, views: impl Iterator<Item = &'a SynchrotronView>) -> f64 {
+    /// Returns the unit of |b| at these nodes.
+    pub fn unit_along(&self, lines: &Sightlines, hole: &Kerr, velocity: &AngularVelocity) -> f64 {
+        self.unit_of(self.views(lines, hole, velocity).iter().flatten().flatten())
+    }
+
+    fn views(
+        &self,
+        lines: &Sightlines,
+        hole: &Kerr,
+        velocity: &AngularVelocity,
+    ) -> Vec<Vec<Option<SynchrotronView>>> {
+        let along = |ray| self.along(lines, ray, hole, velocity);
+        (0..lines.rays()).into_par_iter().map(along).collect()
+    }
+
+    fn unit_of<'a>(&self, views: impl Iterator<Item = &'a SynchrotronView>) -> f64 {
         if self.law.normalisation == Normalisation::None {
             return 1.0;
         }

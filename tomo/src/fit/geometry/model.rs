@@ -139,6 +139,7 @@ impl GeometryModel {
             sin_inclination: geometry.get(Parameter::Inclination).sin(),
             screen: [alpha, beta],
             position_angle: geometry.get(Parameter::PositionAngle),
+            unit: None,
         })
     }
 

@@ -224,7 +224,13 @@ pub fn check_band<'a>(
             "band.position_angles_deg needs loss.0.stokes = [\"Q\", \"U\"] with the same error of both"
         );
     }
-    axis(file)?;
+    let vector = axis(file)?.0.vector();
+    if vector[2].abs() < 1.0 - 1e-9 {
+        let [x, y, z] = vector;
+        refuse!(
+            "motion.axis = [{x}, {y}, {z}] is not allowed with [band], whose circles lie about [0, 0, 1]"
+        );
+    }
     Ok(curve)
 }
 

@@ -207,6 +207,7 @@ fn polarized(file: &FitFile, screen: &[Vec<f64>; 2]) -> Result<Option<PolarizedV
         sin_inclination: observer(&file.observer)?.inclination().sin(),
         screen: [alpha, beta],
         position_angle: file.observer.position_angle_deg.value().to_radians(),
+        unit: None,
     }))
 }
 

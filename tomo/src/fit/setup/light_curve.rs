@@ -93,9 +93,8 @@ fn prepared(mut curve: LightCurve, settings: &MeasuredCurve) -> Result<LightCurv
         curve = curve.turned(angle);
     }
     if let Some(jy) = settings.intensity {
-        curve = curve.with_intensity(jy);
-        // An I that the file lacks has no error yet.
-        curve = curve.with_sigmas(settings.sigma.map_or([None; 4], |sigma| sigma.all()));
+        // Of I alone: errors of Q and U have been turned.
+        curve = curve.with_intensity(jy, settings.sigma.and_then(|sigma| sigma.all()[0]));
     }
     if curve.samples.is_empty() {
         refuse!("no samples are left: see utc_h, average and most_gap_s of [data.light-curve]");

@@ -58,11 +58,14 @@ impl PreviewView<'_> {
         let motion = Motion { times: vec![time], ..self.motion.clone() };
         let side = self.side();
         let mut still = PreviewImage { side, time, recovered: Vec::new(), truth: None };
+        // That of the fit: a mean over the rays of a still, or of a part of it, is another one.
+        let Instrument { lines, hole, polarized, .. } = self.instrument;
+        let unit = polarized.as_ref().map(|view| view.unit_along(lines, hole, &motion.velocity));
         let mut first = 0;
         while first < side * side {
             let rays = self.rays(first)?;
             first += rays.count.len();
-            let mut model = self.forward_model(&rays, &motion)?;
+            let mut model = self.forward_model(&rays, &motion, unit)?;
             still.recovered.extend(rays.pixels(&recovered(&mut model, trainer, state)));
             if let Some(truth) = self.truth {
                 let image = truth.movie_through(&mut model);
@@ -104,7 +107,12 @@ impl PreviewView<'_> {
     }
 
     /// Nodes of rays, with the weights of integrals along them.
-    fn forward_model(&self, rays: &Rays, motion: &Motion) -> Result<ForwardModel<f32>> {
+    fn forward_model(
+        &self,
+        rays: &Rays,
+        motion: &Motion,
+        unit: Option<f64>,
+    ) -> Result<ForwardModel<f32>> {
         let Instrument { hole, redshift, polarized, .. } = self.instrument;
         let request = SightlineRequest {
             region: self.file.region.limits(),
@@ -117,8 +125,11 @@ impl PreviewView<'_> {
         let model = ForwardModel::new(&lines, motion, hole, *redshift)?;
         let Some(view) = polarized else { return Ok(model) };
         let screen = [rays.alpha.clone(), rays.beta.clone()];
-        let factors =
-            PolarizedView { screen, ..view.clone() }.factors(&lines, hole, &motion.velocity)?;
+        let factors = PolarizedView { screen, unit, ..view.clone() }.factors(
+            &lines,
+            hole,
+            &motion.velocity,
+        )?;
         model.seen(Some(&factors), &Observable::Images)
     }
 }

@@ -27,10 +27,14 @@ pub fn law(frame: FieldFrame, [vertical, radial, toroidal]: [f64; 3]) -> Polariz
 
 /// Few rays about a hole.
 pub fn traced(spin: f64, degrees: f64) -> (Kerr, Sightlines, [Vec<f64>; 2]) {
+    some_traced(spin, degrees, 12)
+}
+
+fn some_traced(spin: f64, degrees: f64, count: usize) -> (Kerr, Sightlines, [Vec<f64>; 2]) {
     let hole = Kerr::new(spin).unwrap();
     let observer = Observer::at_infinity(Inclination::from_degrees(degrees).unwrap());
     let at = |k: usize| (9.0 * (0.9 * k as f64).sin() + 0.1, 8.0 * (1.3 * k as f64).cos());
-    let (alpha, beta): (Vec<f64>, Vec<f64>) = (0..12).map(at).unzip();
+    let (alpha, beta): (Vec<f64>, Vec<f64>) = (0..count).map(at).unzip();
     let region = Region { r_min: 4.0, r_max: 12.0, z_width: 4.0 };
     let sampling = Sampling::Gauss { order: 4, split: 1 };
     let request = SightlineRequest { region, sampling, delay: false, momentum: true };
@@ -45,6 +49,7 @@ pub fn view(law: PolarizationLaw, screen: &[Vec<f64>; 2], degrees: f64) -> Polar
         sin_inclination: degrees.to_radians().sin(),
         screen: screen.clone(),
         position_angle: 0.0,
+        unit: None,
     }
 }
 
@@ -363,4 +368,23 @@ fn exact_turns_and_dark_gas() {
     let far = |k: usize| lines.position[0][k].hypot(lines.position[1][k]) > 6.0;
     assert!((0..lines.points()).filter(|k| far(*k)).all(|k| dark[k] == Stokes::default()));
     assert!(dark.iter().any(|stokes| stokes.i > 0.0));
+}
+
+/// A part of the rays has the factors that it has among all of them, with the unit of all.
+#[test]
+fn exact_a_part_of_the_rays_has_the_mean_field_of_all() {
+    let gas = AngularVelocity::Keplerian { drag: 0.6 };
+    let law = PolarizationLaw {
+        normalisation: Normalisation::MeanField,
+        ..law(FieldFrame::Ideal, [1.0, 0.0, 0.3])
+    };
+    let factors = |count: usize, unit: Option<f64>| {
+        let (hole, lines, screen) = some_traced(0.6, 40.0, count);
+        let view = PolarizedView { unit, ..view(law, &screen, 40.0) };
+        (view.factors(&lines, &hole, &gas).unwrap(), view.unit_along(&lines, &hole, &gas))
+    };
+    let (all, unit) = factors(12, None);
+    let part = factors(7, Some(unit)).0;
+    assert!(part.len() > 20 && part == all[..part.len()]);
+    assert_ne!(factors(7, None).0, part);
 }
