@@ -36,16 +36,20 @@ impl Certificate {
         for (x, g) in x.iter().zip(gradient) {
             // ⟨g, s⟩ is least over the box where s = 0 for g ≥ 0, and s = upper for g < 0.
             gap += g * x + upper * (-g).max(0.0);
-            let wrong = if *x <= 0.0 {
-                (-g).max(0.0)
-            } else if *x >= upper {
-                g.max(0.0)
-            } else {
-                g.abs()
-            };
-            violation = violation.max(wrong);
+            violation = violation.max(Self::wrong(*x, *g, upper));
         }
         (gap, violation)
+    }
+
+    /// What violates the conditions for a minimum at a node.
+    pub(super) fn wrong(x: f64, g: f64, upper: f64) -> f64 {
+        if x <= 0.0 {
+            (-g).max(0.0)
+        } else if x >= upper {
+            g.max(0.0)
+        } else {
+            g.abs()
+        }
     }
 }
 

@@ -2,12 +2,8 @@
 
 /// A convex function of numbers in a box.
 pub(super) trait Convex {
-    /// Numbers.
-    fn count(&self) -> usize;
     /// Its value; overwrites the gradient.
     fn value_and_gradient(&mut self, x: &[f64], gradient: &mut Vec<f64>) -> f64;
-    /// Its second derivative times a direction, where it is quadratic.
-    fn curvature(&mut self, direction: &[f64], out: &mut Vec<f64>);
     /// Positive numbers that are to the second derivatives as well as is known.
     fn diagonal(&self) -> Vec<f64>;
 }

@@ -1,5 +1,6 @@
 //! The best field of one of many similar problems: as near the minimum as the differences between them ask.
 
+use super::certificate::Certificate;
 use super::data::Data;
 use super::descent::{Descended, Ending};
 use super::nodes::dilated;
@@ -78,8 +79,11 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             let is_active = self.beside_those(shines);
             let round = self.over(&data, &is_active, &least.x, how.settling)?;
             let (x, gradient) = (&round.least.x, &round.gradient);
-            let [inside, outside] =
-                [true, false].map(|inside| violation(x, gradient, &is_active, inside));
+            let (mut inside, mut outside) = (0.0f64, 0.0f64);
+            for ((x, g), is_active) in x.iter().zip(gradient).zip(&is_active) {
+                let most = if *is_active { &mut inside } else { &mut outside };
+                *most = most.max(Certificate::wrong(*x, *g, self.upper));
+            }
             // Others need not satisfy the conditions better than those that count; where iterations
             // ran out, these may still improve.
             let is_done = outside <= inside && round.ending != Ending::Exhausted;
@@ -159,11 +163,4 @@ impl<T: Float + Default> LinearProblem<'_, T> {
 /// Returns settings of iterations that end where they hardly lower the function.
 fn settling() -> LinearSettings {
     LinearSettings { settled: SETTLED, tolerance: 0.0, ..LinearSettings::default() }
-}
-
-/// The largest violation of the conditions for a minimum among the nodes that count, or among the others.
-fn violation(x: &[f64], gradient: &[f64], is_active: &[bool], counts: bool) -> f64 {
-    let all = x.iter().zip(gradient).zip(is_active).filter(|(_, active)| **active == counts);
-    let wrong = all.map(|((x, g), _)| if *x > 0.0 { g.abs() } else { (-g).max(0.0) });
-    wrong.fold(0.0, f64::max)
 }

@@ -140,7 +140,8 @@ impl<'a, 'b, T: Float + Default> Objective<'a, 'b, T> {
     /// The value where nothing shines, and the largest slope there of the nodes that count.
     pub fn nothing(&mut self) -> (f64, f64) {
         let mut gradient = Vec::new();
-        let value = self.value_and_gradient(&vec![0.0; self.count()], &mut gradient);
+        let value =
+            self.value_and_gradient(&vec![0.0; self.operator.active.count()], &mut gradient);
         (value, gradient.iter().fold(0.0f64, |most, g| most.max(g.abs())))
     }
 
@@ -163,6 +164,28 @@ impl<'a, 'b, T: Float + Default> Objective<'a, 'b, T> {
         squares.iter().zip(prior).map(|(square, prior)| scale * square + prior).collect()
     }
 
+    /// Returns the second derivatives times a direction, where data are quadratic.
+    pub fn curvature(&mut self, direction: &[f64]) -> Vec<f64> {
+        self.evaluations += 1;
+        // As long as an emission of one, so that the data's own slopes, which are subtracted, cost no digits.
+        let largest = direction.iter().fold(0.0f64, |largest, x| largest.max(x.abs()));
+        let scale = if largest > 0.0 { 1.0 / largest } else { 1.0 };
+        let (dark, along) = (self.dark.as_deref(), rounded::<T>(direction, scale));
+        let mut out = self.operator.curvature(self.data, dark, &along);
+        out.iter_mut().for_each(|x| *x *= largest);
+        if self.terms.is_curved() {
+            let all = self.operator.active.expand(direction);
+            let mut slopes = vec![0.0; all.len()];
+            self.terms.add_curvature(&all, &mut slopes);
+            let slopes = self.operator.active.gather(&slopes);
+            out.iter_mut().zip(slopes).for_each(|(x, slope)| *x += slope);
+        }
+        if let Some(image) = self.terms.quiescent {
+            image.bend(direction, &mut out);
+        }
+        out
+    }
+
     fn penalties(&self, x: &[f64], add: impl FnOnce(&[f64])) -> f64 {
         if self.terms.is_empty() {
             return 0.0;
@@ -181,10 +204,6 @@ fn rounded<T: Float>(x: &[f64], scale: f64) -> Vec<T> {
 }
 
 impl<T: Float + Default> Convex for Objective<'_, '_, T> {
-    fn count(&self) -> usize {
-        self.operator.active.count()
-    }
-
     fn value_and_gradient(&mut self, x: &[f64], gradient: &mut Vec<f64>) -> f64 {
         self.evaluations += 1;
         let (value, slopes) =
@@ -195,26 +214,6 @@ impl<T: Float + Default> Convex for Objective<'_, '_, T> {
             + self.penalties(x, |slopes: &[f64]| {
                 gradient.iter_mut().zip(active.gather(slopes)).for_each(|(g, s)| *g += s);
             })
-    }
-
-    fn curvature(&mut self, direction: &[f64], out: &mut Vec<f64>) {
-        self.evaluations += 1;
-        // As long as an emission of one, so that the data's own slopes, which are subtracted, cost no digits.
-        let largest = direction.iter().fold(0.0f64, |largest, x| largest.max(x.abs()));
-        let scale = if largest > 0.0 { 1.0 / largest } else { 1.0 };
-        let (dark, along) = (self.dark.as_deref(), rounded::<T>(direction, scale));
-        *out = self.operator.curvature(self.data, dark, &along);
-        out.iter_mut().for_each(|x| *x *= largest);
-        if self.terms.is_curved() {
-            let all = self.operator.active.expand(direction);
-            let mut slopes = vec![0.0; all.len()];
-            self.terms.add_curvature(&all, &mut slopes);
-            let slopes = self.operator.active.gather(&slopes);
-            out.iter_mut().zip(slopes).for_each(|(x, slope)| *x += slope);
-        }
-        if let Some(image) = self.terms.quiescent {
-            image.bend(direction, out);
-        }
     }
 
     fn diagonal(&self) -> Vec<f64> {

@@ -131,16 +131,20 @@ fn moved<T: Float>(
 }
 
 /// M⁻¹ b by conjugate gradients with a diagonal preconditioner, and what M times it leaves of b.
-fn solved(objective: &mut dyn Convex, b: &[f64], iterations: usize) -> (Vec<f64>, Vec<f64>) {
+fn solved<T: Float + Default>(
+    objective: &mut Objective<'_, '_, T>,
+    b: &[f64],
+    iterations: usize,
+) -> (Vec<f64>, Vec<f64>) {
     let diagonal = objective.diagonal();
     let scaled = |r: &[f64]| -> Vec<f64> { r.iter().zip(&diagonal).map(|(r, d)| r / d).collect() };
     let mut x = vec![0.0; b.len()];
-    let (mut r, mut product) = (b.to_vec(), Vec::new());
+    let mut r = b.to_vec();
     let mut z = scaled(&r);
     let mut p = z.clone();
     let (mut rz, mut absorbed) = (dot(&r, &z), 0.0);
     for _ in 0..iterations {
-        objective.curvature(&p, &mut product);
+        let product = objective.curvature(&p);
         let bend = dot(&p, &product);
         // No residual is left but rounding, or no curvature along the direction.
         if bend <= 0.0 || rz <= 0.0 {

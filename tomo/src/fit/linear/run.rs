@@ -249,7 +249,10 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         let outside = |k: &usize| !is_active[*k] && gradient[*k] < least;
         let admitted: Vec<bool> = (0..x.len()).map(|k| outside(&k)).collect();
         // A descent that ran out of iterations goes on in another round, with new nodes or without.
-        let none = !admitted.iter().any(|new| *new) && ending != Ending::Exhausted;
+        // Nor does the first one know the prices of what it has found.
+        let is_priced = self.round > 1 || !problem.change.is_sharpened();
+        let is_settled = ending != Ending::Exhausted && is_priced;
+        let none = !admitted.iter().any(|new| *new) && is_settled;
         if none || self.round >= settings.rounds {
             let certificate = Certificate { value, dark, gap, violation, dark_slope, upper };
             return Ok(Some(self.solution(

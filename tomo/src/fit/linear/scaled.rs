@@ -21,9 +21,12 @@ impl<'a> Scaled<'a> {
     }
 
     pub fn to(&self, y: &[f64]) -> Vec<f64> {
-        let x = y.iter().zip(&self.root).map(|(y, root)| y / root);
-        // Division may round a number at its bound to one beyond it.
-        x.map(|x| x.clamp(0.0, self.upper)).collect()
+        // Division may round a number at its bound to one beside it, which would count as free.
+        let x = |(y, root): (&f64, &f64)| match *y >= self.upper * root {
+            true => self.upper,
+            false => (y / root).clamp(0.0, self.upper),
+        };
+        y.iter().zip(&self.root).map(x).collect()
     }
 
     pub fn upper(&self, k: usize) -> f64 {
@@ -61,4 +64,33 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// y += a x.
 pub(super) fn add(y: &mut [f64], a: f64, x: &[f64]) {
     y.iter_mut().zip(x).for_each(|(y, x)| *y += a * x);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Diagonal(Vec<f64>);
+
+    impl Convex for Diagonal {
+        fn diagonal(&self) -> Vec<f64> {
+            self.0.clone()
+        }
+
+        fn value_and_gradient(&mut self, _: &[f64], _: &mut Vec<f64>) -> f64 {
+            0.0
+        }
+    }
+
+    /// What is at its bound in one unit is so in the other.
+    #[test]
+    fn exact_numbers_at_their_bounds_stay_there() {
+        let mut inner = Diagonal((1..2000).map(|k| 0.37 * f64::from(k)).collect());
+        for upper in [0.8, 1.0, 3.0, 1000.0] {
+            let scaled = Scaled::new(&mut inner, upper);
+            let mut y = vec![1e9; 1999];
+            scaled.project(&mut y);
+            assert!(scaled.to(&y).iter().all(|x| *x == upper), "{upper}");
+        }
+    }
 }

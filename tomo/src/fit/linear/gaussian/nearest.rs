@@ -10,20 +10,10 @@ use core::ops::ControlFlow;
 const ENOUGH: Stop = Stop { iterations: 4000, tolerance: 1e-9, settled: 0.0 };
 
 impl Convex for &GaussianField {
-    fn count(&self) -> usize {
-        GaussianField::count(self)
-    }
-
     fn value_and_gradient(&mut self, x: &[f64], gradient: &mut Vec<f64>) -> f64 {
         gradient.clear();
         gradient.resize(x.len(), 0.0);
         GaussianField::value_and_gradient(self, x, 1.0, gradient)
-    }
-
-    fn curvature(&mut self, direction: &[f64], out: &mut Vec<f64>) {
-        out.clear();
-        out.resize(direction.len(), 0.0);
-        self.add_curvature(direction, 1.0, out);
     }
 
     fn diagonal(&self) -> Vec<f64> {

@@ -109,8 +109,7 @@ fn exact_slopes_beside_a_quiescent_image() {
         let difference = (after.0 - before.0) / (2.0 * h);
         assert!((difference / slope - 1.0).abs() < 1e-6, "{seen:?}: {difference} {slope}");
         if seen == Array::Visibilities {
-            let mut product = Vec::new();
-            objective.curvature(&direction, &mut product);
+            let product = objective.curvature(&direction);
             let (bend, found) = ((after.1 - before.1) / (2.0 * h), dot(&product, &direction));
             assert!((bend / found - 1.0).abs() < 1e-6, "{bend} {found}");
         }
