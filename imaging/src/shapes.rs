@@ -130,8 +130,9 @@ impl Shape {
             Self::Gaussian => {
                 // The exponential of [[x₁, x₂], [x₂, −x₁]], of determinant 1: x₀ sets the area.
                 // A round Gaussian, whose angle means nothing, is a point like others.
-                let h = x[1].hypot(x[2]).min(3.0);
-                let part = if h > 0.0 { h.sinh() / h } else { 1.0 };
+                let size = x[1].hypot(x[2]);
+                let h = size.min(MOST_STRETCHED);
+                let part = if size > 0.0 { h.sinh() / size } else { 1.0 };
                 let round = h.cosh() * (east * east + north * north);
                 let long = x[1] * (east * east - north * north) + 2.0 * x[2] * east * north;
                 bell((round + part * long).max(0.0), x[0])
@@ -176,7 +177,7 @@ impl Shape {
         let turn = |east: f64, north: f64| east.atan2(north).to_degrees().rem_euclid(360.0);
         match self {
             Self::Gaussian => {
-                let h = x[1].hypot(x[2]).min(3.0);
+                let h = x[1].hypot(x[2]).min(MOST_STRETCHED);
                 // The longer axis is where the form is least.
                 let angle = 0.5 * (-x[2]).atan2(x[1]).to_degrees();
                 vec![
@@ -201,6 +202,9 @@ impl Shape {
         }
     }
 }
+
+/// Logarithm of the largest ratio of a Gaussian's axes, 20.
+const MOST_STRETCHED: f64 = 3.0;
 
 /// The shape that fits best by its criterion.
 pub fn best_shape<'a>(shapes: impl Iterator<Item = &'a ShapeFit>) -> Option<&'a ShapeFit> {
@@ -343,4 +347,24 @@ fn independent(problem: &ImageProblem<'_>, file: &StaticImageFile, chi2: &[f64])
     kinds
         .filter(|((loss, _), _)| !repeats(loss.data))
         .fold((0.0, 0.0), |sum, ((_, n), chi2)| (sum.0 + chi2 * n as f64, sum.1 + n as f64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Beyond the largest ratio of axes a Gaussian stays the one of that ratio: an ellipse, not a strip across the field.
+    #[test]
+    fn exact_gaussians_are_no_narrower_than_the_largest_ratio() {
+        let grid = ImageGrid::new(60, 60, 120.0 * MICROARCSECOND).unwrap();
+        let shares = |x: [f64; 3]| Shape::Gaussian.shares(&x, 30.0, grid);
+        for [a, b] in [[1.0, 0.0], [0.0, 1.0], [-0.6, 0.8]] {
+            let at = |h: f64| shares([20f64.ln(), a * h, b * h]);
+            let most = at(MOST_STRETCHED);
+            for (found, expected) in at(4.5).iter().zip(&most) {
+                assert!((found - expected).abs() < 1e-12);
+            }
+            assert!(at(1.0).iter().zip(&most).any(|(x, y)| (x - y).abs() > 1e-4));
+        }
+    }
 }

@@ -24,3 +24,27 @@ fn exact_leakage_is_found_with_the_flare() {
     let report = std::fs::read_to_string(folder.path().join("flare/report.html")).unwrap();
     assert!(report.contains("Leakage of stations"));
 }
+
+/// Leakage beside emission that changes and is not voxels: its linear start has a field for each knot.
+#[test]
+fn exact_leakage_is_found_beside_emission_that_changes() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = root().join("scenes/fits/polarized_flare.toml").display().to_string();
+    let mut words = vec!["fit", &scene, "-o", "run"];
+    let changes = [
+        "screen.pixels=16",
+        "simulation.observation.scans=6",
+        "instrument.leakage.rounds=2",
+        "change={allowed='any',weight=0.01,spacing=40.0}",
+        "representation.kind=grid",
+        "representation.grid={nodes=16}",
+        "training.start={linear={nodes=12,stride=1,steps=10,iterations=10}}",
+        "training.steps=5",
+        "linear.rounds=1",
+    ];
+    changes.iter().for_each(|change| words.extend(["--set", change]));
+    succeed(folder.path(), &words);
+    let found = results(&folder.path().join("run"));
+    let rms = found["leakage"]["beside_the_truth"]["rms"].as_f64().unwrap();
+    assert!(rms < 0.05, "{rms}");
+}

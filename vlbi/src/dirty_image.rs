@@ -7,7 +7,7 @@ use num_complex::Complex;
 /// Bytes of exponentials that are kept.
 const KEPT: usize = 1 << 20;
 
-/// The dirty image Σ wᵢ Re(Vᵢ e^{2πi(ux + vy)})/√Σ wᵢ with the natural weights wᵢ = 1/σᵢ², which for visibilities of
+/// The dirty image Σ wᵢ Re(Vᵢ e^{−2πi(ul + vm)})/√Σ wᵢ of offsets l to the east and m to the north with the natural weights wᵢ = 1/σᵢ², which for visibilities of
 /// noise alone has a standard deviation of 1 in every pixel. Visibilities and σ in the same unit, (u, v) in wavelengths.
 ///
 /// # Errors

@@ -107,7 +107,7 @@ impl Compare {
         }
         let chosen = cases::expand(&asked.experiment, &asked.source, &asked.choice)?;
         if self.status {
-            return status::show(&folder, &chosen);
+            return status::show(&folder, &chosen, asked.experiment.samples(asked.choice.quick));
         }
         // First, because the check refuses one χ² for several kinds of data.
         ran::split_chi2(&mut asked.experiment, &chosen);

@@ -57,33 +57,13 @@ impl<'a> Runner<'a> {
 
     /// Returns the status of a case without running it.
     pub fn known(&self, case: &Case) -> Status {
-        let run = &self.run_of(case);
-        match results(run) {
-            // The page is written after results.json: without it the fit was cut short.
-            Some((results, true)) if is_ours(&results) && run.join("report.html").exists() => {
-                self.with_draws(results, run).map_or(Status::Open, Status::Done)
-            }
-            _ => match case.early_error() {
+        match finished(&self.run_of(case), self.samples) {
+            Some(results) => Status::Done(results),
+            None => match case.early_error() {
                 Some(error) => Status::Failed(error.to_owned()),
                 None => Status::Open,
             },
         }
-    }
-
-    /// Results with what follows from the draws, where these are wanted; none if they are not all there.
-    fn with_draws(&self, mut results: Value, run: &Path) -> Option<Value> {
-        let Some(samples) = self.samples else { return Some(results) };
-        let text = output::read_text(&run.join(posterior::FOLDER).join(posterior::NUMBERS)).ok()?;
-        let numbers: Value = serde_json::from_str(&text).ok()?;
-        if !is_whole(&text) || numbers["samples"] != samples {
-            return None;
-        }
-        for (key, ..) in RESULTS {
-            if let Some(number) = numbers.get(key) {
-                results[key] = number.clone();
-            }
-        }
-        Some(results)
     }
 
     /// Refuses cases that have read files which are no longer the same: others would be compared with them.
@@ -194,6 +174,27 @@ fn said(run: &Path) -> PathBuf {
 /// process.
 fn was_told(status: ExitStatus) -> bool {
     status.code().is_some_and(|code| matches!(code, 129 | 130 | 143))
+}
+
+/// Results of a run of this version that is whole, with what follows from its draws where so many are wanted.
+pub fn finished(run: &Path, samples: Option<u32>) -> Option<Value> {
+    let (mut results, is_whole_file) = results(run)?;
+    // The page is written after results.json: without it the fit was cut short.
+    if !is_whole_file || !is_ours(&results) || !run.join("report.html").exists() {
+        return None;
+    }
+    let Some(samples) = samples else { return Some(results) };
+    let text = output::read_text(&run.join(posterior::FOLDER).join(posterior::NUMBERS)).ok()?;
+    let numbers: Value = serde_json::from_str(&text).ok()?;
+    if !is_whole(&text) || numbers["samples"] != samples {
+        return None;
+    }
+    for (key, ..) in RESULTS {
+        if let Some(number) = numbers.get(key) {
+            results[key] = number.clone();
+        }
+    }
+    Some(results)
 }
 
 /// Returns the results of a run, if it has come so far, and whether they are as they were written.

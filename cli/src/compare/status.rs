@@ -2,7 +2,7 @@
 
 use super::cases::Case;
 use super::one;
-use super::runner::CASES;
+use super::runner::{self, CASES};
 use crate::answer::Answer;
 use crate::lock::Lock;
 use anyhow::anyhow;
@@ -25,7 +25,9 @@ enum State {
 }
 
 /// Counts cases from what lies in the folder: it is read once, and of cases only those are looked into that have begun.
-pub fn show(folder: &Path, cases: &[Case]) -> anyhow::Result<Answer> {
+///
+/// `samples` are the draws that each is to have.
+pub fn show(folder: &Path, cases: &[Case], samples: Option<u32>) -> anyhow::Result<Answer> {
     if !folder.join(super::plan::FILE).is_file() {
         return Err(no_comparison(folder));
     }
@@ -39,7 +41,8 @@ pub fn show(folder: &Path, cases: &[Case]) -> anyhow::Result<Answer> {
     let state = |case: &Case| {
         let slug = case.slug();
         let has = |ending: &str| there.contains(&format!("{slug}.{ending}"));
-        if there.contains(&slug) && at.join(&slug).join("report.html").is_file() {
+        let is_done = || runner::finished(&at.join(&slug), samples).is_some();
+        if there.contains(&slug) && is_done() {
             State::Done
         } else if has("lock") && Lock::is_held(&one::lock_of(folder, case)) {
             // The lock file outlives its process, the lock does not.

@@ -3,7 +3,7 @@
 use super::arguments;
 use super::image_files::{self, OwnTimes};
 use crate::output;
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use kerrlight_vlbi::simulate::StokesMovie;
 use std::path::{Path, PathBuf};
 
@@ -130,6 +130,12 @@ fn numbered(name: &str) -> Vec<(u128, String)> {
 pub fn read(files: &[PathBuf], fov_uas: Option<f64>) -> anyhow::Result<(StokesMovie, OwnTimes)> {
     let [first, rest @ ..] = files else { bail!("no image is given") };
     let (mut movie, mut times) = image_files::read(first, fov_uas)?;
+    let is_movie = |path: &Path| {
+        anyhow!("{} is a movie: in a sequence every file is one image", path.display())
+    };
+    if !rest.is_empty() && movie.i.frames() != 1 {
+        return Err(is_movie(first));
+    }
     for path in rest {
         let (image, time) = image_files::read(path, fov_uas)?;
         let (a, b) = (movie.i.grid, image.i.grid);
@@ -137,8 +143,8 @@ pub fn read(files: &[PathBuf], fov_uas: Option<f64>) -> anyhow::Result<(StokesMo
         if (a.width, a.height) != (b.width, b.height) || !same_field {
             bail!("{} differs from {} in pixels or field", path.display(), first.display());
         }
-        if movie.i.frames() != 1 && movie.i.pixels.len() == a.pixels() || image.i.frames() != 1 {
-            bail!("{} is a movie: in a sequence every file is one image", path.display());
+        if image.i.frames() != 1 {
+            return Err(is_movie(path));
         }
         movie.i.pixels.extend(image.i.pixels);
         for (all, one) in movie.polarized.iter_mut().zip(image.polarized) {
@@ -159,9 +165,6 @@ pub fn read(files: &[PathBuf], fov_uas: Option<f64>) -> anyhow::Result<(StokesMo
             }
             _ => OwnTimes::Unknown,
         };
-    }
-    if movie.i.frames() < files.len() {
-        bail!("{} is a movie: in a sequence every file is one image", first.display());
     }
     Ok((movie, times))
 }
@@ -264,6 +267,24 @@ mod tests {
         std::fs::remove_file(path.join("f_9.exr")).unwrap();
         let message = files(&path.join("f_%02d.exr")).unwrap_err().to_string();
         assert!(message.contains("f_8.exr is followed by f_10.exr"), "{message}");
+    }
+
+    /// A movie among images is refused, whether it comes first or later.
+    #[test]
+    fn exact_sequences_have_one_image_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let [image, movie] = ["image.npy", "movie.npy"].map(|name| folder.path().join(name));
+        let array = |shape: &[u64]| {
+            let values = vec![0.5; shape.iter().product::<u64>() as usize];
+            kerrlight_common::numpy::write_array(shape, &values)
+        };
+        std::fs::write(&image, array(&[4, 4])).unwrap();
+        std::fs::write(&movie, array(&[3, 4, 4])).unwrap();
+        for files in [[&movie, &image], [&image, &movie]] {
+            let error = read(&files.map(Clone::clone), Some(100.0)).unwrap_err().to_string();
+            assert!(error.contains("movie.npy is a movie"), "{error}");
+        }
+        assert_eq!(read(&[image.clone(), image], Some(100.0)).unwrap().0.i.frames(), 2);
     }
 
     #[test]

@@ -93,22 +93,32 @@ pub fn survey_polarized(
         let problem = search.problem(&*term.term, light, value, frames.clone());
         search.solved(Stage::Strengths, &problem, value, survey)
     };
-    let mut found = strength(best);
+    let Some(mut found) = strength(best) else { return Ok(None) };
+    let (mut round, mut is_stopped) = (0, false);
     // Rows see the leakage that was found last.
     let leakage = measured.in_turn(
         || {
-            found = strength(best);
-            let once: Vec<f32> =
-                found.iter().flat_map(|found| &found.images).map(|x| *x as f32).collect();
+            round += 1;
+            // The first round has the image above; one that was stopped keeps what it has.
+            if round > 1 && !is_stopped {
+                match strength(best) {
+                    Some(next) => found = next,
+                    None => is_stopped = true,
+                }
+            }
+            let once: Vec<f32> = found.images.iter().map(|x| *x as f32).collect();
             Ok::<_, Error>(once.repeat(measured.times.len()))
         },
         |_, _| {},
     )?;
+    if is_stopped {
+        return Ok(None);
+    }
     // A round finds leakage after its image: the last leakage has no image yet.
     if leakage.is_some() {
-        found = strength(best);
+        let Some(last) = strength(best) else { return Ok(None) };
+        found = last;
     }
-    let Some(found) = found else { return Ok(None) };
     let others: Vec<f64> = allowed(&losses).into_iter().filter(|value| *value != best).collect();
     let Some(strengths) = others.into_par_iter().map(strength).collect() else { return Ok(None) };
     let draws = search.draws(measured, survey, best)?;

@@ -5,7 +5,9 @@ use super::*;
 use crate::data;
 use crate::settings::StaticImageFile;
 use crate::survey;
+use crate::survey::Stage;
 use crate::tests::{SETTINGS, night, spoil};
+use core::sync::atomic::{AtomicUsize, Ordering};
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::noise::apply_leakage;
 use kerrlight_vlbi::observation::{Basis, Observation};
@@ -138,12 +140,21 @@ fn exact_gradients_of_the_polarised_loss() {
 }
 
 fn found(text: &str, seed: u64, leakage: Option<f64>) -> PolarizedSurvey {
+    found_while(text, seed, leakage, &|_| true).unwrap()
+}
+
+fn found_while(
+    text: &str,
+    seed: u64,
+    leakage: Option<f64>,
+    goes_on: &(dyn Fn(Stage) -> bool + Sync),
+) -> Option<PolarizedSurvey> {
     let file = StaticImageFile::parse(text).unwrap();
     let seen = observed(seed, leakage);
     let measured = data::total_intensity(&file, seen.clone(), "data").unwrap();
     let intensity = survey(&file, &measured, &[], &|_, _| true).unwrap().unwrap();
     let polarized = data::polarized(&file, seen, "data").unwrap().unwrap();
-    survey_polarized(&file, &polarized, &intensity, &|_, _| true).unwrap().unwrap()
+    survey_polarized(&file, &polarized, &intensity, &|stage, _| goes_on(stage)).unwrap()
 }
 
 /// Ratios know the spiral although gains are lost: its angle within 10° and three stated errors, its strength as the beam
@@ -162,14 +173,31 @@ fn exact_a_spiral_is_found_through_gains() {
     assert_eq!((found.draws.len(), found.leakage.is_none()), (4, true));
 }
 
+fn beside_leakage() -> String {
+    settings().replace("polarimetric-ratios", "polarized-visibilities").replace(
+        "[[loss]]\ndata = \"amplitudes\"",
+        "[instrument.leakage]\namplitude = 0.1\nrounds = 8\n[[loss]]\ndata = \"amplitudes\"",
+    )
+}
+
+/// A watch that says no ends the search without a result, at the first image and in a round of leakage.
+#[test]
+fn exact_the_search_for_leakage_can_be_stopped() {
+    for after in [0, 3] {
+        let asked = AtomicUsize::new(0);
+        let goes_on = |stage: Stage| {
+            stage != Stage::Strengths || asked.fetch_add(1, Ordering::Relaxed) < after
+        };
+        assert!(found_while(&beside_leakage(), 3, Some(0.05), &goes_on).is_none());
+        assert!(asked.load(Ordering::Relaxed) > after);
+    }
+}
+
 /// Visibilities with free gains find it beside leakage of 5 %, and a quarter of that is left of the leakage: what is wrong with
 /// total intensity, which is held, ends in it.
 #[test]
 fn exact_a_spiral_is_found_beside_leakage() {
-    let text = settings().replace("polarimetric-ratios", "polarized-visibilities").replace(
-        "[[loss]]\ndata = \"amplitudes\"",
-        "[instrument.leakage]\namplitude = 0.1\nrounds = 8\n[[loss]]\ndata = \"amplitudes\"",
-    );
+    let text = beside_leakage();
     let found = found(&text, 3, Some(0.05));
     let numbers = found.found.numbers;
     assert!((numbers.beta2_deg - 60.0).abs() < 12.0, "{numbers:?}");

@@ -5,12 +5,12 @@ use super::progress::{At, Event, Progress};
 use super::search::weighed;
 use super::{Fit, Stopped};
 use crate::Error;
-use crate::fit::linear::{Change, Ending, LinearProgress, LinearSolution, Voxels};
+use crate::fit::linear::{Ending, LinearProgress, LinearSolution};
 use crate::fit::scan::{AxisLoss, AxisProblem, AxisSettings, Effort, refine_axis, scan_axis};
 use crate::fit::settings::{AxisScan as AxisScanSettings, AxisSearch, FitFile, Kind, Start};
 use crate::fit::setup::{self, CoarseGrid, CoarseView, FitData, SolvedLeakage, WarmStart};
-use crate::fit::{Batch, Field, Motion, State, Trainer, WithStaticImage};
-use crate::representation::{Representation, Workspace};
+use crate::fit::{Batch, Field, ForwardModel, Motion, State, Trainer};
+use crate::representation::{Registry, Workspace};
 use core::ops::ControlFlow;
 use kerrlight_render::dynamics::Axis;
 use std::sync::{Mutex, PoisonError};
@@ -76,15 +76,14 @@ impl Fit<'_, '_> {
         if file.representation.kind == Kind::LinearGrid {
             let nodes = file.representation.linear_grid.nodes;
             let file = weighed(file, &mut trainer.objective, axis, times, progress)?;
-            let change = setup::change(&file, times)?;
             let grid = CoarseGrid { nodes, stride: 1, seed: None };
-            let solution = solve_linear(&file, measured, axis, change, grid, trainer, progress)?;
+            let solution = solve_linear(&file, measured, axis, times, grid, trainer, progress)?;
             state.now.parameters = solution.parameters();
         } else if let Start::Linear { nodes, stride, steps, .. } = file.training.start {
-            let change = setup::change(file, times)?;
             let grid = CoarseGrid { nodes, stride, seed: None };
-            let solution = solve_linear(file, measured, axis, change, grid, trainer, progress)?;
-            let given = WarmStart { solution: &solution, nodes, knots: change.knots };
+            let solution = solve_linear(file, measured, axis, times, grid, trainer, progress)?;
+            let knots = setup::change(file, times)?.knots;
+            let given = WarmStart { solution: &solution, nodes, knots };
             let imprinted = setup::warm_start(file, trainer.representation, &given, steps, state)?;
             progress.found(Event::WarmStarted(&imprinted))?;
         }
@@ -97,21 +96,12 @@ fn solve_linear(
     file: &FitFile,
     measured: &FitData,
     axis: Axis,
-    change: Change,
+    times: [f64; 2],
     grid: CoarseGrid,
     trainer: &mut Trainer<'_, f32>,
     progress: &mut dyn Progress,
 ) -> Result<LinearSolution<f32>, Error> {
-    let voxels =
-        Voxels::cube(grid.nodes, file.region.r_max, setup::linear(file)?.degree).field()?;
-    let voxels: Box<dyn Representation<f32>> = match trainer.objective.model.quiescent() {
-        Some(image) => Box::new(WithStaticImage::new(Box::new(voxels), image)),
-        None => Box::new(voxels),
-    };
-    let representation = match file.representation.kind {
-        Kind::LinearGrid => trainer.representation,
-        _ => &*voxels,
-    };
+    let change = setup::change(file, times)?;
     let objective = &mut trainer.objective;
     let mut solution = None;
     // Two closures tell, and `progress` can be borrowed by one: the lock lends it to either.
@@ -130,18 +120,13 @@ fn solve_linear(
         if found.ending == Ending::Cancelled {
             return Err(Stopped::Lost("the linear grid was being solved").into());
         }
-        let parameters = &found.parameters();
-        let field = Field { representation, parameters, axis, occupancy: None };
         // The images are for the leakage: without it none are computed.
-        let frames: Vec<usize> = match measured.leakage {
-            Some(_) => (0..measured.times.len()).collect(),
+        let images = match measured.leakage {
+            Some(_) => images_of(&found, file, axis, times, grid, &objective.model)?,
             None => Vec::new(),
         };
-        let mut movie = vec![0.0; frames.len() * objective.model.pixels()];
-        let (batch, workspace) = (&mut Batch::default(), &mut Workspace::new());
-        objective.model.movie(field, &frames, batch, workspace, &mut movie);
         solution = Some(found);
-        Ok(movie)
+        Ok(images)
     };
     // `rounds` returns nothing: its error waits until the rounds are over.
     let mut refused = Ok(());
@@ -156,4 +141,26 @@ fn solve_linear(
     let solution = solution.ok_or(Stopped::Lost("the linear grid was being solved"))?;
     progress.found(Event::Linear(&solution))?;
     Ok(solution)
+}
+
+/// The images of all frames that a solution of the linear problem has.
+fn images_of(
+    solution: &LinearSolution<f32>,
+    file: &FitFile,
+    axis: Axis,
+    times: [f64; 2],
+    grid: CoarseGrid,
+    model: &ForwardModel<f32>,
+) -> Result<Vec<f32>, Error> {
+    let mut file = file.clone();
+    file.representation.kind = Kind::LinearGrid;
+    file.representation.linear_grid.nodes = grid.nodes;
+    let representation = &*setup::representation(&file, &Registry::default(), times)?;
+    let parameters = &solution.parameters();
+    let field = Field { representation, parameters, axis, occupancy: None };
+    let frames: Vec<usize> = (0..model.frames()).collect();
+    let mut movie = vec![0.0; frames.len() * model.pixels()];
+    let (batch, workspace) = (&mut Batch::default(), &mut Workspace::new());
+    model.movie(field, &frames, batch, workspace, &mut movie);
+    Ok(movie)
 }

@@ -85,7 +85,7 @@ fn read_heading(
         }
         "RF:" => observation.frequency_hz = Some(gigahertz(&words, "RF")?),
         "BW:" => observation.bandwidth_hz = Some(gigahertz(&words, "BW")?),
-        key @ ("PHASECAL:" | "AMPCAL:" | "OPACITYCAL:" | "DCAL:" | "FRCAL:") => {
+        key if CALIBRATIONS.contains(&key) => {
             if matches!(first(), "0" | "False") {
                 observation.history.push(format!("{key} 0"));
             }
@@ -239,8 +239,9 @@ pub fn to_text(observation: &Observation) -> Result<String, Error> {
         frequency / 1e9,
         bandwidth / 1e9
     );
-    for flag in ["PHASECAL", "AMPCAL", "OPACITYCAL", "DCAL", "FRCAL"] {
-        let _ = writeln!(text, "# {flag}: 1");
+    for flag in CALIBRATIONS {
+        let is_missing = observation.history.iter().any(|line| *line == format!("{flag} 0"));
+        let _ = writeln!(text, "# {flag} {}", u8::from(!is_missing));
     }
     let rule = "-".repeat(136);
     let _ = writeln!(text, "# {rule}\n# {}", array::HEADING);
@@ -284,6 +285,9 @@ fn write_row(text: &mut String, observation: &Observation, row: &Row) {
     }
     text.push('\n');
 }
+
+/// Headings that say what has been calibrated.
+const CALIBRATIONS: [&str; 5] = ["PHASECAL:", "AMPCAL:", "OPACITYCAL:", "DCAL:", "FRCAL:"];
 
 /// Whole, minutes and seconds of hours or degrees.
 fn parts(value: f64, unit: &str) -> String {

@@ -19,8 +19,9 @@ pub fn parse(bytes: &[u8]) -> Result<Pixels, FileError> {
     let text = core::str::from_utf8(bytes)
         .map_err(|error| FileError::whole(format!("not UTF-8 text: {error}")))?;
     let [(width, wide_as), (height, high_as)] = [field(text, "FOVX:")?, field(text, "FOVY:")?];
-    let step_as = wide_as / width as f64;
-    if (high_as / height as f64 - step_as).abs() > 1e-3 * step_as {
+    let mut wide_as = wide_as;
+    let mut step_as = wide_as / width as f64;
+    if (high_as / height as f64 - step_as).abs() > 1e-3 * step_as + ROUNDED_AS / height as f64 {
         return Err(FileError::whole("FOVX and FOVY are not those of square pixels"));
     }
     let mut planes: Vec<Vec<f64>> = Vec::new();
@@ -48,6 +49,15 @@ pub fn parse(bytes: &[u8]) -> Result<Pixels, FileError> {
         let place = planes[0].len();
         let (column, row) = (place % width, place / width);
         let (x0, y0) = *last.get_or_insert((*x, *y));
+        // eht-imaging rounds the field to a microarcsecond, which over many pixels may be more than one of them, and places to 1e-10
+        // arcseconds.
+        if row == 0 && column > 0 {
+            let field = (x0 - x) / column as f64 * width as f64;
+            let apart = (field - wide_as).abs();
+            if apart > 3.0 * PLACE_AS * width as f64 && apart < 1e-3 * wide_as + ROUNDED_AS {
+                (wide_as, step_as) = (field, field / width as f64);
+            }
+        }
         let expected = [x0 - column as f64 * step_as, y0 - row as f64 * step_as];
         // Places are rounded, but one that is out of order is off by a pixel or more.
         if (x - expected[0]).abs().max((y - expected[1]).abs()) > 0.25 * step_as {
@@ -77,6 +87,11 @@ pub fn parse(bytes: &[u8]) -> Result<Pixels, FileError> {
         ..Pixels::default()
     })
 }
+
+/// Last digit of the field in a heading, arcseconds.
+const ROUNDED_AS: f64 = 1e-6;
+/// That of the places of pixels.
+const PLACE_AS: f64 = 1e-10;
 
 /// Pixels along a side, and its length in arcseconds.
 fn field(text: &str, name: &str) -> Result<(usize, f64), FileError> {
@@ -133,6 +148,20 @@ mod tests {
         assert_eq!(alone.polarized, [None, None, None]);
         let all = parse((HEAD.to_owned() + &lines(" 1 2 3")).as_bytes()).unwrap();
         assert_eq!(all.polarized[2], Some(vec![3.0; 6]));
+    }
+
+    /// A heading rounds a field of 126.6 µas to 127 µas, and pixels of 0.633 µas have exact places.
+    #[test]
+    fn exact_fields_are_those_of_the_pixels() {
+        let head = HEAD.replace("2 pix 0.000004", "200 pix 0.000127");
+        let mut text = head.replace("3 pix 0.000006", "2 pix 0.000001");
+        for k in 0..400u32 {
+            let (x, y) = (63.0 - 0.633 * f64::from(k % 200), 0.3 - 0.633 * f64::from(k / 200));
+            text += &format!("{:15.10} {:15.10} {k}\n", 1e-6 * x, 1e-6 * y);
+        }
+        let pixels = parse(text.as_bytes()).unwrap();
+        assert_eq!(pixels.values[399], 399.0);
+        assert!((pixels.field_uas.unwrap() - 126.6).abs() < 2e-4, "{:?}", pixels.field_uas);
     }
 
     #[test]

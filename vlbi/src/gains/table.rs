@@ -10,7 +10,7 @@ use std::collections::HashMap;
 pub struct StationGain {
     /// Hours of UTC since 0 h of the observation's day.
     pub time_h: f64,
-    /// Duration for which it holds, seconds: half of it before that time, half after.
+    /// Seconds before and after that time for which it holds.
     pub span_s: f64,
     /// Name of the station.
     pub station: String,

@@ -304,7 +304,7 @@ fn of_visibilities(observation: &Observation, path: &str, file: &str) -> anyhow:
         ),
     };
     let mut losses = "[[loss]]\ndata = \"amplitudes\"\nweight = 1.0".to_owned();
-    if has_closures(observation, source.is_some_and(|source| source.uv_min.is_some())) {
+    if has_closures(observation, 300.0, source.is_some_and(|source| source.uv_min.is_some())) {
         losses += "\n[[loss]]\ndata = \"closure-phases\"\nweight = 1.0\nleast_snr = 3.0 #! weaker ones are not Gaussian";
     }
     // Pixels of the region, 8 M deep, with emission 0.02.
@@ -326,9 +326,9 @@ fn of_visibilities(observation: &Observation, path: &str, file: &str) -> anyhow:
 }
 
 /// Returns whether closure phases are left of the rows that the template's fit keeps.
-fn has_closures(observation: &Observation, long_only: bool) -> bool {
+fn has_closures(observation: &Observation, average_s: f64, long_only: bool) -> bool {
     // Averages and the shortest baseline of the template decide what still closes.
-    let settings = VisibilitySettings { average_s: 300.0, uv_min: long_only.then_some(1e8) };
+    let settings = VisibilitySettings { average_s, uv_min: long_only.then_some(1e8) };
     let Ok(mut kept) = setup::prepared(observation.clone(), &settings) else { return false };
     setup::frames_of(&mut kept);
     ClosureTerm::<f64>::new(&kept, ClosureKind::Phase, 3.0).is_ok()

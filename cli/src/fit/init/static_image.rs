@@ -27,7 +27,7 @@ pub fn of_visibilities(
         None => (short, 0.1 * short, "the amplitude of the shortest baselines"),
     };
     let long_only = source.and_then(|source| source.uv_min);
-    let losses = losses(has_closures(observation, long_only.is_some()));
+    let losses = losses(has_closures(observation, average(source), long_only.is_some()));
     let extra = [long_only, source.and_then(|source| source.blur)].into_iter().flatten();
     let mut extra: Vec<String> = extra.map(str::to_owned).collect();
     if source.is_some_and(|source| source.varies) {

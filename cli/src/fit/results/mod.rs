@@ -75,12 +75,12 @@ impl Estimate<'_> {
     ) -> anyhow::Result<(String, Value)> {
         let seen = fit.seen(state)?;
         let movie = fit.pictured(state, &seen)?;
+        // Before verdict and loss, which see the leakage from here on.
+        let leakage = self.leakage(&seen)?;
         let judged = fit.judged(state, &seen, &movie)?;
         let trainer = &mut fit.trainer;
         let volume = recovered(self.file, trainer, state)?;
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
-        // Before the loss, which sees the leakage from here on.
-        let leakage = self.leakage(&seen)?;
         let quiescent = self.quiescent(trainer, state)?;
         let loss = trainer.objective.loss_of(&frames, &seen)?;
         let mask = numbers::mask_error(trainer, state, &seen)?;
