@@ -6,10 +6,10 @@ use crate::memory;
 use npyz::WriterBuilder;
 use std::io::{Chain, Cursor, Read};
 
-/// Brackets of a header: types of fields within fields. Its parser takes twice as long for each more.
-const MOST_BRACKETS: usize = 8;
+/// Brackets within brackets of a header: types of fields within fields. Its parser takes twice as long for each more.
+const MOST_NESTED: usize = 8;
 
-/// Bytes of a header that are looked at.
+/// Bytes of a header, at most.
 const LONGEST: u64 = 1 << 20;
 
 /// The bytes of an array, of which the header was looked at.
@@ -39,7 +39,7 @@ pub fn read_array(bytes: &[u8]) -> Result<(Vec<u64>, Vec<f64>), Error> {
 /// An array, if its header is one that the parser reads in no time.
 ///
 /// # Errors
-/// If the bytes are no array, or the header has more than eight brackets.
+/// If the bytes are no array, or the header is longer than a mebibyte or nested more than eight deep.
 pub fn open<R: Read>(mut bytes: R) -> Result<npyz::NpyFile<Headed<R>>, NumpyError> {
     let not = |error| NumpyError::content(format!("not an npy file: {error}"));
     let mut header = Vec::new();
@@ -52,14 +52,34 @@ pub fn open<R: Read>(mut bytes: R) -> Result<npyz::NpyFile<Headed<R>>, NumpyErro
         [_, _, _, _, _, _, _, _, a, b, c, d] => u64::from(u32::from_le_bytes([a, b, c, d])),
         _ => 0,
     };
-    bytes.by_ref().take(rest.min(LONGEST)).read_to_end(&mut header).map_err(not)?;
-    let brackets = header.iter().skip(10).filter(|byte| **byte == b'[').count();
-    if brackets > MOST_BRACKETS {
+    if rest > LONGEST {
+        let message = format!("a header of {rest} bytes is not read: at most {LONGEST}");
+        return Err(NumpyError::content(message));
+    }
+    bytes.by_ref().take(rest).read_to_end(&mut header).map_err(not)?;
+    let depth = nested(&header[header.len().min(10)..]);
+    if depth > MOST_NESTED {
         let message =
-            format!("a header with {brackets} brackets is not read: at most {MOST_BRACKETS}");
+            format!("a header with brackets {depth} deep is not read: at most {MOST_NESTED}");
         return Err(NumpyError::content(message));
     }
     npyz::NpyFile::new(Cursor::new(header).chain(bytes)).map_err(not)
+}
+
+/// Returns how deep brackets of any kind are nested, outside of strings.
+fn nested(text: &[u8]) -> usize {
+    let (mut depth, mut most, mut string) = (0usize, 0, None);
+    for byte in text {
+        match (string, byte) {
+            (None, b'\'' | b'"') => string = Some(byte),
+            (Some(quote), _) if quote == byte => string = None,
+            (None, b'[' | b'(' | b'{') => depth += 1,
+            (None, b']' | b')' | b'}') => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        most = most.max(depth);
+    }
+    most
 }
 
 /// Values whose first index runs fastest, with the last running fastest.
@@ -212,13 +232,19 @@ mod tests {
     /// A header of 200 brackets would take the parser longer than anybody waits.
     #[test]
     fn exact_nested_headers_are_errors() {
-        let text = format!("{{'descr': {}", "[".repeat(200));
-        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-        bytes.extend((text.len() as u16).to_le_bytes());
-        bytes.extend(text.as_bytes());
-        let error = read_array(&bytes).unwrap_err().to_string();
-        assert!(error.contains("200 brackets"), "{error}");
-        assert!(Stream::new(bytes.as_slice()).is_err());
+        for each in ["[", "(1,", "{1:", "(')',"] {
+            let text = format!("{{'descr': {}", each.repeat(200));
+            let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+            bytes.extend((text.len() as u16).to_le_bytes());
+            bytes.extend(text.as_bytes());
+            let error = read_array(&bytes).unwrap_err().to_string();
+            assert!(error.contains("brackets 201 deep"), "{error}");
+            assert!(Stream::new(bytes.as_slice()).is_err());
+        }
+        // A length of 4 GiB asks for no memory.
+        let long = b"\x93NUMPY\x02\x00\xff\xff\xff\xff{}";
+        let error = read_array(long).unwrap_err().to_string();
+        assert!(error.contains("a header of 4294967295 bytes"), "{error}");
     }
 
     /// Two arrays in one file: the second is not left out silently.
