@@ -2,7 +2,7 @@
 //! light in the primaries of IEC 61966-2-1 (sRGB).
 //!
 //! The observer's functions are the sums of piecewise Gaussians of Wyman, Sloan & Shirley (2013,
-//! Journal of Computer Graphics Techniques 2(2), 1), within about 0.003 of the tabulated ones in
+//! Journal of Computer Graphics Techniques 2(2), 1), within about 0.004 of the tabulated ones in
 //! chromaticity along the Planckian locus.
 
 /// Colours of black bodies of one total intensity, by temperature.

@@ -214,7 +214,9 @@ impl Medium for VolumeModel {
 
     fn cell_size(&self) -> Option<CellSize> {
         let inner = self.region.map_or(0.0, |region| region.r_min);
-        Some(CellSize { size: self.volume.finest(), inner: self.occupied.radii[0].max(inner) })
+        // Falling matter comes nearer than the file has light.
+        let lit = if self.falling().is_some() { 0.0 } else { self.occupied.radii[0] };
+        Some(CellSize { size: self.volume.finest(), inner: lit.max(inner) })
     }
 
     fn quantities(&self) -> Quantities {

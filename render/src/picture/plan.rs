@@ -57,7 +57,7 @@ impl Plan {
     fn rays(&mut self, prepared: &PreparedScene) {
         self.say(Part::Rays, true, how(prepared));
         match prepared.request().half_orbits {
-            Some(n) => self.say(Part::Rays, true, format!("light of the first {n} half-orbits")),
+            Some(n) => self.say(Part::Rays, true, format!("light of images 0 to {n}")),
             None => self.say(Part::Rays, false, "no limit of half-orbits"),
         }
         let carried = "Stokes parameters of all emission, carried by the Walker-Penrose constant; \
@@ -147,7 +147,7 @@ impl Plan {
         self.say(part, true, what);
         let slow = volumes.iter().any(|volume| volume.quantities().time);
         self.either(part, slow, ["emission when the light passed", "one time: no delays"]);
-        let shift = ["g of circles about the axis", "no redshift: no momentum"];
+        let shift = ["g of the matter at each node", "no redshift: no momentum"];
         self.either(part, prepared.has_redshift(), shift);
     }
 

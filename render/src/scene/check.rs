@@ -193,7 +193,10 @@ fn check_polarization(scene: &Scene) -> Result<(), Invalid> {
     let effects = &scene.effects;
     let (key, circular) = ("effects.polarization", effects.circular_polarization_lorentz_factor);
     if !effects.polarization {
-        let unused = if scene.magnetic_field.is_some() { "magnetic_field" } else { key };
+        let unused = match scene.magnetic_field {
+            Some(_) => "magnetic_field",
+            None => "effects.circular_polarization_lorentz_factor",
+        };
         if scene.magnetic_field.is_some() || circular.is_some() {
             let allowed = format!("true with `{unused}`, or without it and what belongs to it");
             return Err(Invalid::new(key, false, allowed));

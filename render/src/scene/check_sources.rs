@@ -40,14 +40,16 @@ const LONGEST_SHEAR: f64 = 2000.0;
 
 pub(super) fn check_spot(spot: &Spot, k: usize, hole: &Kerr, time: f64) -> Result<(), Invalid> {
     let key = |name: &str| format!("spot.{k}.{name}");
-    let least = orbits::photon_orbit(hole).max(3.0);
-    let allowed = format!("a radius above {least:.4}, where circular orbits end");
-    number(key("radius"), spot.radius, spot.radius > least, &allowed)?;
     let norm = spot.axis.iter().map(|x| x * x).sum::<f64>();
     if !(1e-30..=1e30).contains(&norm) {
         let allowed = "three numbers that are not all 0, with a length in [1e-15, 1e15]";
         return Err(Invalid::new(key("axis"), format!("{:?}", spot.axis), allowed));
     }
+    // Matter about another axis meets the component of the spin along it.
+    let along = Kerr::new(hole.spin() * spot.axis[2] / norm.sqrt());
+    let least = along.map_or(3.0, |hole| orbits::photon_orbit(&hole).max(3.0));
+    let allowed = format!("a radius above {least:.4}, where circular orbits end");
+    number(key("radius"), spot.radius, spot.radius > least, &allowed)?;
     number(key("sigma"), spot.sigma, spot.sigma <= spot.radius, "at most the radius")?;
     if let Some(since) = spot.sheared_since {
         let ok = since.is_finite() && time - since <= LONGEST_SHEAR;

@@ -93,6 +93,17 @@ fn values_in_lists_of_tables_are_located() {
     assert!(text.starts_with("line 31: `spot.1.radius` = 1 "), "{text}");
 }
 
+/// The photon orbit against the spin is at 3.91 M for 0.9 (Bardeen, Press & Teukolsky 1972, equation 2.18).
+#[test]
+fn orbits_end_farther_out_against_the_spin() {
+    let old = "radius = 10.0\nphase_deg = 45.0\naxis = [0.0, 1.0, 1.0]";
+    let new = "radius = 3.5\nphase_deg = 45.0";
+    assert!(Scene::parse(&SCENE.replacen(old, new, 1)).is_ok());
+    let text = error(old, &format!("{new}\naxis = [0.0, 0.0, -2.0]"));
+    let expected = "line 31: `spot.1.radius` = 3.5 is not allowed: a radius above 3.9103";
+    assert!(text.starts_with(expected), "{text}");
+}
+
 #[test]
 fn unknown_keys_and_wrong_types_name_the_line() {
     let text = error("spin = 0.9", "spinn = 0.9");

@@ -197,7 +197,16 @@ impl Sum<'_> {
                     line.nodes(medium.sphere(), ray.last_time(), rule, split, columns);
                     let done =
                         self.radiate(m, k, (ray, crossings), (times, number * together), columns);
-                    if done || split >= finest(medium) {
+                    if done {
+                        break;
+                    }
+                    if split >= finest(medium) {
+                        // Panels that are too long have had the light of one time at most.
+                        let each = times.chunks(1).enumerate().filter(|_| times.len() > 1);
+                        for (n, time) in each {
+                            let (rays, place) = ((ray, crossings), number * together + n);
+                            self.radiate(m, k, rays, (time, place), columns);
+                        }
                         break;
                     }
                     split *= 2;

@@ -12,8 +12,9 @@ use kerrlight_geodesic::vector::dot;
 pub struct StarField {
     cells: Cells,
     probability: f64,
-    cos_radius: f64,
     radius: f64,
+    /// 1 − cos of it.
+    versine: f64,
     brightness: f64,
     seed: u64,
 }
@@ -26,8 +27,8 @@ impl StarField {
         StarField {
             cells,
             probability: f64::from(stars.count) / cells.count() as f64,
-            cos_radius: radius.cos(),
             radius,
+            versine: 2.0 * (0.5 * radius).sin().powi(2),
             brightness: stars.brightness,
             seed: stars.seed,
         }
@@ -36,9 +37,10 @@ impl StarField {
     pub(super) fn color(&self, direction: [f64; 3]) -> [f32; 3] {
         let mut color = [0.0; 3];
         self.near(direction, [self.radius; 2], |star| {
-            let cos_distance = dot(direction, star.direction);
-            if cos_distance >= self.cos_radius {
-                let edge = (1.0 - cos_distance) / (1.0 - self.cos_radius);
+            // Half of the squared chord: 1 less a cosine has no digits for tiny stars.
+            let chord = [0, 1, 2].map(|k| direction[k] - star.direction[k]);
+            let edge = 0.5 * dot(chord, chord) / self.versine;
+            if edge <= 1.0 {
                 star.shine((1.0 - edge).powi(2), &mut color);
             }
         });
@@ -49,7 +51,7 @@ impl StarField {
     /// 2π(1 − cos R)/3 times its peak, and the variance, R²/8, of its disc.
     pub(super) fn mean_color(&self, beam: &Beam) -> [f32; 3] {
         let beam = beam.widened(self.radius / 8f64.sqrt());
-        let flux = core::f64::consts::TAU * (1.0 - self.cos_radius) / 3.0;
+        let flux = core::f64::consts::TAU * self.versine / 3.0;
         let peak = flux * beam.peak_density();
         let mut color = [0.0; 3];
         self.near(beam.direction(), beam.reach(), |star| {
@@ -87,7 +89,7 @@ impl StarField {
     /// Directions and fluxes (peak brightness times solid angle, of the green channel) of all
     /// stars.
     pub fn catalogue(&self) -> Vec<([f64; 3], f64)> {
-        let flux = core::f64::consts::TAU * (1.0 - self.cos_radius) / 3.0;
+        let flux = core::f64::consts::TAU * self.versine / 3.0;
         let Cells { rings, sectors } = self.cells;
         let cells = (0..rings).flat_map(|ring| (0..sectors).map(move |k| (ring, k)));
         let stars = cells.filter_map(|(ring, sector)| self.star(ring, sector));
@@ -160,6 +162,19 @@ mod tests {
         let found = (lit[0] + lit[1]) / f64::from(n);
         assert!((found / expected - 1.0).abs() < 0.05, "{found} {expected}");
         assert!((lit[0] / lit[1] - 1.0).abs() < 0.1, "{lit:?}");
+    }
+
+    /// Tiny stars have the flux of a small disc, and shine at their place.
+    #[test]
+    fn exact_tiny_stars_keep_their_light() {
+        for radius_deg in [1e-2, 1e-5, 1e-7, 1e-9] {
+            let field = StarField::new(&Stars { count: 30, radius_deg, brightness: 1.0, seed: 5 });
+            let area = std::f64::consts::PI * radius_deg.to_radians().powi(2) / 3.0;
+            for (direction, flux) in field.catalogue() {
+                let peak = f64::from(field.color(direction)[1]);
+                assert!((flux / (area * peak) - 1.0).abs() < 1e-6, "{radius_deg}: {flux} {peak}");
+            }
+        }
     }
 
     /// Beams that lie side by side mean_color all light of all stars: the sum over a fine net of

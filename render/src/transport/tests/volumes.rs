@@ -156,6 +156,26 @@ fn chord_of_cube(offset: [f64; 3], direction: [f64; 3]) -> f64 {
     (ends[1] - ends[0]).max(0.0)
 }
 
+/// Cells that are too fine for the finest panels shine as much among several times as at one.
+#[test]
+fn exact_fine_cells_far_away_shine_at_all_times() {
+    let scene = scene(&["effects.lensing=false", "effects.redshift=false"]);
+    let (sin, cos) = 70f64.to_radians().sin_cos();
+    let file = volume(64, around([50.0 * sin, 0.0, 50.0 * cos], 0.25), |_| 1.0);
+    let still =
+        VolumeSource { reference_time: None, ..source(Rotation::None, [0.0, 0.0, 1.0], 0.0) };
+    let prepared = prepared(scene, still, file);
+    let seen = |times: &[f64]| -> Vec<f64> {
+        let mut seen = vec![RayResult::default(); times.len()];
+        let scratch = &mut Scratch::default();
+        prepared.observe_block(&[0.03], &[0.02], times, scratch, &mut seen).unwrap();
+        seen.iter().map(|seen| seen.intensity).collect()
+    };
+    let one = seen(&TIMES[..1])[0];
+    assert!(one > 0.2, "{one}");
+    assert_eq!(seen(&TIMES), [one; 3]);
+}
+
 /// Without lensing the picture of a uniform box or ball is its chords: exactly up to the last
 /// cell on either side, whose edge lies somewhere in a panel.
 #[test]

@@ -297,7 +297,9 @@ impl Media {
             // What absorbs does not change: all times have the depths of the first.
             let total = scratch.lights_of(m, seen.number)[first..].first().map_or(0.0, |l| l.depth);
             let depths = &scratch.sums.depths;
-            scratch.profile.set(optics.hole.spin(), nodes, &emission, depths, total);
+            // On straight rays dλ = r² dτ, without the spin's part of Σ.
+            let spin = if optics.lensing { optics.hole.spin() } else { 0.0 };
+            scratch.profile.set(spin, nodes, &emission, depths, total);
         }
         scratch.emission = emission;
         done
