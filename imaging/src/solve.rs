@@ -72,8 +72,7 @@ pub fn solve(
     }
 }
 
-/// The same of a function that returns its value and overwrites its gradient. Where no step along a direction helps, it
-/// begins again along the gradient.
+/// The same of a function that returns its value and overwrites its gradient.
 pub(super) fn minimum(
     mut objective: &mut dyn FnMut(&[f64], &mut [f64]) -> f64,
     start: &[f64],
@@ -91,7 +90,6 @@ pub(super) fn minimum(
         }
         match lbfgs.step(&mut objective, &mut state, &mut parameters) {
             Step::Taken { value, .. } => losses.push(value),
-            Step::NoDescent if state.pairs > 0 => state.pairs = 0,
             Step::NoDescent | Step::NotFinite => break,
         }
         let before = losses.len().checked_sub(SPAN + 1).map(|k| losses[k]);

@@ -176,7 +176,14 @@ impl Lbfgs {
         let wolfe = Wolfe { decrease: 1e-4, curvature: 0.9, evaluations: self.evaluations };
         let start = Point { length: 0.0, value, slope };
         let found = if slope < 0.0 { wolfe.search(start, first, evaluate) } else { None };
-        let Some(at) = found else { return Step::NoDescent };
+        let Some(at) = found else {
+            if state.pairs == 0 {
+                return Step::NoDescent;
+            }
+            // Pairs that no longer fit may be why no step helps: once more along the gradient.
+            state.pairs = 0;
+            return self.step(objective, state, parameters);
+        };
         // The step as it was rounded, not as it was meant: the gradients are those of its two ends.
         direction.iter_mut().zip(&trial).zip(&*parameters).for_each(|((d, t), p)| *d = *t - *p);
         gradient.iter_mut().zip(&trial_gradient).for_each(|(g, t)| *g = *t - *g);
