@@ -1,6 +1,6 @@
 //! `kerrlight convert`: visibilities from one format to another.
 
-use crate::answer::{self, Answer};
+use crate::answer::Answer;
 use crate::interferometry::arguments;
 use crate::interferometry::{self, ObservationFile, Written};
 use crate::output::{self, Output};
@@ -204,7 +204,7 @@ impl Convert {
         output.write((comments + &files::light_curve_to_csv(&curve)).as_bytes())?;
         let count = curve.samples.len();
         eprintln!("{count} samples");
-        Ok(written(&output).with("samples", count))
+        Ok(interferometry::written(&output).with("samples", count))
     }
 
     /// Returns whether standard output carries the visibilities.
@@ -301,11 +301,4 @@ fn told(error: anyhow::Error) -> anyhow::Error {
         }
         _ => error,
     }
-}
-
-/// The answer of a table that was written.
-fn written(output: &Output) -> Answer {
-    let files = answer::written([output]);
-    let text: String = files.iter().map(|file| format!("{}\n", file.display())).collect();
-    Answer::text(text).files(files)
 }

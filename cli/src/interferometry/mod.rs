@@ -114,8 +114,13 @@ impl ObservationFile {
 
     /// Describes the file once it is written.
     pub fn answer(&self) -> Answer {
-        let files = answer::written([&self.output]);
-        let text: String = files.iter().map(|file| format!("{}\n", file.display())).collect();
-        Answer::text(text).files(files)
+        written(&self.output)
     }
+}
+
+/// Describes a table that was written.
+pub fn written(output: &Output) -> Answer {
+    let files = answer::written([output]);
+    let text: String = files.iter().map(|file| format!("{}\n", file.display())).collect();
+    Answer::text(text).files(files)
 }

@@ -36,11 +36,7 @@ fn starlit(prepared: &PreparedScene, _: bool) -> bool {
     prepared.sky().is_some()
 }
 
-fn repeated(prepared: &PreparedScene, _: bool) -> bool {
-    prepared.has_sources() && prepared.has_lensing()
-}
-
-fn moving(prepared: &PreparedScene, _: bool) -> bool {
+fn bent(prepared: &PreparedScene, _: bool) -> bool {
     prepared.has_sources() && prepared.has_lensing()
 }
 
@@ -66,19 +62,19 @@ pub static REQUESTED: [ChannelKind; 25] = [
     channel("sky.R", "scene unit", SKY, starlit, |l| f64::from(l.mixed.sky[0])),
     channel("sky.G", "scene unit", SKY, starlit, |l| f64::from(l.mixed.sky[1])),
     channel("sky.B", "scene unit", SKY, starlit, |l| f64::from(l.mixed.sky[2])),
-    channel("n0.R", "scene unit", DIRECT, repeated, |l| f64::from(l.mixed.orders[0][0])),
-    channel("n0.G", "scene unit", DIRECT, repeated, |l| f64::from(l.mixed.orders[0][1])),
-    channel("n0.B", "scene unit", DIRECT, repeated, |l| f64::from(l.mixed.orders[0][2])),
-    channel("n1.R", "scene unit", FIRST, repeated, |l| f64::from(l.mixed.orders[1][0])),
-    channel("n1.G", "scene unit", FIRST, repeated, |l| f64::from(l.mixed.orders[1][1])),
-    channel("n1.B", "scene unit", FIRST, repeated, |l| f64::from(l.mixed.orders[1][2])),
-    channel("n2.R", "scene unit", HIGHER, repeated, |l| f64::from(l.mixed.orders[2][0])),
-    channel("n2.G", "scene unit", HIGHER, repeated, |l| f64::from(l.mixed.orders[2][1])),
-    channel("n2.B", "scene unit", HIGHER, repeated, |l| f64::from(l.mixed.orders[2][2])),
+    channel("n0.R", "scene unit", DIRECT, bent, |l| f64::from(l.mixed.orders[0][0])),
+    channel("n0.G", "scene unit", DIRECT, bent, |l| f64::from(l.mixed.orders[0][1])),
+    channel("n0.B", "scene unit", DIRECT, bent, |l| f64::from(l.mixed.orders[0][2])),
+    channel("n1.R", "scene unit", FIRST, bent, |l| f64::from(l.mixed.orders[1][0])),
+    channel("n1.G", "scene unit", FIRST, bent, |l| f64::from(l.mixed.orders[1][1])),
+    channel("n1.B", "scene unit", FIRST, bent, |l| f64::from(l.mixed.orders[1][2])),
+    channel("n2.R", "scene unit", HIGHER, bent, |l| f64::from(l.mixed.orders[2][0])),
+    channel("n2.G", "scene unit", HIGHER, bent, |l| f64::from(l.mixed.orders[2][1])),
+    channel("n2.B", "scene unit", HIGHER, bent, |l| f64::from(l.mixed.orders[2][2])),
     channel("st.u", "", ST_U, always, |l| l.st()[0]),
     channel("st.v", "", ST_V, always, |l| l.st()[1]),
     channel("st.a", "", ST_A, always, |l| l.st()[2]),
     channel("footprint", "sr", FOOTPRINT, lensed, |l| l.footprint),
-    channel("motion.u", "pixels/M", MOTION_U, moving, |l| l.motion[0]),
-    channel("motion.v", "pixels/M", MOTION_V, moving, |l| l.motion[1]),
+    channel("motion.u", "pixels/M", MOTION_U, bent, |l| l.motion[0]),
+    channel("motion.v", "pixels/M", MOTION_V, bent, |l| l.motion[1]),
 ];

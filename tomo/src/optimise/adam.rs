@@ -1,6 +1,5 @@
 //! Adam (Kingma & Ba 2015, arXiv:1412.6980, algorithm 1).
 
-use crate::Error;
 use kerrlight_common::simd::{Float, InstructionSet, Lanes, Task, dispatch};
 use rayon::prelude::*;
 
@@ -56,21 +55,6 @@ impl<T: Float> AdamState<T> {
 const SHARE: usize = 16_384;
 
 impl Adam {
-    /// Itself, if its numbers are in their ranges.
-    ///
-    /// # Errors
-    /// Names the number that is not.
-    pub fn checked(self) -> Result<Self, Error> {
-        for (field, value) in [("beta1", self.beta1), ("beta2", self.beta2)] {
-            if !(0.0..1.0).contains(&value) {
-                return Err(Error::out_of_range(field, value, "0 ≤ β < 1"));
-            }
-        }
-        let ok = self.epsilon.is_finite() && self.epsilon > 0.0;
-        let allowed = "above 0";
-        if ok { Ok(self) } else { Err(Error::out_of_range("epsilon", self.epsilon, allowed)) }
-    }
-
     /// One step with learning rate `rate` (in units of the parameters), by all threads.
     ///
     /// # Panics

@@ -142,6 +142,6 @@ impl Problem {
     ) -> Result<Objective<f32>, Error> {
         let pixels = self.settings.screen.pixels * self.settings.screen.pixels;
         let data = measured.terms(&self.settings.loss, pixels)?;
-        Ok(Objective { model: setup::forward_model(instrument, motion)?, data })
+        Ok(Objective { model: instrument.forward(motion)?, data })
     }
 }

@@ -19,13 +19,12 @@ pub fn parse(bytes: &[u8]) -> Result<Pixels, FileError> {
     let text = core::str::from_utf8(bytes)
         .map_err(|error| FileError::whole(format!("not UTF-8 text: {error}")))?;
     let [(width, wide_as), (height, high_as)] = [field(text, "FOVX:")?, field(text, "FOVY:")?];
-    let mut wide_as = wide_as;
-    let mut step_as = wide_as / width as f64;
+    let mut places = Places { width, wide_as, first: None };
+    let step_as = places.step_as();
     if (high_as / height as f64 - step_as).abs() > 1e-3 * step_as + ROUNDED_AS / height as f64 {
         return Err(FileError::whole("FOVX and FOVY are not those of square pixels"));
     }
     let mut planes: Vec<Vec<f64>> = Vec::new();
-    let mut last = None;
     let lines = (1..).zip(text.lines().map(str::trim));
     for (line, text) in lines.filter(|(_, text)| !text.is_empty() && !text.starts_with('#')) {
         let wrong = |message: String| FileError::line(line, message);
@@ -46,27 +45,7 @@ pub fn parse(bytes: &[u8]) -> Result<Pixels, FileError> {
                 "{count} numbers: 3 (x, y, I), 5 (Q, U) or 6 (V) in every line"
             )));
         }
-        let place = planes[0].len();
-        let (column, row) = (place % width, place / width);
-        let (x0, y0) = *last.get_or_insert((*x, *y));
-        // eht-imaging rounds the field to a microarcsecond, which over many pixels may be more than one of them, and places to 1e-10
-        // arcseconds.
-        if row == 0 && column > 0 {
-            let field = (x0 - x) / column as f64 * width as f64;
-            let apart = (field - wide_as).abs();
-            if apart > 3.0 * PLACE_AS * width as f64 && apart < 1e-3 * wide_as + ROUNDED_AS {
-                (wide_as, step_as) = (field, field / width as f64);
-            }
-        }
-        let expected = [x0 - column as f64 * step_as, y0 - row as f64 * step_as];
-        // Places are rounded, but one that is out of order is off by a pixel or more.
-        if (x - expected[0]).abs().max((y - expected[1]).abs()) > 0.25 * step_as {
-            let message = format!(
-                "x = {x}, y = {y}, where {:.10}, {:.10} is expected: rows from the north, each from the east, as FOVX and FOVY say",
-                expected[0], expected[1]
-            );
-            return Err(wrong(message));
-        }
+        places.check(planes[0].len(), *x, *y).map_err(wrong)?;
         planes.iter_mut().zip(stokes).for_each(|(plane, value)| plane.push(*value));
     }
     let found = planes.first().map_or(0, Vec::len);
@@ -83,9 +62,49 @@ pub fn parse(bytes: &[u8]) -> Result<Pixels, FileError> {
         height,
         values,
         polarized,
-        field_uas: Some(wide_as * 1e6),
+        field_uas: Some(places.wide_as * 1e6),
         ..Pixels::default()
     })
+}
+
+/// Places of the pixels, rows from the north, each from the east.
+struct Places {
+    /// Pixels of a row.
+    width: usize,
+    /// Their field, arcseconds.
+    wide_as: f64,
+    first: Option<[f64; 2]>,
+}
+
+impl Places {
+    fn step_as(&self) -> f64 {
+        self.wide_as / self.width as f64
+    }
+
+    /// Explains why a place is not that of the next pixel. The first row tells the field.
+    fn check(&mut self, pixel: usize, x: f64, y: f64) -> Result<(), String> {
+        let (column, row) = (pixel % self.width, pixel / self.width);
+        let [x0, y0] = *self.first.get_or_insert([x, y]);
+        // eht-imaging rounds the field to a microarcsecond, which over many pixels may be more than one of them, and places to
+        // 1e-10 arcseconds.
+        if row == 0 && column > 0 {
+            let field = (x0 - x) / column as f64 * self.width as f64;
+            let apart = (field - self.wide_as).abs();
+            let is_rounded = apart < 1e-3 * self.wide_as + ROUNDED_AS;
+            if is_rounded && apart > 3.0 * PLACE_AS * self.width as f64 {
+                self.wide_as = field;
+            }
+        }
+        let step_as = self.step_as();
+        let [right, down] = [x0 - column as f64 * step_as, y0 - row as f64 * step_as];
+        // Places are rounded, but one that is out of order is off by a pixel or more.
+        match (x - right).abs().max((y - down).abs()) > 0.25 * step_as {
+            true => Err(format!(
+                "x = {x}, y = {y}, where {right:.10}, {down:.10} is expected: rows from the north, each from the east, as FOVX and FOVY say"
+            )),
+            false => Ok(()),
+        }
+    }
 }
 
 /// Last digit of the field in a heading, arcseconds.

@@ -112,11 +112,10 @@ fn scan(time_h: f64, baselines: &[Baseline], kind: ClosureKind) -> ClosureSet {
     stations.sort_unstable();
     stations.dedup();
     let find = |a: u16, b: u16| index.get(&[a.min(b), a.max(b)]).copied();
-    let mut closures = match kind {
+    let closures = match kind {
         ClosureKind::Phase => choose(triangles(&stations, find), baselines, kind),
         ClosureKind::LogAmplitude => choose(quadrangles(&stations, find), baselines, kind),
     };
-    closures.sort_by(|a, b| a.noise_sigma.total_cmp(&b.noise_sigma));
     let variance: HashMap<usize, f64> =
         baselines.iter().map(|b| (b.visibility, b.variance())).collect();
     let shared = |a: &Closure, b: &Closure| -> f64 {

@@ -54,7 +54,7 @@ pub fn draw(
     let Through { file, instrument, motion, registry, .. } = *through;
     let pixels = file.screen.pixels * file.screen.pixels;
     let data = measured.terms(&file.loss, pixels)?;
-    let objective = Objective { model: setup::forward_model(instrument, motion)?, data };
+    let objective = Objective { model: instrument.forward(motion)?, data };
     let times = setup::emission_times(instrument, motion);
     let representation = setup::representation(file, registry, times)?;
     let (axis, rate) = setup::axis(file)?;
@@ -81,7 +81,7 @@ fn predicted(through: &Through<'_>, movie: &Frames<f32>) -> anyhow::Result<Vec<C
     let pixels = file.screen.pixels * file.screen.pixels;
     // The data as they were measured: those that were fitted have noise once more.
     let data = measured.terms(&file.loss, pixels)?;
-    let objective = Objective { model: setup::forward_model(instrument, motion)?, data };
+    let objective = Objective { model: instrument.forward(motion)?, data };
     let compared = (objective.names(), objective.statistics(movie)?);
     let evidence = Evidence { file: Some(file), losses: &file.loss, seed: file.seed, measured };
     let of = |(data, tested): &(String, Tested)| {

@@ -183,16 +183,16 @@ impl Lower {
         let mut all = Vec::new();
         for (set, values) in sets.column_iter().enumerate() {
             let chi2 = values.norm_squared();
-            let products = [values.dot(&direction), values.dot(&emission)];
+            let product = values.dot(&direction);
             for mean in means {
                 let strength = self.power * mean * mean;
                 // (C + s uuᵀ)⁻¹ by Sherman & Morrison, and det (C + s uuᵀ) = `more` det C.
                 let more = 1.0 + strength * square;
-                let form = chi2 - strength * products[0] * products[0] / more;
+                let form = chi2 - strength * product * product / more;
                 // All emission given the data: its covariance with them is this column times the power.
                 let with = emission + direction * (mean * mean * total[1]);
                 let along = with.dot(&direction) * strength / more;
-                let expected = self.power * (with.dot(&values) - along * products[0]);
+                let expected = self.power * (with.dot(&values) - along * product);
                 let seen = with.norm_squared() - along * with.dot(&direction);
                 let own = total[0] + (mean * total[1]).powi(2);
                 let variance = self.power * (own - self.power * seen);

@@ -8,7 +8,6 @@ use super::state::Progress;
 use crate::Error;
 use crate::fit::forward::occupancy::Occupancy;
 use crate::fit::loss::objective::{Loss, Objective};
-use crate::fit::loss::selection::Selection;
 use crate::optimise::Adam;
 use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::Axis;
@@ -25,16 +24,6 @@ pub enum Drawn {
     Pixels(Vec<(u32, u32)>),
     /// Whole frames, of all data.
     Frames(Vec<usize>),
-}
-
-impl Drawn {
-    /// The same, borrowed.
-    pub fn selection(&self) -> Selection<'_> {
-        match self {
-            Self::Pixels(pairs) => Selection::Pixels(pairs),
-            Self::Frames(frames) => Selection::Frames(frames),
-        }
-    }
 }
 
 /// Some steps in a row, of which the settings are the same.

@@ -8,18 +8,3 @@ pub enum Selection<'a> {
     /// Whole frames, of all data.
     Frames(&'a [usize]),
 }
-
-impl Selection<'_> {
-    /// Returns the number of pairs or frames.
-    pub fn len(&self) -> usize {
-        match self {
-            Self::Pixels(pairs) => pairs.len(),
-            Self::Frames(frames) => frames.len(),
-        }
-    }
-
-    /// Returns whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-}

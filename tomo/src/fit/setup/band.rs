@@ -3,14 +3,14 @@
 mod background;
 mod kept;
 
-use super::{Curve, FitData, Instrument, Result, axis, forward_model, hours_per_m, motion};
+use super::{Curve, FitData, Instrument, Result, axis, hours_per_m, motion};
 use crate::fit::band::{
     Band, BandPrior, CurveRows, Interval, PolarGrid, Sampling, UNLIKELY, Weighed, evidence, places,
     together, validation, without_flare,
 };
 use crate::fit::journal::{self, Journal};
 use crate::fit::settings::{BandSettings, FitError, FitFile, refuse};
-use crate::fit::{FluxDatum, Motion};
+use crate::fit::{FluxDatum, ForwardModel, Motion};
 use background::{backgrounds, expected};
 use kerrlight_render::dynamics::AngularVelocity;
 use kerrlight_render::polarization::StokesParameter;
@@ -336,8 +336,8 @@ fn rows(
 ) -> Result<CurveRows> {
     let file = in_band_geometry(file, flow.inclination_deg);
     let instrument = Instrument::new(&file)?;
-    let mut model =
-        forward_model(&instrument, &band_motion(&file, measured, flow.rotation_factor)?)?;
+    let mut model: ForwardModel<f32> =
+        instrument.forward(&band_motion(&file, measured, flow.rotation_factor)?)?;
     let axis = axis(&file)?.0;
     model.weigh(axis);
     let scale = |datum: &Option<[f64; 2]>| datum.map_or(0.0, |[_, sigma]| 1.0 / sigma);

@@ -1,7 +1,7 @@
 //! Coarse views of searches: fewer pixels and nodes, or other ones.
 
 use super::linear_problem::terms;
-use super::{FitData, Instrument, Result, forward_model, linear, priors, sky, spacing};
+use super::{FitData, Instrument, Result, linear, priors, sky, spacing};
 use crate::fit::scan::AxisProblem;
 use crate::fit::settings::{FitFile, LossKind, Region, Screen, WidthOf};
 use crate::fit::{Motion, Objective, Sampling};
@@ -96,7 +96,7 @@ impl CoarseView {
     ) -> Result<R> {
         let file = &self.file;
         let settings = linear(file)?;
-        let model = forward_model(&self.instrument, motion)?;
+        let model = self.instrument.forward(motion)?;
         let count = file.screen.pixels * file.screen.pixels;
         let objective = Objective { model, data: self.measured.terms(&file.loss, count)? };
         let all = objective.observed();

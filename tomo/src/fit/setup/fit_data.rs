@@ -73,20 +73,6 @@ impl FitData {
 
     /// The data alone.
     pub fn without_truth(&self) -> Self {
-        Self {
-            times: self.times.clone(),
-            files: self.files.clone(),
-            movie: self.movie.clone(),
-            visibilities: self.visibilities.clone(),
-            has_intrinsic_variability: self.has_intrinsic_variability,
-            curve: self.curve.clone(),
-            sky: self.sky,
-            pulse: self.pulse,
-            gains: self.gains.clone(),
-            leakage: self.leakage.clone(),
-            truth: None,
-            true_gains: None,
-            true_leakage: None,
-        }
+        Self { truth: None, true_gains: None, true_leakage: None, ..self.clone() }
     }
 }

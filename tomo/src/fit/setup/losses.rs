@@ -2,11 +2,10 @@
 
 use super::imported::FILE;
 use super::polarized::images;
-use super::{FitData, Instrument, Result};
+use super::{FitData, Result};
 use crate::fit::settings::{FitError, Loss, LossKind, Within, refuse};
 use crate::fit::{
-    Data, ForwardModel, FrameTerm, ImageTerm, IntensityTerm, LightCurveTerm, Motion, Scan,
-    ScanTerm, Weighted,
+    Data, FrameTerm, ImageTerm, IntensityTerm, LightCurveTerm, Scan, ScanTerm, Weighted,
 };
 use kerrlight_common::frames::Frames;
 use kerrlight_common::memory;
@@ -226,11 +225,3 @@ type ScanData<T> = Box<dyn DataTerm<T> + Send>;
 
 /// Exponentials of a frame up to this many bytes are kept.
 const MEMORY: usize = 8 << 20;
-
-/// The forward model of a fit, in single precision.
-///
-/// # Errors
-/// If the motion is out of range.
-pub fn forward_model(instrument: &Instrument, motion: &Motion) -> Result<ForwardModel<f32>> {
-    instrument.forward(motion)
-}

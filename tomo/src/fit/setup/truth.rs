@@ -98,7 +98,7 @@ impl Truth {
             spot.amplitude * shines * (-0.5 * offset * offset).exp()
         };
         let of_spots: f64 = self.spots.iter().map(light).sum();
-        let of_glyphs = self.glyphs.iter().map(|glyph| glyph.at(reference, 0.0)).sum::<f64>();
+        let of_glyphs = self.glyphs.iter().map(|glyph| glyph.at(reference)).sum::<f64>();
         let of_field = self.field.as_ref().map_or(0.0, |field| field.at(reference));
         self.scale * (of_spots + of_glyphs + of_field)
     }

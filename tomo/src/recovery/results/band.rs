@@ -107,19 +107,20 @@ impl BandResults {
             None => None,
         };
         let axis_z = file.motion.axis.map_or(1.0, |axis| axis[2]);
+        let (radii, periods) = (radii(scan), periods(scan));
         Ok(Self {
             inclination_deg: median(&inclinations, Some(best.inclination_deg)),
             inclinations,
             rotation_factor: probabilities(|geometry| geometry.rotation_factor),
             position_angle_deg: probabilities(|geometry| geometry.position_angle_deg),
             clockwise: Some(clockwise(scan, axis_z)),
-            radius: median(&radii(scan), Some(best.band.radius)),
-            radii: radii(scan),
+            radius: median(&radii, Some(best.band.radius)),
+            radii,
             band: best.band,
             emission_radius: scan.radius,
             azimuth_deg: azimuth(scan.azimuth),
-            period_min: median(&periods(scan), None),
-            periods: binned(&periods(scan), BINS),
+            period_min: median(&periods, None),
+            periods: binned(&periods, BINS),
             ln_bayes_factor: Some(scan.ln_bayes_factor),
             background: scan.background.is_some().then_some(best.band.background),
             background_jy: scan.background.clone(),

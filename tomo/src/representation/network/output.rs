@@ -73,7 +73,6 @@ impl<T: Float> Task<T> for OutputBackward<'_, T> {
             self.weights.chunks_exact(V::LANES).zip(self.gradient.chunks_exact_mut(V::LANES));
         for (b, (weights, gradient)) in blocks.enumerate() {
             let columns = b * V::LANES..(b + 1) * V::LANES;
-            let writes = columns.end <= self.output.stride;
             let w = V::load_or(weights, T::zero());
             let mut sum = V::load_or(gradient, T::zero());
             let rows = self.input.numbers.chunks(self.input.stride);
@@ -82,10 +81,8 @@ impl<T: Float> Task<T> for OutputBackward<'_, T> {
                 let x = V::splat(*x);
                 let h = V::load_or(&row[columns.clone()], T::zero());
                 sum = x.mul_add(h, sum);
-                if writes {
-                    let masked = V::select(zero.lt(h), x * w, zero);
-                    masked.store(&mut output[columns.clone()]);
-                }
+                let masked = V::select(zero.lt(h), x * w, zero);
+                masked.store(&mut output[columns.clone()]);
             }
             sum.store(gradient);
         }

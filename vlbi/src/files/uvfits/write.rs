@@ -67,10 +67,6 @@ pub fn write(observation: &Observation) -> Result<Vec<u8>, Error> {
     if observation.rows.is_empty() {
         return Err(FileError::whole("there are no visibilities to write").into());
     }
-    if let Some(value) = observation.rows.iter().find_map(too_large) {
-        let message = format!("a visibility of {value:e} Jy: UVFITS holds numbers up to 3.4e38");
-        return Err(FileError::whole(message).into());
-    }
     let ordered = |row: &Row| row.stations[0] < row.stations[1];
     let sorted = observation.rows.is_sorted_by(|a, b| a.time_h <= b.time_h);
     if several || !sorted || !observation.rows.iter().all(ordered) {
@@ -199,13 +195,6 @@ fn group_bytes(groups: &[&[Row]], w_seconds: &[f64], facts: &Facts) -> Vec<u8> {
         }
     }
     padded(bytes, 0)
-}
-
-/// A part of a visibility that single precision does not hold.
-fn too_large(row: &Row) -> Option<f64> {
-    let parts =
-        (0..4).filter_map(|k| row.product(k)).flat_map(|m| [m.visibility.re, m.visibility.im]);
-    parts.into_iter().find(|part| part.is_finite() && (*part as f32).is_infinite())
 }
 
 /// Real part, imaginary part, weight 1/σ²; all 0 where there is none.

@@ -18,7 +18,7 @@ fn of_truth(changes: &[&str], scale: f32) -> DataVerdict {
     let measured = data::measure(&file, &instrument, Path::new(".")).unwrap();
     let motion = setup::motion(&file, measured.times.clone()).unwrap();
     let data = measured.terms(&file.loss, 400).unwrap();
-    let objective = Objective { model: setup::forward_model(&instrument, &motion).unwrap(), data };
+    let objective = Objective { model: instrument.forward(&motion).unwrap(), data };
     let scaled = |image: &[f64]| image.iter().map(|x| scale * *x as f32).collect();
     let movie = measured.movie.as_ref().unwrap().mapped(400, scaled).unwrap();
     let evidence =

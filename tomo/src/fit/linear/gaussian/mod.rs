@@ -81,11 +81,6 @@ impl GaussianField {
         Ok(Self { law, shape, spread, amplitudes, center })
     }
 
-    /// Its law.
-    pub fn law(&self) -> Matern {
-        self.law
-    }
-
     /// Number of nodes.
     pub fn count(&self) -> usize {
         self.spread.len()

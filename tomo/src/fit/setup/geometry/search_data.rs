@@ -9,7 +9,7 @@ use crate::fit::settings::{
 };
 use crate::fit::setup::linear_problem::terms;
 use crate::fit::setup::{
-    CoarseView, FitData, Result, change, emission_times, forward_model, linear, motion, priors,
+    CoarseView, FitData, Result, change, emission_times, linear, motion, priors,
 };
 use crate::fit::{Objective, Weighted as Imaged};
 use kerrlight_vlbi::operator::Pulse;
@@ -93,7 +93,7 @@ impl SearchData {
         let plain = motion(file, measured.times.clone())?;
         let count = file.screen.pixels * file.screen.pixels;
         let data = measured.terms(&file.loss, count)?;
-        let objective = Objective { model: forward_model(instrument, &plain)?, data };
+        let objective = Objective { model: instrument.forward(&plain)?, data };
         let all = objective.observed();
         let frames: Vec<usize> =
             all.iter().copied().step_by((all.len() / self.frames).max(1)).collect();
