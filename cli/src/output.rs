@@ -15,7 +15,8 @@ use std::cell::RefCell;
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError, TryLockError};
+use std::time::Duration;
 
 /// A file to be written, checked before any work is done for it.
 #[derive(Debug, Clone)]
@@ -211,8 +212,16 @@ impl Drop for Unfinished {
 
 /// Removes what is being written, before the program ends in the middle of it.
 pub fn remove_unfinished() {
-    let all = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
-    for path in all.iter() {
+    // A thread that has run out of memory while it holds the lock would wait for itself.
+    let held = (0..100).find_map(|_| match UNFINISHED.try_lock() {
+        Ok(all) => Some(all),
+        Err(TryLockError::Poisoned(error)) => Some(error.into_inner()),
+        Err(TryLockError::WouldBlock) => {
+            std::thread::sleep(Duration::from_millis(1));
+            None
+        }
+    });
+    for path in held.iter().flat_map(|all| all.iter()) {
         // It may have been moved to its place.
         let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
     }

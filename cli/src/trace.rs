@@ -125,7 +125,9 @@ impl Trace {
         let name = self.rays.display().to_string();
         let table = Table::parse(&self.read()?).with_context(|| name.clone())?;
         let request = self.request();
-        let each = 4 * u32::from(self.crossings) + 5 * self.samples;
+        let numbers = 5 + 2 * u32::from(self.momentum) + u32::from(self.weights);
+        let samples = numbers.saturating_mul(self.samples).saturating_mul(self.pieces());
+        let each = samples.saturating_add(4 * u32::from(self.crossings));
         let what = || format!("{} rays with {each} numbers each", table.rays.len());
         memory::afford(what, memory::table(table.rays.len() as f64, f64::from(each)))?;
         let blocks = table.blocks();
@@ -144,6 +146,11 @@ impl Trace {
     /// Returns whether standard output carries the table because `-o -` says so.
     pub fn pipes(&self) -> bool {
         self.output.as_deref().is_some_and(output::is_pipe)
+    }
+
+    /// Pieces of a ray on which its samples lie: one that turns round passes between two radii twice.
+    fn pieces(&self) -> u32 {
+        if self.between.is_some() { 2 } else { 1 }
     }
 
     fn request(&self) -> Request {
@@ -241,9 +248,7 @@ impl Trace {
         // θ is π/2 at every crossing.
         groups.push(crossings.into_iter().filter(|column| column.name() != "theta").collect());
         if self.samples > 0 {
-            // A ray that turns round passes between the radii twice.
-            let pieces = if self.between.is_some() { 2 } else { 1 };
-            let width = self.samples as usize * pieces;
+            let width = self.samples as usize * self.pieces() as usize;
             groups.push(points(traced, width, "sample_", |b| &b.samples));
         }
         if self.errors {

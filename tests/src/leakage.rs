@@ -32,14 +32,14 @@ fn exact_leakage_is_found_beside_emission_that_changes() {
     let scene = root().join("scenes/fits/polarized_flare.toml").display().to_string();
     let mut words = vec!["fit", &scene, "-o", "run"];
     let changes = [
-        "screen.pixels=16",
-        "simulation.observation.scans=6",
-        "instrument.leakage.rounds=2",
+        "screen.pixels=24",
+        "simulation.observation.scans=12",
+        "instrument.leakage.rounds=4",
         "change={allowed='any',weight=0.01,spacing=40.0}",
         "representation.kind=grid",
-        "representation.grid={nodes=16}",
-        "training.start={linear={nodes=12,stride=1,steps=10,iterations=10}}",
-        "training.steps=5",
+        "representation.grid={nodes=20}",
+        "training.start={linear={nodes=20,stride=1,steps=400,iterations=40}}",
+        "training.steps=60",
         "linear.rounds=1",
     ];
     changes.iter().for_each(|change| words.extend(["--set", change]));

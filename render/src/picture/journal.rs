@@ -119,7 +119,7 @@ impl<F: Read + Write + Seek + ?Sized> Journal<F> {
     /// earlier one.
     ///
     /// # Errors
-    /// On a failure to write; what was there before stays.
+    /// On a failure to write; the band is then missing, all others stay.
     pub(super) fn append(&mut self, band: usize, tally: Tally, bytes: &[u8]) -> Result<()> {
         let too_large = || Error::new(ErrorKind::InvalidInput, "a band is too large");
         let size = u32::try_from(bytes.len()).ok().filter(|size| *size <= LARGEST_RECORD);

@@ -106,8 +106,8 @@ impl<T> Groups<'_, T> {
 /// rayon pool.
 ///
 /// Results do not depend on the number of threads, to the last bit; a point's value and its
-/// gradient with respect to the coordinates do not depend on its batch either. Nothing is
-/// allocated once the workspace has seen a batch of the size.
+/// gradient with respect to the coordinates do not depend on its batch either. Fields that do not
+/// change allocate nothing once the workspace has seen a batch of the size.
 ///
 /// Lengths that do not fit together are bugs and panic.
 ///

@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector};
 pub struct Weighed {
     /// ln of the mean probability over all combinations, up to what is the same for all geometries.
     pub ln_evidence: f64,
-    /// The same for each of the radii.
+    /// The part of it of each radius, of which only ratios mean anything.
     pub by_radius: Vec<f64>,
     /// The most probable combination.
     pub best: Band,

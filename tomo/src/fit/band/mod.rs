@@ -46,7 +46,7 @@ pub struct BandPrior {
 }
 
 impl BandPrior {
-    /// Powers of amplitudes over two orders of magnitude to both sides, and means up to twice the field's deviation;
+    /// Powers of amplitudes from 0.03 to 30, and means up to twice the field's deviation;
     /// nothing else shines.
     pub fn usual(radii: Vec<f64>, widths: Vec<f64>, lengths: Vec<f64>, height: f64) -> Self {
         let powers = [0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0].to_vec();

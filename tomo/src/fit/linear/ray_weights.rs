@@ -134,7 +134,7 @@ impl<T: Float> Geometry<T> {
 pub(super) struct Walk<'a, T> {
     pub model: &'a ForwardModel<T>,
     pub voxels: Voxels,
-    knots: Knots,
+    pub knots: Knots,
     axis: Axis,
     geometry: Geometry<T>,
     /// Least and largest delay of a node.

@@ -45,7 +45,10 @@ impl<'a, T: Float + Default> Operator<'a, T> {
     /// Bytes that the rows of a frame take, about: a bound where that fits for all of these, otherwise those of the first.
     fn largest(&self, frames: &[usize], room: usize) -> usize {
         let points = self.walk.model.points() * self.corners.len();
-        let bound = points.saturating_mul(size_of::<T>() + 4);
+        // A node is in a row of each Stokes parameter; births of every knot before it reach it.
+        let images = self.walk.model.planes.as_ref().map_or(1, |planes| planes.count);
+        let times = images * self.walk.knots.count;
+        let bound = points.saturating_mul(times).saturating_mul(size_of::<T>() + 4);
         // A frame is measured by making its rows: not where even the bound fits.
         if bound.saturating_mul(GROWTH * frames.len()) <= room {
             return bound;

@@ -57,7 +57,7 @@ pub struct AxisSettings {
     pub candidates: usize,
     /// Effort of the solutions of the refinement.
     pub fine: Effort,
-    /// Times that the step of the refinement is halved; it begins with the distance of lattice points, √(4π/directions).
+    /// Times that the step of the refinement is halved; it begins with half the distance of lattice points, √(4π/directions).
     pub halvings: usize,
 }
 

@@ -89,7 +89,7 @@ pub struct Trial {
 pub(super) struct Sure {
     /// The best one.
     pub geometry: Geometry,
-    /// Its errors; none if the data leave a parameter open.
+    /// Its errors; none if no quadratic form describes the values around.
     pub spread: Option<Spread>,
     /// χ²/N there, times what χ² is multiplied by.
     pub reduced_chi2: f64,

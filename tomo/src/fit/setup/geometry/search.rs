@@ -18,7 +18,7 @@ use rayon::prelude::*;
 pub struct FoundGeometry {
     /// The best geometry.
     pub geometry: Geometry,
-    /// Errors; none if the data leave a parameter open.
+    /// Errors; none if no quadratic form describes the values around it.
     pub spread: Option<Spread>,
     /// χ² of the fine search's best geometry over the number of its data.
     pub reduced_chi2: f64,
