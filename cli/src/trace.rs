@@ -125,9 +125,10 @@ impl Trace {
         let name = self.rays.display().to_string();
         let table = Table::parse(&self.read()?).with_context(|| name.clone())?;
         let request = self.request();
-        let numbers = 5 + 2 * u32::from(self.momentum) + u32::from(self.weights);
+        let momentum = 2 * u32::from(self.momentum);
+        let numbers = 5 + momentum + u32::from(self.weights);
         let samples = numbers.saturating_mul(self.samples).saturating_mul(self.pieces());
-        let each = samples.saturating_add(4 * u32::from(self.crossings));
+        let each = samples.saturating_add((4 + momentum) * u32::from(self.crossings));
         let what = || format!("{} rays with {each} numbers each", table.rays.len());
         memory::afford(what, memory::table(table.rays.len() as f64, f64::from(each)))?;
         let blocks = table.blocks();

@@ -72,7 +72,7 @@ def read(obs: Any) -> dict[str, Any]:
         mjd=obs.mjd,
         frequency_hz=float(obs.rf),
         bandwidth_hz=float(obs.bw),
-        history=("from eht-imaging", *(f"{name} = False" for name in CALIBRATIONS if not getattr(obs, name, True))),
+        history=("from eht-imaging", *(f"{name.upper()}: 0" for name in CALIBRATIONS if not getattr(obs, name, True))),
     )
 
 

@@ -318,7 +318,7 @@ def test_sidereal_times_of_ehtim():
     first = (12.9 - 13.0308) * 0.99727 + 23.93447
     expected = [first + 11.0 * 0.99727, first + 11.2 * 0.99727, first]
     np.testing.assert_allclose(of.time, np.repeat(expected, 6), atol=1e-4)
-    assert of.history == ("from eht-imaging", "opacitycal = False")
+    assert of.history == ("from eht-imaging", "OPACITYCAL: 0")
     obs.timetype = "LST"
     with pytest.raises(ValueError, match='timetype = "LST" is not allowed'):
         Observation.from_ehtim(obs)

@@ -45,6 +45,8 @@ fn exact_leakage_is_found_beside_emission_that_changes() {
     changes.iter().for_each(|change| words.extend(["--set", change]));
     succeed(folder.path(), &words);
     let found = results(&folder.path().join("run"));
-    let rms = found["leakage"]["beside_the_truth"]["rms"].as_f64().unwrap();
-    assert!(rms < 0.05, "{rms}");
+    let beside = &found["leakage"]["beside_the_truth"];
+    let [rms, size] = ["rms", "size"].map(|key| beside[key].as_f64().unwrap());
+    // No leakage at all is as far off as it is large.
+    assert!(rms < 0.75 * size, "{rms} {size}");
 }

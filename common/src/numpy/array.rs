@@ -52,11 +52,11 @@ pub fn open<R: Read>(mut bytes: R) -> Result<npyz::NpyFile<Headed<R>>, NumpyErro
         [_, _, _, _, _, _, _, _, a, b, c, d] => u64::from(u32::from_le_bytes([a, b, c, d])),
         _ => 0,
     };
-    if rest > LONGEST {
+    if header.starts_with(b"\x93NUMPY") && rest > LONGEST {
         let message = format!("a header of {rest} bytes is not read: at most {LONGEST}");
         return Err(NumpyError::content(message));
     }
-    bytes.by_ref().take(rest).read_to_end(&mut header).map_err(not)?;
+    bytes.by_ref().take(rest.min(LONGEST)).read_to_end(&mut header).map_err(not)?;
     let depth = nested(&header[header.len().min(10)..]);
     if depth > MOST_NESTED {
         let message =
@@ -69,10 +69,13 @@ pub fn open<R: Read>(mut bytes: R) -> Result<npyz::NpyFile<Headed<R>>, NumpyErro
 /// Returns how deep brackets of any kind are nested, outside of strings.
 fn nested(text: &[u8]) -> usize {
     let (mut depth, mut most, mut string) = (0usize, 0, None);
-    for byte in text {
+    let mut bytes = text.iter();
+    while let Some(byte) = bytes.next() {
         match (string, byte) {
             (None, b'\'' | b'"') => string = Some(byte),
             (Some(quote), _) if quote == byte => string = None,
+            // What follows ends no string.
+            (Some(_), b'\\') => drop(bytes.next()),
             (None, b'[' | b'(' | b'{') => depth += 1,
             (None, b']' | b')' | b'}') => depth = depth.saturating_sub(1),
             _ => {}
@@ -232,7 +235,7 @@ mod tests {
     /// A header of 200 brackets would take the parser longer than anybody waits.
     #[test]
     fn exact_nested_headers_are_errors() {
-        for each in ["[", "(1,", "{1:", "(')',"] {
+        for each in ["[", "(1,", "{1:", "(')',", r"('\'',"] {
             let text = format!("{{'descr': {}", each.repeat(200));
             let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
             bytes.extend((text.len() as u16).to_le_bytes());
@@ -245,6 +248,8 @@ mod tests {
         let long = b"\x93NUMPY\x02\x00\xff\xff\xff\xff{}";
         let error = read_array(long).unwrap_err().to_string();
         assert!(error.contains("a header of 4294967295 bytes"), "{error}");
+        let error = read_array(b"1.0, 2.0, 3.0, 4.0").unwrap_err().to_string();
+        assert!(error.contains("not an npy file"), "{error}");
     }
 
     /// Two arrays in one file: the second is not left out silently.

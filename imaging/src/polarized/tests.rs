@@ -5,7 +5,7 @@ use super::*;
 use crate::data;
 use crate::settings::StaticImageFile;
 use crate::survey;
-use crate::survey::Stage;
+use crate::survey::{Stage, SurveyWatch};
 use crate::tests::{SETTINGS, night, spoil};
 use core::sync::atomic::{AtomicUsize, Ordering};
 use kerrlight_common::units::MICROARCSECOND;
@@ -140,21 +140,21 @@ fn exact_gradients_of_the_polarised_loss() {
 }
 
 fn found(text: &str, seed: u64, leakage: Option<f64>) -> PolarizedSurvey {
-    found_while(text, seed, leakage, &|_| true).unwrap()
+    found_while(text, seed, leakage, &|_, _| true).unwrap()
 }
 
 fn found_while(
     text: &str,
     seed: u64,
     leakage: Option<f64>,
-    goes_on: &(dyn Fn(Stage) -> bool + Sync),
+    goes_on: &SurveyWatch<'_>,
 ) -> Option<PolarizedSurvey> {
     let file = StaticImageFile::parse(text).unwrap();
     let seen = observed(seed, leakage);
     let measured = data::total_intensity(&file, seen.clone(), "data").unwrap();
     let intensity = survey(&file, &measured, &[], &|_, _| true).unwrap().unwrap();
     let polarized = data::polarized(&file, seen, "data").unwrap().unwrap();
-    survey_polarized(&file, &polarized, &intensity, &|stage, _| goes_on(stage)).unwrap()
+    survey_polarized(&file, &polarized, &intensity, goes_on).unwrap()
 }
 
 /// Ratios know the spiral although gains are lost: its angle within 10° and three stated errors, its strength as the beam
@@ -183,13 +183,15 @@ fn beside_leakage() -> String {
 /// A watch that says no ends the search without a result, at the first image and in a round of leakage.
 #[test]
 fn exact_the_search_for_leakage_can_be_stopped() {
-    for after in [0, 3] {
-        let asked = AtomicUsize::new(0);
-        let goes_on = |stage: Stage| {
-            stage != Stage::Strengths || asked.fetch_add(1, Ordering::Relaxed) < after
+    for images in [0, 1, 2] {
+        let solved = AtomicUsize::new(0);
+        // Told of each image before its steps, with 0, and at its end, with 1.
+        let goes_on = |stage: Stage, done: usize| {
+            let at_end = stage == Stage::Strengths && done == 1;
+            !at_end || solved.fetch_add(1, Ordering::Relaxed) < images
         };
         assert!(found_while(&beside_leakage(), 3, Some(0.05), &goes_on).is_none());
-        assert!(asked.load(Ordering::Relaxed) > after);
+        assert_eq!(solved.load(Ordering::Relaxed), images + 1);
     }
 }
 

@@ -120,7 +120,7 @@ fn white() -> [f32; 3] {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Spot {
-    /// Radius of the orbit, M, outside the photon orbit and 3 M.
+    /// Radius of the orbit, M, outside of 3 M and the photon orbit of the spin along `axis`.
     #[schemars(range(max = 1e6), extend("unit" = "M"))]
     pub radius: f64,
     /// Angle along the orbit at time 0, degrees.

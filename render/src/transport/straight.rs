@@ -201,9 +201,9 @@ impl Sum<'_> {
                         break;
                     }
                     if split >= finest(medium) {
-                        // Panels that are too long have had the light of one time at most.
-                        let each = times.chunks(1).enumerate().filter(|_| times.len() > 1);
-                        for (n, time) in each {
+                        // Panels that are too long for cells have light at one time alone.
+                        let dark = times.len() > 1 && medium.cell_size().is_some();
+                        for (n, time) in times.chunks(1).enumerate().filter(|_| dark) {
                             let (rays, place) = ((ray, crossings), number * together + n);
                             self.radiate(m, k, rays, (time, place), columns);
                         }

@@ -33,6 +33,7 @@ use crate::fit::{Loss, Motion, State, Trainer};
 use kerrlight_common::frames::Frames;
 use kerrlight_render::volume::Volume;
 use kerrlight_render::volume::metrics::{self, Comparison, Mask};
+use kerrlight_vlbi::polarimetry::LeakageTable;
 
 /// Reason why a fit ended before its end: it was told to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -85,6 +86,8 @@ pub struct Recovery {
     pub judged: DataVerdict,
     /// Distance of the volume from the truth inside the region, where data are simulated.
     pub closeness: Option<Comparison>,
+    /// Leakage of the stations' feeds beside the movie, where it is solved for.
+    pub leakage: Option<LeakageTable>,
     /// Parameters of the representation, and the axis.
     pub state: State<f32>,
 }
@@ -210,6 +213,11 @@ impl<'t> Fit<'_, 't> {
     fn recovery(&mut self, state: &State<f32>) -> Result<Recovery, Error> {
         let volume = recovered(self.file, &mut self.trainer, state)?;
         let seen = self.seen(state)?;
+        // Before verdict and loss, which see the leakage from here on.
+        let leakage = match self.measured.leakage {
+            Some(_) => self.measured.solve_leakage(&seen.to_vec()?)?,
+            None => None,
+        };
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
         let loss = self.trainer.objective.loss_of(&frames, &seen)?;
         let movie = self.pictured(state, &seen)?;
@@ -224,6 +232,7 @@ impl<'t> Fit<'_, 't> {
             loss,
             judged,
             closeness,
+            leakage: leakage.map(|found| found.table),
             state: state.clone(),
         })
     }

@@ -91,7 +91,8 @@ impl Places {
             let field = (x0 - x) / column as f64 * self.width as f64;
             let apart = (field - self.wide_as).abs();
             let is_rounded = apart < 1e-3 * self.wide_as + ROUNDED_AS;
-            if is_rounded && apart > 3.0 * PLACE_AS * self.width as f64 {
+            // The farther apart places are, the better they tell it.
+            if is_rounded && apart > 3.0 * PLACE_AS * self.width as f64 / column as f64 {
                 self.wide_as = field;
             }
         }
@@ -169,18 +170,24 @@ mod tests {
         assert_eq!(all.polarized[2], Some(vec![3.0; 6]));
     }
 
-    /// A heading rounds a field of 126.6 µas to 127 µas, and pixels of 0.633 µas have exact places.
+    /// A heading rounds fields to 1 µas, and places of pixels to 1e-4 µas: many narrow pixels tell the field all the same.
     #[test]
     fn exact_fields_are_those_of_the_pixels() {
-        let head = HEAD.replace("2 pix 0.000004", "200 pix 0.000127");
-        let mut text = head.replace("3 pix 0.000006", "2 pix 0.000001");
-        for k in 0..400u32 {
-            let (x, y) = (63.0 - 0.633 * f64::from(k % 200), 0.3 - 0.633 * f64::from(k / 200));
-            text += &format!("{:15.10} {:15.10} {k}\n", 1e-6 * x, 1e-6 * y);
+        for (width, field) in [(200u32, 126.6), (512, 126.9), (2048, 95.3), (3, 100.0)] {
+            let step = field / f64::from(width);
+            let heading = format!("{width} pix {:.6} as", 1e-6 * field);
+            let head = HEAD.replace("2 pix 0.000004 as", &heading);
+            let heading = format!("16 pix {:.6} as", 16e-6 * step);
+            let mut text = head.replace("3 pix 0.000006 as", &heading);
+            for k in 0..16 * width {
+                let [x, y] = [(k % width, width), (k / width, 16)]
+                    .map(|(at, of)| step * (f64::from(of) / 2.0 - 0.5 - f64::from(at)));
+                text += &format!("{:15.10} {:15.10} {k}\n", 1e-6 * x, 1e-6 * y);
+            }
+            let pixels = parse(text.as_bytes()).unwrap();
+            assert_eq!(pixels.values.len(), 16 * width as usize);
+            assert!((pixels.field_uas.unwrap() - field).abs() < 4e-4, "{:?}", pixels.field_uas);
         }
-        let pixels = parse(text.as_bytes()).unwrap();
-        assert_eq!(pixels.values[399], 399.0);
-        assert!((pixels.field_uas.unwrap() - 126.6).abs() < 2e-4, "{:?}", pixels.field_uas);
     }
 
     #[test]

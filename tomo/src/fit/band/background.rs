@@ -68,10 +68,14 @@ impl Background {
             return Ok(vec![0.0; minutes.len()]);
         }
         let scale = background.constant.hypot(background.variation);
+        let Self { constant, variation, .. } = background;
+        // In units of the scale no square leaves the range of numbers.
+        let relative =
+            Self { constant: constant / scale, variation: variation / scale, ..background };
         let entry = |a: usize, b: usize| {
             // Smooth processes have covariances that are singular to rounding.
             let own = if a == b { 1e-10 } else { 0.0 };
-            background.covariance(minutes[a] - minutes[b]) / scale.powi(2) + own
+            relative.covariance(minutes[a] - minutes[b]) + own
         };
         let factor = DMatrix::from_fn(minutes.len(), minutes.len(), entry).cholesky();
         let wild = || Error::out_of_range("minutes", background.minutes, "times that differ");

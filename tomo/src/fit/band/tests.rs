@@ -361,4 +361,9 @@ fn impossible_backgrounds_are_refused() {
 #[test]
 fn exact_no_background_is_dark() {
     assert_eq!(Background::NONE.drawn(&[0.0, 1.0], &[0.1, 0.2]).unwrap(), [0.0, 0.0]);
+    let drawn = |constant: f64| {
+        let background = Background { constant, ..Background::NONE };
+        background.drawn(&[0.0, 1.0], &[0.1, 0.2]).unwrap()[0] / constant
+    };
+    assert!((drawn(1e-170) / drawn(1.0) - 1.0).abs() < 1e-12);
 }

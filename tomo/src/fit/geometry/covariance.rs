@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Part of every prior's deviation up to which the second derivatives alone are the answer.
 const NARROW: f64 = 0.3;
-/// Half the distance of the differences of priors, in units of each parameter's scale.
+/// Distance that is kept from a pole, in units of each parameter's scale.
 const WIDTH: f64 = 0.1;
 
 /// Covariance in units of the parameters' scales, from second derivatives of ½χ² − ln p in the same units, whose first
@@ -30,7 +30,7 @@ pub(super) fn covariance(
             return Some(covariance);
         }
     }
-    // By differences as wide as those of the bowl, to take off just what these have added.
+    // As for the bowl, to take off just what was added.
     let of_prior = |k: usize| {
         let scale = free[k].parameter.scale();
         let [_, bend] = free[k].curve(geometry.get(free[k].parameter), WIDTH * scale);

@@ -100,6 +100,17 @@ impl Prior {
         }
     }
 
+    /// Part of the probability below a value.
+    pub fn below(&self, x: f64) -> f64 {
+        match *self {
+            Prior::Uniform { low, high } => ((x - low) / (high - low)).clamp(0.0, 1.0),
+            Prior::Normal { mean, sigma } => 0.5 * libm::erfc((mean - x) / (sigma * SQRT_2)),
+            Prior::Isotropic { low, high } => {
+                ((low.cos() - x.cos()) / (low.cos() - high.cos())).clamp(0.0, 1.0)
+            }
+        }
+    }
+
     /// Itself, if its numbers make a density.
     ///
     /// # Errors

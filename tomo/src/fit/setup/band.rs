@@ -228,7 +228,7 @@ pub fn check_band<'a>(
     if vector[2].abs() < 1.0 - 1e-9 {
         let [x, y, z] = vector;
         refuse!(
-            "motion.axis = [{x}, {y}, {z}] is not allowed with [band], whose circles lie about [0, 0, 1]"
+            "an axis of [{x}, {y}, {z}] is not allowed with [band], whose circles lie about [0, 0, 1]"
         );
     }
     Ok(curve)
