@@ -8,7 +8,7 @@ use crate::Error;
 use crate::fit::linear::{Ending, LinearProgress, LinearSolution};
 use crate::fit::scan::{AxisLoss, AxisProblem, AxisSettings, Effort, refine_axis, scan_axis};
 use crate::fit::settings::{AxisScan as AxisScanSettings, AxisSearch, FitFile, Kind, Start};
-use crate::fit::setup::{self, CoarseGrid, CoarseView, FitData, SolvedLeakage, WarmStart};
+use crate::fit::setup::{self, CoarseView, FitData, GridSpec, SolvedLeakage, WarmStart};
 use crate::fit::{Batch, Field, ForwardModel, Motion, State, Trainer};
 use crate::representation::{Registry, Workspace};
 use core::ops::ControlFlow;
@@ -76,11 +76,11 @@ impl Fit<'_, '_> {
         if file.representation.kind == Kind::LinearGrid {
             let nodes = file.representation.linear_grid.nodes;
             let file = weighed(file, &mut trainer.objective, axis, times, progress)?;
-            let grid = CoarseGrid { nodes, stride: 1, seed: None };
+            let grid = GridSpec { nodes, stride: 1, seed: None };
             let solution = solve_linear(&file, measured, axis, times, grid, trainer, progress)?;
             state.now.parameters = solution.parameters();
         } else if let Start::Linear { nodes, stride, steps, .. } = file.training.start {
-            let grid = CoarseGrid { nodes, stride, seed: None };
+            let grid = GridSpec { nodes, stride, seed: None };
             let solution = solve_linear(file, measured, axis, times, grid, trainer, progress)?;
             let knots = setup::change(file, times)?.knots;
             let given = WarmStart { solution: &solution, nodes, knots };
@@ -97,7 +97,7 @@ fn solve_linear(
     measured: &FitData,
     axis: Axis,
     times: [f64; 2],
-    grid: CoarseGrid,
+    grid: GridSpec,
     trainer: &mut Trainer<'_, f32>,
     progress: &mut dyn Progress,
 ) -> Result<LinearSolution<f32>, Error> {
@@ -149,7 +149,7 @@ fn images_of(
     file: &FitFile,
     axis: Axis,
     times: [f64; 2],
-    grid: CoarseGrid,
+    grid: GridSpec,
     model: &ForwardModel<f32>,
 ) -> Result<Vec<f32>, Error> {
     let mut file = file.clone();

@@ -1,7 +1,7 @@
 //! Settings for a light curve: what its numbers tell, and what has to be assumed.
 
 use super::sources::Source;
-use super::{complete, digits};
+use super::template::{complete, digits, plain_words};
 use anyhow::bail;
 use kerrlight_render::polarization::StokesParameter;
 use kerrlight_vlbi::light_curve::{LightCurve, Sample};
@@ -75,7 +75,7 @@ pub fn of_light_curve(
         fitted.parameters.iter().map(|p| format!("\"{}\"", p.name())).collect();
     let fields = [
         ("read", fitted.read(name)),
-        ("title", super::plain_words(name)),
+        ("title", plain_words(name)),
         ("mass", mass(source)),
         ("jy", digits(flare * JY_PER_PIXEL)),
         (

@@ -1,89 +1,31 @@
 //! `kerrlight fit --init`: a commented file to start from, for given data or for the built-in experiment.
 
+mod advice;
 mod annotate;
 mod guess;
 mod light_curve;
+mod movie;
 mod polarized;
 mod quick_look;
 mod sources;
 mod static_image;
+mod template;
+mod visibilities;
 
-use super::{BUILT_IN, Work};
+use super::BUILT_IN;
 use crate::answer::Answer;
-use crate::interferometry::image_files::OwnTimes;
-use crate::interferometry::movie_files;
 use crate::output::Output;
 use crate::plain;
+pub use advice::explained;
 use annotate::annotate;
 use anyhow::{Context, bail};
 pub use guess::{Guess, guess};
-use kerrlight_common::toml_file::ReadError;
-use kerrlight_common::units::{MICROARCSECOND, gravitational_angle};
-use kerrlight_imaging::settings::StaticImageFile;
-use kerrlight_tomo::fit::settings::FitFile;
-use kerrlight_tomo::fit::setup::{self, VisibilitySettings};
-use kerrlight_vlbi::data_terms::ClosureTerm;
 use kerrlight_vlbi::files;
-use kerrlight_vlbi::gains::prior_table;
 use kerrlight_vlbi::observation::Observation;
-use kerrlight_vlbi::products::ClosureKind;
-use kerrlight_vlbi::simulate::{Movie, StokesMovie};
+use movie::{of_movie, read_movie};
 use quick_look::QuickLook;
-use sources::{SOURCES, Source};
+use sources::{called, known};
 use std::path::{Path, PathBuf};
-
-/// An error in settings; of what is missing, with what to write.
-pub fn explained(error: &ReadError) -> anyhow::Error {
-    let text = error.to_string();
-    // The reader of TOML tells the kind of error and the name in its words alone.
-    let missing = text.split_once("missing field `").and_then(|(_, rest)| rest.split('`').next());
-    let unknown = text.split_once("unknown field `").and_then(|(_, rest)| rest.split('`').next());
-    let advice = match (missing, unknown) {
-        (Some(missing), _) => advice(missing, &error.key()),
-        (_, Some(unknown)) => moved(&error.key(), unknown).to_owned(),
-        _ => String::new(),
-    };
-    anyhow::anyhow!("{text}{advice}")
-}
-
-/// Names the present place of a key or a table that a table does not have.
-fn moved(table: &str, key: &str) -> &'static str {
-    match (table, key) {
-        ("", "world") => {
-            "\na number that is not known has a prior in place of its value, such as `spin = { uniform = [0.0, 0.9] }` in \
-             [hole]; the search for it is [search], and what differs in a simulation stands in [simulation]"
-        }
-        ("", "truth" | "observation" | "light_curve" | "movie") => {
-            "\nwhat is simulated stands in [simulation]: [simulation.truth], [simulation.movie], \
-             [simulation.observation], [simulation.light_curve]; times of images that are read stand in [data.movie]"
-        }
-        ("training", rate) if rate.ends_with("rate") => {
-            "\nlearning rates stand with what is learnt: [representation.network], [representation.feature-grid], \
-             [representation.grid], [representation.own]"
-        }
-        _ => "",
-    }
-}
-
-/// Advises on a key that is missing in a table; `loss.0` is one of the tables `loss`.
-fn advice(missing: &str, table: &str) -> String {
-    let is_name = |part: &&str| !part.is_empty() && part.parse::<u32>().is_err();
-    let place: Vec<&str> = table.split('.').filter(is_name).collect();
-    let path: Vec<&str> = place.iter().copied().chain([missing]).collect();
-    let (place, path) = (place.join("."), path.join("."));
-    let key = FitFile::keys().at(&path).or_else(|| StaticImageFile::keys().at(&path));
-    match key {
-        Some(key) if key.is_table() => {
-            format!(
-                "\nadd a table [{path}]: {} `kerrlight fit --init` writes an example",
-                key.meaning
-            )
-        }
-        Some(key) if place.is_empty() => format!("\ngive `{missing} = …`: {}", key.note()),
-        Some(key) => format!("\ngive `{missing} = …` in [{place}]: {}", key.note()),
-        None => String::new(),
-    }
-}
 
 /// Model that is fitted to visibilities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -166,7 +108,11 @@ fn of_files(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Resu
     let said: String = others
         .map(|(seen, path)| {
             let name = &called(seen, known(seen));
-            format!("{}{}\n", guess::READ, read(seen, &file(path), name, known(seen).is_some()))
+            format!(
+                "{}{}\n",
+                guess::READ,
+                visibilities::read(seen, &file(path), name, known(seen).is_some())
+            )
         })
         .collect();
     Ok(text.replacen('\n', &format!("\n{said}"), 1))
@@ -212,42 +158,6 @@ fn seen_from(toml: &Path, data: &Path) -> anyhow::Result<String> {
     Ok(text.to_owned())
 }
 
-/// Images, their times and the width of their field in µas, as far as the file tells.
-struct Images {
-    movie: Movie,
-    times: OwnTimes,
-    field_uas: Option<f64>,
-}
-
-fn read_movie(path: &Path) -> anyhow::Result<Images> {
-    let files = movie_files::files(path)?;
-    let of = |(StokesMovie { i: movie, .. }, times): (StokesMovie, OwnTimes), known: bool| {
-        let field = movie.grid.pixel_rad * movie.grid.width as f64 / MICROARCSECOND;
-        Images { movie, times, field_uas: known.then_some(field) }
-    };
-    // First without a field: FITS and text images, which have one, refuse another.
-    movie_files::read(&files, None).map(|read| of(read, true)).or_else(|first| {
-        movie_files::read(&files, Some(1.0)).map(|read| of(read, false)).map_err(|_| first)
-    })
-}
-
-fn known(observation: &Observation) -> Option<&'static Source> {
-    let word: String = observation.source.to_ascii_uppercase().split_whitespace().collect();
-    SOURCES.iter().find(|source| {
-        let near = observation.position.is_some_and(|at| {
-            let hours = (at.ra_hours - source.position.ra_hours).abs();
-            hours < 0.01 && (at.dec_deg - source.position.dec_deg).abs() < 0.1
-        });
-        near || source.words.iter().any(|name| word.starts_with(name))
-    })
-}
-
-/// The source's name in a line of text.
-fn called(observation: &Observation, source: Option<&Source>) -> String {
-    let name = source.map_or(observation.source.trim(), |source| source.name);
-    plain::line(if name.is_empty() { "unnamed source" } else { name }).into_owned()
-}
-
 /// Guesses settings for visibilities: a static image, if that is wanted, the source is known to stand still for a night, or
 /// what it varies is no more than is known of it.
 fn of_observation(
@@ -261,7 +171,7 @@ fn of_observation(
     let source = known(observation);
     let name = &called(observation, source);
     let image = || static_image::of_visibilities(observation, source, name, &path, file);
-    let volume = || of_visibilities(observation, &path, file);
+    let volume = || visibilities::of_visibilities(observation, &path, file);
     match (model, source) {
         (Some(Model::Image), _) => image(),
         (Some(Model::Volume), _) | (None, None) => volume(),
@@ -276,193 +186,4 @@ fn of_observation(
             Ok(text.replacen('\n', &said, 1))
         }
     }
-}
-
-fn of_visibilities(observation: &Observation, path: &str, file: &str) -> anyhow::Result<String> {
-    let flux = short_baselines(observation)?;
-    let source = known(observation);
-    let name = &called(observation, source);
-    let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
-    let (mass, inclination, field) = match source {
-        Some(of) => (
-            format!(
-                "mass_msun = {:?} #! {}\ndistance_kpc = {:?} #! {}",
-                of.mass_msun, of.mass, of.distance_kpc, of.mass
-            ),
-            format!("inclination_deg = {:?} #! {}", of.inclination_deg, of.inclination),
-            format!(
-                "{:.0} microarcseconds",
-                24.0 * gravitational_angle(of.mass_msun, of.distance_kpc)
-            ),
-        ),
-        None => (
-            format!(
-                "#? mass_msun = 4.154e6 # no built-in value for {name}\n#? distance_kpc = 8.178 # the same"
-            ),
-            "#? inclination_deg = 60.0 # the data do not determine the inclination".to_owned(),
-            "from the mass and distance".to_owned(),
-        ),
-    };
-    let mut losses = "[[loss]]\ndata = \"amplitudes\"\nweight = 1.0".to_owned();
-    if has_closures(observation, 300.0, source.is_some_and(|source| source.uv_min.is_some())) {
-        losses += "\n[[loss]]\ndata = \"closure-phases\"\nweight = 1.0\nleast_snr = 3.0 #! weaker ones are not Gaussian";
-    }
-    // Pixels of the region, 8 M deep, with emission 0.02.
-    let per_pixel = flux / (core::f64::consts::PI * (10.0f64 / 24.0 * 32.0).powi(2) * 8.0 * 0.02);
-    let fields = [
-        ("title", format!("{}{day}: measured visibilities", plain_words(name))),
-        ("mass", mass),
-        ("inclination", inclination),
-        ("field", field),
-        ("jy", digits(per_pixel)),
-        ("flux", digits(flux)),
-        ("losses", losses),
-        ("uv_min", source.and_then(|source| source.uv_min).unwrap_or_default().to_owned()),
-        ("gains", gains(observation)),
-        ("read", read(observation, file, name, source.is_some()) + unfitted(observation)),
-        ("path", path.to_owned()),
-    ];
-    complete(include_str!("visibilities.toml"), &fields)
-}
-
-/// Returns whether closure phases are left of the rows that the template's fit keeps.
-fn has_closures(observation: &Observation, average_s: f64, long_only: bool) -> bool {
-    // Averages and the shortest baseline of the template decide what still closes.
-    let settings = VisibilitySettings { average_s, uv_min: long_only.then_some(1e8) };
-    let Ok(mut kept) = setup::prepared(observation.clone(), &settings) else { return false };
-    setup::frames_of(&mut kept);
-    ClosureTerm::<f64>::new(&kept, ClosureKind::Phase, 3.0).is_ok()
-}
-
-/// Describes the assumed gains of the stations.
-fn gains(observation: &Observation) -> String {
-    let seen = |k: usize| observation.rows.iter().any(|r| r.stations.contains(&(k as u16)));
-    let names = observation.stations.iter().enumerate().filter(|(k, _)| seen(*k));
-    let known = |name: &str| prior_table("EHT2017", name).is_some();
-    match names.map(|(_, station)| &station.name).all(|name| known(name)) {
-        true => "table = \"EHT2017\" #! 10 % of the amplitude, 60 % at the LMT, which lost light by pointing".to_owned(),
-        false => "amplitude = 0.1 #! stations are calibrated to 10 % of their amplitudes".to_owned(),
-    }
-}
-
-/// Describes the file, in a line.
-fn read(observation: &Observation, file: &str, name: &str, is_known: bool) -> String {
-    let rows: Vec<f64> = observation.stokes_i().map(|(row, _)| row.time_h).collect();
-    let [first, last] = rows
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], time| [a.min(*time), b.max(*time)]);
-    let source =
-        if is_known { format!("{name}, recognised by position or name") } else { name.to_owned() };
-    let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
-    let frequency =
-        observation.frequency_hz.map_or(String::new(), |hz| format!(" at {:.1} GHz", hz * 1e-9));
-    format!(
-        "{file}: {source}{day}, {first:.2} h to {last:.2} h UTC, {} stations, {} visibilities of Stokes I{frequency}",
-        observation.stations.len(),
-        rows.len()
-    )
-}
-
-/// Names the data that a volume leaves out.
-fn unfitted(observation: &Observation) -> &'static str {
-    match observation.is_polarized() {
-        true => "; its polarisation is not fitted without [polarization]",
-        false => "",
-    }
-}
-
-/// Median amplitude of the shortest tenth of the baselines, Jy.
-fn short_baselines(observation: &Observation) -> anyhow::Result<f64> {
-    let mut all: Vec<[f64; 2]> = observation
-        .rows
-        .iter()
-        .filter_map(|row| {
-            let i = row.stokes_i(observation.basis)?;
-            Some([row.uv[0].hypot(row.uv[1]), i.visibility.norm()])
-        })
-        .filter(|pair| pair.iter().all(|x| x.is_finite()))
-        .collect();
-    all.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    // The shortest resolve least; the median of a tenth does not hang on a single datum.
-    all.truncate(all.len().div_ceil(10));
-    all.sort_by(|a, b| a[1].total_cmp(&b[1]));
-    match all.get(all.len() / 2) {
-        Some([_, flux]) if *flux > 0.0 => Ok(*flux),
-        _ => bail!("there are no nonzero visibilities of total intensity"),
-    }
-}
-
-fn of_movie(images: &Images, path: &str) -> anyhow::Result<String> {
-    let Images { movie, times, field_uas } = images;
-    let (grid, frames) = (movie.grid, movie.frames());
-    if grid.width != grid.height {
-        bail!("images of {} x {} pixels: a fit needs square images", grid.width, grid.height);
-    }
-    let flux =
-        movie.pixels.chunks(grid.pixels()).map(|image| image.iter().sum()).fold(0.0, f64::max);
-    let peak = movie.pixels.iter().copied().fold(0.0, f64::max);
-    if flux <= 0.0 {
-        bail!("all pixels of the images are zero");
-    }
-    let jy = flux / (grid.pixels() as f64 * 4.0 * 0.02);
-    let span = field_uas
-        .map_or(String::new(), |field| format!("; on the sky it is {field:.1} microarcseconds"));
-    let hours = match times {
-        OwnTimes::Unknown => String::new(),
-        OwnTimes::Utc(hours) | OwnTimes::Since(hours) => match hours[..] {
-            [first, .., last] => format!("; they span {:.4} hours", last - first),
-            _ => String::new(),
-        },
-    };
-    let fields = [
-        ("title", "Images".to_owned()),
-        ("pixels", grid.width.to_string()),
-        ("frames", frames.to_string()),
-        ("jy", digits(jy)),
-        ("upper", digits(10.0 * (peak / jy).max(1.0))),
-        ("flux", digits(flux)),
-        ("peak", digits(peak)),
-        ("span", span),
-        ("hours", hours),
-        ("path", path.to_owned()),
-    ];
-    complete(include_str!("movie.toml"), &fields)
-}
-
-/// A number with three digits, as TOML has it.
-fn digits(value: f64) -> String {
-    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
-    format!("{rounded:?}")
-}
-
-/// A name without what would end a string.
-fn plain_words(name: &str) -> String {
-    name.chars().filter(|c| !c.is_control() && !matches!(c, '"' | '\\')).collect()
-}
-
-/// The template with its fields; what comes out is a fit's file once all is filled in.
-fn complete(template: &str, fields: &[(&str, String)]) -> anyhow::Result<String> {
-    let mut text = String::with_capacity(2 * template.len());
-    let mut rest = template;
-    // Once from front to back: what a field says, the name of a file perhaps, is no field itself.
-    while let Some((before, after)) = rest.split_once('{') {
-        let name_of = |(name, _): &&(&str, String)| {
-            after.strip_prefix(*name).is_some_and(|after| after.starts_with('}'))
-        };
-        text.push_str(before);
-        match fields.iter().find(name_of) {
-            Some((name, value)) => {
-                text.push_str(value);
-                rest = &after[name.len() + 1..];
-            }
-            None => {
-                text.push('{');
-                rest = after;
-            }
-        }
-    }
-    text.push_str(rest);
-    // With everything filled in: a template that is no fit is found now, not by the user.
-    Work::read(&text.replace("#? ", "")).context("the starter file")?;
-    Ok(text)
 }

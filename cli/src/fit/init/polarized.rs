@@ -1,6 +1,6 @@
 //! Settings of the polarisation of a static image, guessed from visibilities.
 
-use super::digits;
+use super::template::digits;
 use kerrlight_tomo::fit::verdict::CHANCE;
 use kerrlight_vlbi::light_curve::LightCurve;
 use kerrlight_vlbi::observation::{Basis, Observation};

@@ -1,6 +1,8 @@
 //! Sources whose numbers are published.
 
+use crate::plain;
 use kerrlight_vlbi::earth::SourcePosition;
+use kerrlight_vlbi::observation::Observation;
 
 /// A source whose mass and distance are known.
 pub struct Source {
@@ -100,6 +102,24 @@ pub fn named_above(text: &str) -> Option<&'static Source> {
     let comments = text.lines().take_while(|line| line.starts_with('#'));
     let mut names = comments.filter_map(|line| line.split_once("source:"));
     names.find_map(|(_, name)| named_in(name.trim()))
+}
+
+/// Returns the source that an observation is of, if it is one of these.
+pub fn known(observation: &Observation) -> Option<&'static Source> {
+    let word: String = observation.source.to_ascii_uppercase().split_whitespace().collect();
+    SOURCES.iter().find(|source| {
+        let near = observation.position.is_some_and(|at| {
+            let hours = (at.ra_hours - source.position.ra_hours).abs();
+            hours < 0.01 && (at.dec_deg - source.position.dec_deg).abs() < 0.1
+        });
+        near || source.words.iter().any(|name| word.starts_with(name))
+    })
+}
+
+/// The source's name in a line of text.
+pub fn called(observation: &Observation, source: Option<&Source>) -> String {
+    let name = source.map_or(observation.source.trim(), |source| source.name);
+    plain::line(if name.is_empty() { "unnamed source" } else { name }).into_owned()
 }
 
 #[cfg(test)]

@@ -1,7 +1,9 @@
 //! Settings of a static image, guessed from visibilities.
 
 use super::polarized::Tables;
-use super::{Source, complete, digits, gains, has_closures, plain_words, read, short_baselines};
+use super::sources::Source;
+use super::template::{complete, digits, plain_words};
+use super::visibilities::{gains, has_closures, read, short_baselines};
 use anyhow::Context;
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_tomo::fit::setup::{self, VisibilitySettings};

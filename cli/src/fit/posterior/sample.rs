@@ -123,7 +123,7 @@ fn begin(
         told(&format!("linear grid, round {}, loss {:.4e}", now.round, now.value));
         if keeper.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let grid = setup::CoarseGrid { nodes, stride, seed: Some(prior_seed(file)) };
+    let grid = setup::GridSpec { nodes, stride, seed: Some(prior_seed(file)) };
     let (objective, axis) = (&mut trainer.objective, state.now.axis);
     let solution = setup::solve_linear(file, objective, axis, change, grid, &mut watch);
     let solution = solution.map_err(failed::failed).context("linear")?;

@@ -34,7 +34,7 @@ pub(super) fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
 
 /// Voxels and frames of a linear problem.
 #[derive(Clone, Copy, Debug)]
-pub struct CoarseGrid {
+pub struct GridSpec {
     /// Nodes along each axis.
     pub nodes: usize,
     /// Every so many frames are fitted.
@@ -53,7 +53,7 @@ pub fn solve_linear(
     objective: &mut Objective<f32>,
     axis: Axis,
     change: Change,
-    CoarseGrid { nodes, stride, seed }: CoarseGrid,
+    GridSpec { nodes, stride, seed }: GridSpec,
     watch: &mut Watch<'_>,
 ) -> Result<LinearSolution<f32>> {
     objective.model.weigh(axis);

@@ -52,7 +52,7 @@ pub use imported::Reduction;
 pub use instrument::Instrument;
 pub use leakage::LeakageUnknown;
 pub use learning::{caution, check, representation, training};
-pub use linear_problem::{CoarseGrid, solve_linear};
+pub use linear_problem::{GridSpec, solve_linear};
 pub use memory_budget::check_memory_budget;
 pub use preview_image::{PreviewImage, PreviewView};
 pub use quadrature::Imaged;

@@ -1,0 +1,133 @@
+//! Starter file for a volume from visibilities, and what every starter file says of them.
+
+use super::sources::{called, known};
+use super::template::{complete, digits, plain_words};
+use anyhow::bail;
+use kerrlight_common::units::gravitational_angle;
+use kerrlight_tomo::fit::setup::{self, VisibilitySettings};
+use kerrlight_vlbi::data_terms::ClosureTerm;
+use kerrlight_vlbi::gains::prior_table;
+use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::products::ClosureKind;
+
+/// Seconds of an average.
+const AVERAGE_S: f64 = 300.0;
+
+pub fn of_visibilities(
+    observation: &Observation,
+    path: &str,
+    file: &str,
+) -> anyhow::Result<String> {
+    let flux = short_baselines(observation)?;
+    let source = known(observation);
+    let name = &called(observation, source);
+    let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
+    let (mass, inclination, field) = match source {
+        Some(of) => (
+            format!(
+                "mass_msun = {:?} #! {}\ndistance_kpc = {:?} #! {}",
+                of.mass_msun, of.mass, of.distance_kpc, of.mass
+            ),
+            format!("inclination_deg = {:?} #! {}", of.inclination_deg, of.inclination),
+            format!(
+                "{:.0} microarcseconds",
+                24.0 * gravitational_angle(of.mass_msun, of.distance_kpc)
+            ),
+        ),
+        None => (
+            format!(
+                "#? mass_msun = 4.154e6 # no built-in value for {name}\n#? distance_kpc = 8.178 # the same"
+            ),
+            "#? inclination_deg = 60.0 # the data do not determine the inclination".to_owned(),
+            "from the mass and distance".to_owned(),
+        ),
+    };
+    let mut losses = "[[loss]]\ndata = \"amplitudes\"\nweight = 1.0".to_owned();
+    if has_closures(observation, AVERAGE_S, source.is_some_and(|source| source.uv_min.is_some())) {
+        losses += "\n[[loss]]\ndata = \"closure-phases\"\nweight = 1.0\nleast_snr = 3.0 #! weaker ones are not Gaussian";
+    }
+    // Pixels of the region, 8 M deep, with emission 0.02.
+    let per_pixel = flux / (core::f64::consts::PI * (10.0f64 / 24.0 * 32.0).powi(2) * 8.0 * 0.02);
+    let fields = [
+        ("title", format!("{}{day}: measured visibilities", plain_words(name))),
+        ("mass", mass),
+        ("inclination", inclination),
+        ("field", field),
+        ("jy", digits(per_pixel)),
+        ("flux", digits(flux)),
+        ("losses", losses),
+        ("average", format!("{AVERAGE_S:?}")),
+        ("uv_min", source.and_then(|source| source.uv_min).unwrap_or_default().to_owned()),
+        ("gains", gains(observation)),
+        ("read", read(observation, file, name, source.is_some()) + unfitted(observation)),
+        ("path", path.to_owned()),
+    ];
+    complete(include_str!("visibilities.toml"), &fields)
+}
+
+/// Returns whether closure phases are left of the rows that the template's fit keeps.
+pub fn has_closures(observation: &Observation, average_s: f64, long_only: bool) -> bool {
+    // Averages and the shortest baseline of the template decide what still closes.
+    let settings = VisibilitySettings { average_s, uv_min: long_only.then_some(1e8) };
+    let Ok(mut kept) = setup::prepared(observation.clone(), &settings) else { return false };
+    setup::frames_of(&mut kept);
+    ClosureTerm::<f64>::new(&kept, ClosureKind::Phase, 3.0).is_ok()
+}
+
+/// Describes the assumed gains of the stations.
+pub fn gains(observation: &Observation) -> String {
+    let seen = |k: usize| observation.rows.iter().any(|r| r.stations.contains(&(k as u16)));
+    let names = observation.stations.iter().enumerate().filter(|(k, _)| seen(*k));
+    let known = |name: &str| prior_table("EHT2017", name).is_some();
+    match names.map(|(_, station)| &station.name).all(|name| known(name)) {
+        true => "table = \"EHT2017\" #! 10 % of the amplitude, 60 % at the LMT, which lost light by pointing".to_owned(),
+        false => "amplitude = 0.1 #! stations are calibrated to 10 % of their amplitudes".to_owned(),
+    }
+}
+
+/// Describes the file, in a line.
+pub fn read(observation: &Observation, file: &str, name: &str, is_known: bool) -> String {
+    let rows: Vec<f64> = observation.stokes_i().map(|(row, _)| row.time_h).collect();
+    let [first, last] = rows
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], time| [a.min(*time), b.max(*time)]);
+    let source =
+        if is_known { format!("{name}, recognised by position or name") } else { name.to_owned() };
+    let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
+    let frequency =
+        observation.frequency_hz.map_or(String::new(), |hz| format!(" at {:.1} GHz", hz * 1e-9));
+    format!(
+        "{file}: {source}{day}, {first:.2} h to {last:.2} h UTC, {} stations, {} visibilities of Stokes I{frequency}",
+        observation.stations.len(),
+        rows.len()
+    )
+}
+
+/// Names the data that a volume leaves out.
+fn unfitted(observation: &Observation) -> &'static str {
+    match observation.is_polarized() {
+        true => "; its polarisation is not fitted without [polarization]",
+        false => "",
+    }
+}
+
+/// Median amplitude of the shortest tenth of the baselines, Jy.
+pub fn short_baselines(observation: &Observation) -> anyhow::Result<f64> {
+    let mut all: Vec<[f64; 2]> = observation
+        .rows
+        .iter()
+        .filter_map(|row| {
+            let i = row.stokes_i(observation.basis)?;
+            Some([row.uv[0].hypot(row.uv[1]), i.visibility.norm()])
+        })
+        .filter(|pair| pair.iter().all(|x| x.is_finite()))
+        .collect();
+    all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    // The shortest resolve least; the median of a tenth does not hang on a single datum.
+    all.truncate(all.len().div_ceil(10));
+    all.sort_by(|a, b| a[1].total_cmp(&b[1]));
+    match all.get(all.len() / 2) {
+        Some([_, flux]) if *flux > 0.0 => Ok(*flux),
+        _ => bail!("there are no nonzero visibilities of total intensity"),
+    }
+}
