@@ -327,7 +327,8 @@ impl<'a> Sum<'a> {
             );
         }
         if let (Some(meshes), Some(path), true) = (meshes, path, ray.stepped) {
-            meshes.add(optics, path.path, ray.last_time(), &self.sources.meshes, light);
+            let (way, depths) = ((path.path, ray.last_time()), self.sources.media.profile());
+            meshes.add(optics, way, &self.sources.meshes, depths, light);
         }
     }
 

@@ -7,6 +7,7 @@ use crate::transport::chord::ChordBound;
 use crate::transport::layers::Origin;
 use crate::transport::optics::Optics;
 use crate::transport::result::{Accumulator, Place};
+use crate::transport::sources::media::DepthProfile;
 use crate::transport::tree::{Node, Tree, Walk, WalkScratch};
 use kerrlight_geodesic::vector::distance;
 use kerrlight_geodesic::{Kerr, Path, PathOfRay, Ray};
@@ -258,13 +259,13 @@ impl Meshes {
         if self.tree.can_be_met(ray) { self.tree.meet(path, &bound, walk, hits) } else { None }
     }
 
-    /// Adds the light of the triangles met up to Mino time `end`: I = g^{3+α} I_em.
+    /// Adds the light of the triangles met up to Mino time `end` behind gas of optical depth D: I = g^{3+α} I_em e^{−D}.
     pub fn add(
         &self,
         optics: &Optics,
-        path: &Path,
-        end: f64,
+        (path, end): (&Path, f64),
         scratch: &MeshScratch,
+        depths: &DepthProfile,
         light: &mut Accumulator,
     ) {
         for hit in scratch.hits.iter().take_while(|hit| hit.mino_time <= end) {
@@ -282,9 +283,10 @@ impl Meshes {
             // Where matter cannot move like this there is none that shines.
             let Some(g) = g else { continue };
             let boost = optics.spectral_index.map_or(1.0, |index| g.powf(3.0 + index));
-            light.add(emitted * boost, g, color, hit.mino_time);
+            let intensity = emitted * boost * (-depths.at(hit.mino_time)).exp();
+            light.add(intensity, g, color, hit.mino_time);
             let origin = Origin { source, mino_time: hit.mino_time };
-            light.mark(emitted * boost, Place::of_point(&point), origin);
+            light.mark(intensity, Place::of_point(&point), origin);
         }
     }
 

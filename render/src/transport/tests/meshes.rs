@@ -92,6 +92,34 @@ fn exact_annulus_against_the_disc() {
     assert!(compared > 400, "{compared}");
 }
 
+/// Gas in front of a mesh dims it by e^{−D}: D is the depth of a ray that ends there.
+#[test]
+fn exact_gas_dims_what_is_behind_it() {
+    let gas = "gas={profile=\"gaussian\",scale_radius=10.0,flatness=1.0,motion=\"keplerian\",\
+               emissivity=1e-30,absorptivity=3e17,outer_radius=60.0}";
+    let seen = |absorption: &str| {
+        let base = scene(&[gas, &format!("effects.absorption={absorption}")]);
+        let ball = (mesh(true, MeshVelocity::Static), sphere(6.0, 12));
+        observe(&prepared(base, vec![ball]), &[0.0])
+    };
+    let mut dimmed = 0;
+    for (dim, bright) in seen("true").into_iter().zip(seen("false")) {
+        if bright.outcome != Outcome::Surface {
+            continue;
+        }
+        let expected = bright.intensity * (-dim.optical_depth).exp();
+        let apart = (dim.intensity - expected).abs();
+        assert!(
+            apart <= 1e-9 * bright.intensity,
+            "{} {expected} {}",
+            dim.intensity,
+            dim.optical_depth
+        );
+        dimmed += u32::from(dim.optical_depth > 0.1);
+    }
+    assert!(dimmed > 20, "{dimmed}");
+}
+
 /// The silhouette of a sphere of radius R > 3 around a hole without spin: rays whose turning
 /// point is R, b = R/√(1 − 2/R). Flat triangles are at most 1 − cos² (half a patch) inside of it.
 #[test]
