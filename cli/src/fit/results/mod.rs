@@ -78,6 +78,7 @@ impl Estimate<'_> {
         // Before verdict and loss, which see the leakage from here on.
         let leakage = self.leakage(&seen)?;
         let judged = fit.judged(state, &seen, &movie)?;
+        let light = fit.quiescent_light(state);
         let trainer = &mut fit.trainer;
         let volume = recovered(self.file, trainer, state)?;
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
@@ -91,7 +92,7 @@ impl Estimate<'_> {
         if let Some(changes) = &changes {
             self.folder.file("emission.csv")?.write(changes.table().as_bytes())?;
         }
-        self.scene(trainer, state, &movie)?;
+        self.scene(trainer, state, &movie, &light)?;
         let still = self.still_view().at(self.time_of_still(), trainer, state)?;
         self.curve_table(&seen)?;
         let gains = self.gains(&movie, &seen)?;

@@ -1,14 +1,14 @@
-//! A scene of what was recovered, with its motion: `kerrlight render` and `kerrlight movie` show it.
+//! A scene of the recovered matter, with its motion: `kerrlight render` and `kerrlight movie` show it.
 
 use super::Estimate;
 use crate::plain;
 use anyhow::Context;
 use kerrlight_common::frames::Frames;
 use kerrlight_common::toml_file;
+use kerrlight_render::dynamics::Velocity;
 use kerrlight_render::scene::{Scene, VolumeRegion};
 use kerrlight_render::volume::VolumeFile;
-use kerrlight_tomo::fit::{Sampling, setup};
-use kerrlight_tomo::fit::{State, Trainer};
+use kerrlight_tomo::fit::{Region, Sampling, State, Trainer, setup};
 use kerrlight_tomo::recovery::carried;
 
 /// The scene, and the volume that it names.
@@ -16,19 +16,26 @@ const SCENE: &str = "scene.toml";
 const VOLUME: &str = "scene.npz";
 /// Pixels along each side of its picture.
 const SIDE: usize = 256;
+/// Knots of a velocity that is written number by number, at equal ratios of radii.
+const KNOTS: i32 = 257;
 
 impl Estimate<'_> {
-    /// Writes both; none for a field of events, which is not carried along by matter.
+    /// Writes both; none for a field of events, which is not carried along by matter. Each frame of the movie has the
+    /// `quiescent` light as well.
     pub fn scene(
         &self,
         trainer: &mut Trainer<'_, f32>,
         state: &State<f32>,
         movie: &Frames<f32>,
+        quiescent: &[f32],
     ) -> anyhow::Result<()> {
         if trainer.representation.dimension() != 3 {
             return Ok(());
         }
-        let text = self.scene_text(state, movie)?;
+        let frame = self.frame_of_still();
+        let all = |image: &[f32]| image.iter().map(|x| f64::from(*x)).sum::<f64>();
+        let flux = all(&movie.image(frame)?) - all(quiescent);
+        let text = self.scene_text(state, frame, flux)?;
         // A fit may see from where a scene cannot.
         if let Err(error) = Scene::parse(&text) {
             eprintln!("note: no {SCENE} is written: {error}");
@@ -41,12 +48,11 @@ impl Estimate<'_> {
         self.folder.file(SCENE)?.write(text.as_bytes())
     }
 
-    fn scene_text(&self, state: &State<f32>, movie: &Frames<f32>) -> anyhow::Result<String> {
-        let frame = self.frame_of_still();
+    fn scene_text(&self, state: &State<f32>, frame: usize, flux: f64) -> anyhow::Result<String> {
         let parts = [
             self.heading(),
             self.place(frame)?,
-            self.screen(&movie.image(frame)?)?,
+            self.screen(flux)?,
             self.light(),
             self.volume(state)?,
         ];
@@ -87,6 +93,12 @@ impl Estimate<'_> {
                 "# The projected spin points upwards here; in the fit's images it is at {angle} degrees east of north.\n"
             );
         }
+        if self.file.quiescent.is_some() {
+            text += "# The quiescent light of the fit is not part of it.\n";
+        }
+        if self.file.polarization.is_some() {
+            text += "# Light has the Doppler factor of the fit's [polarization], without what depends on the field.\n";
+        }
         if self.file.effects.absorption.is_some() {
             text += "# The medium of the fit's effects.absorption is not part of scenes: this one is without it.\n";
         }
@@ -106,15 +118,14 @@ impl Estimate<'_> {
         Ok(format!("{text}time = {time:?}               # of frame {frame}, M\n"))
     }
 
-    /// The field of the fit; `image` is what the fit has at the time of the picture.
-    fn screen(&self, image: &[f32]) -> anyhow::Result<String> {
+    /// The field of the fit; `flux` is that of its matter at the time of the picture, Jy.
+    fn screen(&self, flux: f64) -> anyhow::Result<String> {
         let screen = &self.file.screen;
         let field = setup::spacing(screen)? * screen.pixels as f64;
         let mut text = format!(
             "[screen]\nfield_of_view_m = {field:?}\nwidth = {SIDE}                # {} in the fit\n",
             screen.pixels
         );
-        let flux: f64 = image.iter().map(|x| f64::from(*x)).sum();
         let hole = &self.file.hole;
         let on_sky = hole.mass_msun.is_some() && hole.distance_kpc.is_some();
         if on_sky && screen.field_uas.is_none() && flux > 0.0 {
@@ -127,7 +138,8 @@ impl Estimate<'_> {
 
     fn light(&self) -> String {
         let effects = &self.file.effects;
-        let shift = effects.redshift_power;
+        let polarized = self.file.polarization.as_ref().map(|law| law.redshift_power);
+        let shift = effects.redshift_power.or(polarized);
         let shift = shift.map(|power| format!("redshift = true\nredshift_power = {power:?}\n"));
         format!(
             "[effects]\n{}slow_light = {}\n\n[tracer]\nintegrator = \"elliptic\"\ntolerance = 1e-4          # cells of the volume are larger than what a finer one would show\n",
@@ -138,9 +150,7 @@ impl Estimate<'_> {
 
     fn volume(&self, state: &State<f32>) -> anyhow::Result<String> {
         let (motion, region) = (&self.file.motion, &self.file.region);
-        // The scene has to drag as the fit did, and to perturb from the same seed.
-        let law = motion.law().seeded(self.file.seed).dragged(setup::drag(self.file)?);
-        let law = toml_file::inline(&law).context("motion.velocity")?;
+        let law = toml_file::inline(&self.rotation()?).context("motion.velocity")?;
         let region =
             VolumeRegion { r_min: region.r_min, r_max: region.r_max, z_width: region.z_width };
         let region = toml_file::inline(&region).context("region")?;
@@ -152,6 +162,24 @@ impl Estimate<'_> {
         );
         text += &line("injection_time", motion.injection_time);
         Ok(format!("{text}region = {region}\n"))
+    }
+
+    /// The velocity of the matter: the fit's law, or numbers where a [band] has found another multiple of it.
+    fn rotation(&self) -> anyhow::Result<Velocity> {
+        let found = &self.motion.velocity;
+        if setup::motion(self.file, Vec::new())?.velocity == *found {
+            // The scene has to drag as the fit did, and to perturb from the same seed.
+            let drag = setup::drag(self.file)?;
+            return Ok(self.file.motion.law().seeded(self.file.seed).dragged(drag));
+        }
+        let Region { r_min, r_max, .. } = self.file.region.limits();
+        // Matter at the edge of the region comes from beyond it where it falls.
+        let (low, high) = (r_min.max(1.0), 1.5 * r_max);
+        let ratio = (high / low).ln() / f64::from(KNOTS - 1);
+        let radii: Vec<f64> = (0..KNOTS).map(|k| low * (ratio * f64::from(k)).exp()).collect();
+        let angular = radii.iter().map(|r| found.rate(*r)).collect();
+        let radial = radii.iter().map(|r| found.fall(*r)).collect();
+        Ok(Velocity::Profile { radii, angular, radial })
     }
 }
 
