@@ -48,10 +48,7 @@ impl ResolvedFit {
                 Self::in_geometry(problem, &file, geometry, resolution.rays)?
             }
             Choice::Band { inclination_deg, position_angle_deg, rotation_factor, background } => {
-                let mut file = setup::in_band_geometry(settings, *inclination_deg);
-                if let Some(law) = &mut file.polarization {
-                    law.turn_deg += position_angle_deg;
-                }
+                let file = setup::in_band_geometry(settings, *inclination_deg, *position_angle_deg);
                 let motion = setup::band_motion(&file, measured, *rotation_factor)?;
                 let instrument = Instrument::new(&file)?;
                 let measured = background.as_ref().map(|values| measured.before(values.clone()));

@@ -224,6 +224,16 @@ pub fn check_band<'a>(
             "band.position_angles_deg needs loss.0.stokes = [\"Q\", \"U\"] with the same error of both"
         );
     }
+    if file.change.is_some() {
+        refuse!(
+            "[change] is not allowed with [band]: matter of a band carries its emission unchanged"
+        );
+    }
+    let angle = file.observer.position_angle_deg.value();
+    if angle != 0.0 {
+        let allowed = "0 with [band], whose position_angles_deg are those of the spin";
+        return Err(FitError::range("observer.position_angle_deg", angle, allowed).into());
+    }
     let vector = axis(file)?.0.vector();
     if vector[2].abs() < 1.0 - 1e-9 {
         let [x, y, z] = vector;
@@ -306,9 +316,10 @@ fn weighed(
 }
 
 /// The settings of a geometry.
-pub fn in_band_geometry(file: &FitFile, inclination_deg: f64) -> FitFile {
+pub fn in_band_geometry(file: &FitFile, inclination_deg: f64, position_angle_deg: f64) -> FitFile {
     let mut file = file.clone();
     file.observer.inclination_deg = inclination_deg.into();
+    file.observer.position_angle_deg = position_angle_deg.into();
     file
 }
 
@@ -334,7 +345,8 @@ fn rows(
     curve: &Curve,
     flow: Flow,
 ) -> Result<CurveRows> {
-    let file = in_band_geometry(file, flow.inclination_deg);
+    // All position angles share the rows: data are turned in place of them.
+    let file = in_band_geometry(file, flow.inclination_deg, 0.0);
     let instrument = Instrument::new(&file)?;
     let mut model: ForwardModel<f32> =
         instrument.forward(&band_motion(&file, measured, flow.rotation_factor)?)?;

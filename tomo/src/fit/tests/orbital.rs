@@ -110,6 +110,11 @@ fn exact_position_angles_of_the_spin() {
     let found =
         setup::scan_band(&file, &measured, &settings, &Forgetful, &|_| true).unwrap().unwrap();
     assert_eq!(found.geometries[found.best].position_angle_deg, 40.0, "{:?}", found.geometries);
+    // The fit that follows turns its images as well.
+    let turned = setup::in_band_geometry(&file, 12.0, 40.0);
+    assert_eq!(turned.observer.position_angle_deg.value(), 40.0);
+    let refused = setup::check_band(&turned, &measured, &settings).unwrap_err().to_string();
+    assert!(refused.starts_with("observer.position_angle_deg = 40"), "{refused}");
 }
 
 fn measured_file(more: &str) -> FitFile {

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::fit::FluxDatum;
 use crate::fit::band::{Background, Band, Interval};
-use crate::fit::setup::{BandGeometry, BandScan};
+use crate::fit::setup::{self, BandGeometry, BandScan};
 use crate::null::or_nan;
 use crate::recovery::{Choice, Problem};
 use serde::{Deserialize, Serialize};
@@ -106,14 +106,15 @@ impl BandResults {
             Some(_) => Some(file.simulated()?.observer.inclination_deg.value()),
             None => None,
         };
-        let axis_z = file.motion.axis.map_or(1.0, |axis| axis[2]);
+        let rate = setup::motion(file, Vec::new())?.velocity.rate(best.band.radius);
+        let upwards = rate * file.motion.axis.map_or(1.0, |axis| axis[2]);
         let (radii, periods) = (radii(scan), periods(scan));
         Ok(Self {
             inclination_deg: median(&inclinations, Some(best.inclination_deg)),
             inclinations,
             rotation_factor: probabilities(|geometry| geometry.rotation_factor),
             position_angle_deg: probabilities(|geometry| geometry.position_angle_deg),
-            clockwise: Some(clockwise(scan, axis_z)),
+            clockwise: Some(clockwise(scan, upwards)),
             radius: median(&radii, Some(best.band.radius)),
             radii,
             band: best.band,
@@ -236,14 +237,14 @@ fn binned(shares: &[[f64; 2]], bins: usize) -> Vec<[f64; 2]> {
     all
 }
 
-/// The probability that matter turns clockwise on the sky: the axis is that of the hole, right-handed about
-/// `motion.axis`.
-fn clockwise(scan: &BandScan, axis_z: f64) -> f64 {
+/// The probability that matter turns clockwise on the sky, where the law of motion turns it so fast, right-handed about the
+/// spin.
+fn clockwise(scan: &BandScan, upwards: f64) -> f64 {
     let towards = |geometry: &BandGeometry| {
         geometry.rotation_factor * geometry.inclination_deg.to_radians().cos()
     };
     // Seen edge-on there is no sense; standing matter has none.
-    let share = |towards: f64| match towards * axis_z {
+    let share = |towards: f64| match towards * upwards.signum() {
         x if x.abs() < 1e-9 => 0.5,
         x => f64::from(u8::from(x < 0.0)),
     };
