@@ -156,8 +156,8 @@ impl GeometryModel {
 
     /// The same with other rays for the pixels near the critical curve; those of number 0 are the usual ones.
     pub fn seen_along(&self, number: u64) -> Self {
-        let shifted = |ring| RingRays { shift: RingRays::shift(number), ..ring };
-        Self { ring: self.ring.map(shifted), ..self.clone() }
+        let other = |ring| RingRays { lattice: number, ..ring };
+        Self { ring: self.ring.map(other), ..self.clone() }
     }
 
     /// Returns the motion of matter in a geometry.

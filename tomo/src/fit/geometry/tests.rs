@@ -108,7 +108,7 @@ fn exact_pixels_of_the_ring_are_means_over_rays() {
     let mut model = model(Law::CircularOrbits);
     // The third pixel is far from the critical curve.
     (model.x, model.y) = (vec![5.3, -3.9, 9.0], vec![0.2, 3.4, 0.0]);
-    let ring = RingRays { count: 8, spacing: 0.5, shift: [0.1, 0.7] };
+    let ring = RingRays { count: 8, spacing: 0.5, lattice: 3 };
     let geometry = Geometry::new(0.3, 0.9);
     let (blobs, parameters) = parameters(Blobs::STEADY);
     let field = Field {
@@ -221,7 +221,7 @@ fn exact_residuals_point_to_the_model_that_made_the_data() {
 #[test]
 fn exact_steps_lead_to_the_best_geometry() {
     let (mut model, side) = (screen(20, 12), 20);
-    model.ring = Some(RingRays { count: 8, spacing: 1.0, shift: [0.0; 2] });
+    model.ring = Some(RingRays { count: 8, spacing: 1.0, lattice: 0 });
     let truth = Geometry::new(0.6, 1.05).with(Parameter::PositionAngle, 0.7);
     let forward: ForwardModel<f32> = model.seen_along(5).forward(&truth).unwrap();
     let wide = |[x, y, z]: [f64; 3]| {

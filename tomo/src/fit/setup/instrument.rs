@@ -231,7 +231,7 @@ pub(super) fn ring(file: &FitFile) -> Result<Option<RingRays>> {
     if file.polarization.is_some() {
         refuse!("screen.ring_rays and polarization exclude each other");
     }
-    Ok((count > 1).then_some(RingRays { count, spacing: spacing(&file.screen)?, shift: [0.0; 2] }))
+    Ok((count > 1).then_some(RingRays { count, spacing: spacing(&file.screen)?, lattice: 0 }))
 }
 
 /// Rays along each side of a pixel, whose mean is its light.
