@@ -1,8 +1,8 @@
 //! Evidence for a fit: what its residuals are judged by.
 
 use crate::Error;
-use crate::fit::settings::{DataFiles, FitFile, Loss, LossKind, Noise};
-use crate::fit::setup::FitData;
+use crate::fit::settings::{FitFile, Loss, LossKind};
+use crate::fit::setup::{FitData, errors};
 use crate::fit::verdict::{Errors, Expected, Statistics, Tested, Verdict, ZeroSpacing, judge};
 use kerrlight_common::frames::Frames;
 use kerrlight_vlbi::products::debiased_amplitude;
@@ -34,23 +34,6 @@ const SHORT: f64 = 0.05;
 fn ordered(losses: &[Loss]) -> impl Iterator<Item = &Loss> {
     let of = |image: bool| losses.iter().filter(move |l| (l.data == LossKind::Image) == image);
     of(true).chain(of(false))
-}
-
-/// Returns the meaning of σ of a kind of data.
-fn errors(file: &FitFile, kind: LossKind) -> Errors {
-    let of_pixels = matches!(kind, LossKind::Image | LossKind::LightCurve);
-    match (&file.data, file.observation()) {
-        (Some(DataFiles::Movie { .. }), _) => Errors::Assumed,
-        (Some(DataFiles::Visibilities { .. } | DataFiles::LightCurve(_)), _) => Errors::Stated,
-        _ if file.simulated_curve().is_some_and(|curve| curve.noise == Noise::Thermal) => {
-            Errors::Known
-        }
-        (None, Some(seen)) if !of_pixels && seen.noise == Noise::Thermal => match seen.systematic {
-            Some(part) if part > 0.0 => Errors::Stated,
-            _ => Errors::Known,
-        },
-        _ => Errors::Weight,
-    }
 }
 
 /// Data, and what they are to the fit.

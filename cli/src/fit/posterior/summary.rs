@@ -200,7 +200,12 @@ impl Interval {
     /// Returns the interval of 95 %: that of a normal distribution, inside the bounds.
     pub fn ends(&self) -> [f64; 2] {
         let reach = 1.96 * self.deviation;
-        let [low, high] = self.bounds;
+        let ([low, high], unit) = (self.bounds, self.parameter.unit());
+        // A full circle has no ends.
+        let (low, high) = match self.parameter.difference(low * unit, high * unit).abs() < 1e-6 {
+            true => (f64::NEG_INFINITY, f64::INFINITY),
+            false => (low, high),
+        };
         [(self.mean - reach).max(low), (self.mean + reach).min(high)]
     }
 
@@ -229,7 +234,7 @@ impl Interval {
         let truth = self.truth.map(|truth| if truth.abs() < 5e-4 { 0.0 } else { truth });
         let truth = truth.map_or(String::new(), |truth| format!(" (truth: {truth:.3}{unit})"));
         let ([from, to], [low, high]) = (self.ends(), self.bounds);
-        if self.open || (from <= low && to >= high) {
+        if self.open || to - from >= high - low {
             return format!("The {words} is not constrained{truth}.");
         }
         format!("The {words} is between {from:.3}{unit} and {to:.3}{unit} at 95 %{truth}.")

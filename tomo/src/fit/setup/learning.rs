@@ -268,6 +268,10 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     }
     if file.unknown_geometry()?.is_some() {
         linear(file).within("search")?;
+        unweighted(
+            file,
+            "1 with a number that has a prior, whose errors follow from those of the data",
+        )?;
     }
     check_prior(file)?;
     enough_nodes_and_iterations(file)?;
@@ -298,9 +302,13 @@ fn check_prior(file: &FitFile) -> Result<()> {
              bright the emission is"
         );
     }
+    unweighted(file, "1 with [linear.prior], beside which data count as their errors say")
+}
+
+/// Refuses losses that count more or less than the errors of their data say.
+fn unweighted(file: &FitFile, allowed: &str) -> Result<()> {
     match file.loss.iter().position(|loss| loss.weight != 1.0) {
         Some(k) => {
-            let allowed = "1 with [linear.prior], beside which data count as their errors say";
             Err(FitError::range(format!("loss.{k}.weight"), file.loss[k].weight, allowed).into())
         }
         None => Ok(()),

@@ -5,6 +5,7 @@ mod change;
 mod coarse_view;
 mod curve;
 mod drawn;
+mod errors;
 mod fit_data;
 mod gains;
 mod geometry;
@@ -42,6 +43,7 @@ pub use change::{change, emission_times};
 pub use coarse_view::CoarseView;
 pub use curve::Curve;
 pub use drawn::{Drawn, OtherModel};
+pub use errors::errors;
 pub use fit_data::FitData;
 pub use geometry::{
     FoundGeometry, GeometryPosterior, RaySampling, Resolution, SearchWatch, Trial, find_geometry,

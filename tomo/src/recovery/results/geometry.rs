@@ -215,9 +215,9 @@ const RADII: usize = 64;
 /// Returns the distance of a flow from the true one: the root mean square difference of (dr/dt, r dφ/dt) over the radii of
 /// the region, over the root mean square of the true velocity.
 fn flow_error(file: &FitFile, trials: [&Geometry; 2]) -> Result<Option<f64>, Error> {
-    let laws = trials.map(|geometry| setup::motion(&settled(file, geometry), Vec::new()));
-    let [found, truth] = laws;
-    let (found, truth) = (found?.velocity, truth?.velocity);
+    let [found, truth] = trials;
+    let law = |file: &FitFile, geometry| setup::motion(&settled(file, geometry), Vec::new());
+    let (found, truth) = (law(file, found)?.velocity, law(&file.simulated()?, truth)?.velocity);
     let Region { r_min, r_max, .. } = file.region;
     let (mut away, mut all) = (0.0, 0.0);
     for k in 0..RADII {

@@ -163,7 +163,7 @@ impl GeometryResults {
         };
         let values: Vec<String> = nearest.end.iter().map(value).collect();
         Some(format!(
-            "another geometry explains the data about as well (χ²/2 larger by {:.1} in the coarse search), and the intervals \
+            "another geometry explains the data about as well (χ²/2 larger by {:.1}), and the intervals \
              leave it out: {}",
             nearest.above_best,
             values.join(", ")
@@ -223,7 +223,7 @@ impl GeometryResults {
         };
         Some(format!(
             "the volume of the best geometry leaves χ²/N = {chi2:.2}, {means}: matter may move by another law than \
-             motion.velocity, or emission lie outside of the region; else linear.degree = \"quadratic\" may help, and \
+             motion.velocity, or emission lie outside of the region; else more search.fine.nodes may help, and \
              pulse = \"delta\" where data are of finer pixels"
         ))
     }
@@ -402,7 +402,7 @@ mod tests {
             trial([0.1, 80.0], 40.0, [false, true]),
         ];
         let said = results.sentences().join(" ");
-        let rival = "larger by 1.2 in the coarse search), and the intervals leave it out: spin -0.880, inclination \
+        let rival = "larger by 1.2), and the intervals leave it out: spin -0.880, inclination \
                      121.000°.";
         assert!(said.contains(rival), "{said}");
         results.trials[2].above_best = 12.0;

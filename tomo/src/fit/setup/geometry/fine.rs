@@ -1,7 +1,7 @@
 //! Detailed search, from the ends of the coarse searches to the best geometry and its errors.
 
 use super::detail::{Detail, Detailed, Place, RaySampling, Resolution, Sure, Trial};
-use super::posterior::{polished, surely};
+use super::posterior::{Looks, polished, surely};
 use super::search_data::SearchData;
 use super::tangent::Anchor;
 use super::{discretisation, seen_through};
@@ -11,7 +11,7 @@ use crate::fit::geometry::{
 use crate::fit::linear::{StopRule, refined};
 use crate::fit::settings::SearchView;
 use crate::fit::setup::Result;
-use crate::fit::setup::drawn::is_drawn_elsewhere;
+use crate::fit::setup::drawn::{is_drawn, is_drawn_elsewhere};
 use crate::fit::setup::instrument::samples;
 
 impl Detail<'_> {
@@ -38,7 +38,10 @@ impl Detail<'_> {
         }
         let found = self.through(&place, |problem| match is_convex {
             true => populated(problem, anchor.geometry, how, watch),
-            false => about_volumes(&place.seen, problem, anchor, how, watch),
+            false => {
+                let looks = Looks { resampled: None, shares_rays: self.shares_rays(&place) };
+                about_volumes(&place.seen, looks, problem, anchor, how, watch)
+            }
         })?;
         let Some(found) = found else { return Ok(None) };
         let sure = self.beside_its_own(&place, found)?;
@@ -64,6 +67,12 @@ impl Detail<'_> {
     /// Returns whether data are of another model than that of the fit.
     pub fn is_foreign(&self) -> Result<bool> {
         Ok(self.file.data.is_some() || is_drawn_elsewhere(self.file)?)
+    }
+
+    /// Returns whether data have the rays through which a place sees them.
+    pub fn shares_rays(&self, place: &Place) -> bool {
+        let is_simulated = self.file.data.is_none() && !is_drawn(self.file);
+        is_simulated && place.at.pixels == self.file.screen.pixels
     }
 
     /// Adds the errors that the model has of itself, where data are of another one.
@@ -118,6 +127,7 @@ fn populated(
 /// The same where data are convex about a volume only.
 fn about_volumes(
     seen: &SearchData,
+    looks: Looks<'_>,
     problem: &GeometryProblem<'_, f32>,
     volume: &Anchor,
     how: &Exploration,
@@ -130,7 +140,7 @@ fn about_volumes(
         let Some(explored) = quick.explore(start, Some(&x), how, watch)? else {
             return Ok(None);
         };
-        return surely_about(seen, problem, &explored).map(Some);
+        return surely_about(seen, looks, problem, &explored).map(Some);
     };
     let explored = seen.about(&quick, &first, |quick| quick.explore(start, None, how, watch))?;
     let Some(explored) = explored.flatten() else { return Ok(None) };
@@ -139,7 +149,8 @@ fn about_volumes(
         return Ok(None);
     };
     let anchor = Anchor::of(problem, &explored.best);
-    let found = seen.about(problem, &anchor, |problem| surely_about(seen, problem, &explored))?;
+    let found =
+        seen.about(problem, &anchor, |problem| surely_about(seen, looks, problem, &explored))?;
     Ok(found.map(|sure| {
         let spread = sure.spread.filter(|_| sure.reduced_chi2 < WAY);
         Sure { spread, ..sure }
@@ -164,12 +175,13 @@ const WAY: f64 = 3.0;
 /// Returns the errors of the best of the geometries that were explored.
 fn surely_about(
     seen: &SearchData,
+    looks: Looks<'_>,
     problem: &GeometryProblem<'_, f32>,
     explored: &Explored,
 ) -> Result<Sure> {
     if is_stepped(seen, problem) {
         let (polished, reduced) = polished(problem, &explored.best)?;
-        return surely(problem, None, &polished, reduced);
+        return surely(problem, looks, &polished, reduced);
     }
     valued(problem, explored)
 }

@@ -15,7 +15,7 @@ use rand_pcg::Pcg64;
 
 /// Stream of the random numbers of draws.
 const DRAWS: u64 = 0x6f70_656e_0000_0000;
-/// The number of a draw that has as many voxels as the fit.
+/// The number of a look that has the rays of the fit, and as many voxels.
 const SAME: u64 = 0;
 
 /// The best geometry near another one, and its χ²/N.
@@ -42,7 +42,7 @@ fn other_voxels(effort: Effort, number: u64) -> Effort {
 /// with χ²/N where that is above 1.
 pub(super) fn surely(
     problem: &GeometryProblem<'_, f32>,
-    resampled: Resampled<'_>,
+    looks: Looks<'_>,
     polished: &Polished,
     reduced_chi2: f64,
 ) -> Result<Sure> {
@@ -51,7 +51,7 @@ pub(super) fn surely(
         return Ok(Sure { geometry: polished.best.geometry, spread: None, reduced_chi2 });
     }
     let inflation = reduced_chi2.max(1.0);
-    let envelope = enveloped(problem, resampled, polished, inflation)?;
+    let envelope = enveloped(problem, looks, polished, inflation)?;
     let envelope = envelope.unwrap_or_else(|| Envelope {
         geometry: polished.best.geometry,
         covariance: polished.covariance.iter().map(|x| x * inflation).collect(),
@@ -71,14 +71,20 @@ pub(super) fn surely(
     Ok(Sure { geometry, spread: Some(spread), reduced_chi2 })
 }
 
-/// Data through other pixels, and what of the geometry is not known; none where pixels are those of the data.
-pub(super) type Resampled<'a> = Option<(&'a SearchData, &'a UnknownGeometry, &'a SearchView)>;
+/// Looks at the same data through other models.
+#[derive(Clone, Copy)]
+pub(super) struct Looks<'a> {
+    /// Data through other pixels, and what of the geometry is not known; none where pixels are those of the data.
+    pub resampled: Option<(&'a SearchData, &'a UnknownGeometry, &'a SearchView)>,
+    /// True if data have the rays of the fit: along others the minimum lies elsewhere, which is no error.
+    pub shares_rays: bool,
+}
 
 /// The bowl beneath the ripples, along other lattices of rays, each with other voxels, where the data alone decide, and with
 /// other pixels, where those are samples only.
 fn enveloped(
     problem: &GeometryProblem<'_, f32>,
-    resampled: Resampled<'_>,
+    Looks { resampled, shares_rays }: Looks<'_>,
     polished: &Polished,
     inflation: f64,
 ) -> Result<Option<Envelope>> {
@@ -90,7 +96,8 @@ fn enveloped(
         // Models of other pixels come with the panels of the settings, not those of the search.
         let split = problem.model.split;
         let mut look = |problem: &GeometryProblem<'_, f32>| {
-            let model = &GeometryModel { split, ..problem.model.seen_along(number) };
+            let lattice = if shares_rays { SAME } else { number };
+            let model = &GeometryModel { split, ..problem.model.seen_along(lattice) };
             let effort = other_voxels(problem.effort, number);
             surroundings.look(&GeometryProblem { model, effort, ..*problem })
         };

@@ -9,6 +9,7 @@ use crate::fit::geometry::{
 };
 use crate::fit::journal::{Journal, Memory};
 use crate::fit::settings::{FieldKind, FitFile, Linear, UnknownGeometry};
+use crate::fit::setup::errors::have_noise;
 use crate::fit::setup::{FitData, Result};
 
 use rayon::prelude::*;
@@ -56,8 +57,9 @@ pub fn find_geometry(
     let coarse = SearchData::coarsely(file, measured, &search.coarse)?;
     let gaussian = |linear: &Linear| linear.prior_of(FieldKind::Gaussian).is_some();
     let has_prior = file.linear.as_ref().is_some_and(gaussian);
-    // Beside a prior of the voxels data count as their errors say.
-    let scale = |reduced: f64| if has_prior { 1.0 } else { scale(reduced) };
+    // Beside a prior of the voxels, or with noise, data count as their errors say.
+    let is_known = has_prior || have_noise(file);
+    let scale = |reduced: f64| if is_known { 1.0 } else { scale(reduced) };
     // The factor weighs χ² against the priors in every value: it has to be known before them.
     let first = coarse
         .with(unknown, &search.coarse, 1.0, memory, |problem| least(problem, search.starts))?;

@@ -2,7 +2,7 @@
 //! for.
 
 use super::detail::{Detail, Detailed, Place, Resolution, Sure, Trial};
-use super::posterior::{Resampled, polished, surely};
+use super::posterior::{Looks, polished, surely};
 use super::refinement::{MEANS, MOST, Solved};
 use crate::fit::geometry::{Estimate, Free, Geometry, Polished, TrialWatch};
 use crate::fit::setup::Result;
@@ -174,7 +174,8 @@ impl Detail<'_> {
 
     /// Returns the errors of the best geometry, with those that the model has of itself.
     fn sure(&self, place: &Place, best: &Stepped) -> Result<Sure> {
-        let resampled: Resampled<'_> = Some((&place.seen, self.unknown, &place.view));
+        let resampled = Some((&place.seen, self.unknown, &place.view));
+        let looks = Looks { resampled, shares_rays: self.shares_rays(place) };
         let sure = self.smoothly(place, best.geometry(), |problem| {
             // Pixels of images that count are now those about this geometry.
             let moved = place.seen.is_images().then(|| polished(problem, &best.polished.best));
@@ -182,7 +183,7 @@ impl Detail<'_> {
                 Some(polished) => polished,
                 None => (best.polished.clone(), best.reduced),
             };
-            surely(problem, resampled, &polished, reduced)
+            surely(problem, looks, &polished, reduced)
         })?;
         let sure = self.beside_its_own(place, sure)?;
         match place.even {
