@@ -60,45 +60,10 @@ fn styled(length: Option<u64>, style: &str, name: &'static str) -> ProgressBar {
 }
 
 /// A bar that counts things of this name, with a message.
-fn counting(length: u64, name: &'static str) -> ProgressBar {
+pub fn counting(length: u64, name: &'static str) -> ProgressBar {
     let style =
         format!("{{bar:30}} {name} {{pos}} of {{len}}  {{msg}}  {{elapsed}} gone, {{eta}} left");
     styled(Some(length), &style, name)
-}
-
-/// A bar that counts frames.
-pub fn frames(count: u64) -> ProgressBar {
-    counting(count, "frame")
-}
-
-/// A bar that counts steps.
-pub fn steps(count: u64) -> ProgressBar {
-    counting(count, "step")
-}
-
-/// A bar that counts cases, with the name of the one that runs.
-pub fn cases(count: u64) -> ProgressBar {
-    counting(count, "case")
-}
-
-/// A bar that counts trials, and says which search goes on.
-pub fn geometries(count: u64) -> ProgressBar {
-    counting(count, "trial")
-}
-
-/// A bar that counts draws from a posterior, and says what the present one does.
-pub fn samples(count: u64) -> ProgressBar {
-    counting(count, "draw")
-}
-
-/// A bar that counts solutions without a part of the frames.
-pub fn held_out(count: u64) -> ProgressBar {
-    counting(count, "solution")
-}
-
-/// A bar that counts axes.
-pub fn axes(count: u64) -> ProgressBar {
-    counting(count, "axis")
 }
 
 /// A line for work of unknown length.

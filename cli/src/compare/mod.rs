@@ -292,7 +292,7 @@ fn run(cases: &[Case], runner: &Runner<'_>) -> HashMap<String, String> {
     for case in wrong {
         eprintln!("failed: {}: {}", case.name(), case.early_error().unwrap_or_default());
     }
-    let bar = progress::cases(open.len() as u64);
+    let bar = progress::counting(open.len() as u64, "case");
     let mut failed = HashMap::new();
     for case in open {
         if keeper.stopped() {

@@ -40,7 +40,7 @@ pub fn read(path: &Path, times_h: &[f64], reach: Reach) -> anyhow::Result<Stokes
     let movie = || format!("{}: {} frames of {width} x {height} pixels", name(), frames.len());
     memory::afford(movie, memory::movie(frames.len() as f64, grid.pixels() as f64))?;
     let start = scene.observer.time;
-    let bar = progress::frames(frames.len() as u64);
+    let bar = progress::counting(frames.len() as u64, "frame");
     let mut pixels = Vec::with_capacity(frames.len() * grid.pixels());
     let mut polarized = [None, None, None];
     let mut first_factor = None;

@@ -92,7 +92,7 @@ impl Animations {
             }
             None => None,
         };
-        let bar = progress::frames(sequence.len() as u64);
+        let bar = progress::counting(sequence.len() as u64, "frame");
         for k in 0..sequence.len() {
             let drawn = draw(k)?;
             gif.as_mut().map(|film| film.push(&drawn)).transpose()?;

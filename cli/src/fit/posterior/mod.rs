@@ -87,7 +87,7 @@ impl Posterior {
         std::fs::create_dir_all(&path)
             .with_context(|| format!("cannot make {}", path.display()))?;
         let drawing = Drawing::new(&prepared, &folder, unknown.as_ref(), *numbers.end(), &path)?;
-        let bar = progress::samples(numbers.clone().count() as u64);
+        let bar = progress::counting(numbers.clone().count() as u64, "draw");
         let keeper = SignalGuard::brief("stopping; the same command continues");
         for number in numbers.clone() {
             if drawing.kept_or_drawn(&path, number.into(), &keeper, &bar)?.is_none() {
@@ -165,7 +165,7 @@ pub fn draw(prepared: &Problem, folder: &Folder, samples: u32) -> anyhow::Result
     std::fs::create_dir_all(&path).with_context(|| format!("cannot make {}", path.display()))?;
     let unknown = prepared.settings.unknown_geometry()?;
     let drawing = Drawing::new(prepared, folder, unknown.as_ref(), samples, &path)?;
-    let bar = progress::samples(u64::from(samples));
+    let bar = progress::counting(u64::from(samples), "draw");
     let keeper = SignalGuard::brief(format!("stopping; resume with: {}", again(folder, samples)));
     let mut all = Vec::new();
     for number in 1..=u64::from(samples) {

@@ -97,21 +97,22 @@ impl<'a> Kept<'a> {
         let settings = &self.problem.settings;
         match at {
             At::Geometry { .. } => {
-                progress::geometries(geometry_search::planned(settings).unwrap_or(0))
+                progress::counting(geometry_search::planned(settings).unwrap_or(0), "trial")
             }
             At::Band(_) => {
                 let count = settings.band.as_ref().map_or(0, |band| {
                     band.inclinations_deg.values().len() * band.rotation_factors.len()
                 });
-                progress::geometries(count as u64)
+                progress::counting(count as u64, "trial")
             }
             At::HeldOut(..) => {
                 let held = settings.held_out.as_ref();
-                progress::held_out(held.map_or(0, |held| held.values.len() * held.folds) as u64)
+                let count = held.map_or(0, |held| held.values.len() * held.folds);
+                progress::counting(count as u64, "solution")
             }
-            At::Axis(_, of) => progress::axes(of as u64),
+            At::Axis(_, of) => progress::counting(of as u64, "axis"),
             At::Linear(_) => progress::waiting("linear grid"),
-            _ => progress::steps(settings.training.steps),
+            _ => progress::counting(settings.training.steps, "step"),
         }
     }
 

@@ -190,7 +190,7 @@ fn searched(
         + draws.div_ceil(2)
         + of_polarized;
     let keeper = SignalGuard::brief(STOPPED);
-    let bar = progress::held_out(all as u64);
+    let bar = progress::counting(all as u64, "solution");
     let done = AtomicU64::new(0);
     let watch = |stage: Stage, solved: usize| {
         // With nothing solved it is asked within a solution whether to go on.
