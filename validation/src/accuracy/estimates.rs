@@ -4,9 +4,11 @@
 //! Errors of samples are taken at equal Mino time. A crossing is judged as it is used, against
 //! the true crossing, so that an error of when the ray crosses counts as one of where.
 
+use super::Oracle;
 use super::rays::{Angle, Draw, beside_critical_curve, in_disc, log_uniform};
-use super::{Oracle, TrueError};
-use kerrlight_geodesic::{Error, Integrator, Kerr, Placement, Points, RayTable, Request};
+use kerrlight_geodesic::{
+    Error, Integrator, Kerr, Placement, Points, RayTable, Request, Uncertainty,
+};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
@@ -264,7 +266,7 @@ fn judge(
     };
     let estimate = table.uncertainty[0];
     let estimate = [estimate.radius, estimate.theta, estimate.azimuth, estimate.delay];
-    let columns = |t: TrueError| ([t.radius, t.theta, t.azimuth, t.delay], estimate);
+    let columns = |t: Uncertainty| ([t.radius, t.theta, t.azimuth, t.delay], estimate);
     Ok(truth.map(columns))
 }
 
@@ -272,18 +274,18 @@ fn point(points: &Points, k: usize) -> [f64; 4] {
     [points.radius[k], points.theta[k], points.azimuth[k], points.delay[k]]
 }
 
-fn samples(table: &RayTable, horizon: f64, oracle: &Oracle) -> Option<TrueError> {
+fn samples(table: &RayTable, horizon: f64, oracle: &Oracle) -> Option<Uncertainty> {
     let points = &table.samples;
     // Azimuth and delay have no limit at the horizon itself.
     let counts = |k: &usize| points.radius[*k] > horizon * (1.0 + 2e-8);
     (0..points.len())
         .filter(counts)
         .map(|k| oracle.judge(points.mino_time[k], point(points, k)))
-        .reduce(TrueError::max)
+        .reduce(Uncertainty::max)
 }
 
-fn crossings(table: &RayTable, oracle: &Oracle) -> Result<Option<TrueError>, ()> {
-    let times = oracle.exact_crossings();
+fn crossings(table: &RayTable, oracle: &Oracle) -> Result<Option<Uncertainty>, ()> {
+    let times = oracle.crossings();
     let points = &table.crossings;
     let end = table.mino_total[0];
     let before_end = times.iter().filter(|time| time.hi <= end).count();
@@ -291,7 +293,7 @@ fn crossings(table: &RayTable, oracle: &Oracle) -> Result<Option<TrueError>, ()>
         return Err(());
     }
     let judged = |k: usize| oracle.compare(&oracle.at_exactly(times[k]), point(points, k));
-    Ok((0..points.len()).map(judged).reduce(TrueError::max))
+    Ok((0..points.len()).map(judged).reduce(Uncertainty::max))
 }
 
 /// Judges `n` random rays of a class by every setting.

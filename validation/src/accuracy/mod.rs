@@ -15,4 +15,4 @@ mod oracle;
 pub mod rays;
 pub mod sweep;
 
-pub use oracle::{Oracle, TrueError};
+pub use oracle::Oracle;

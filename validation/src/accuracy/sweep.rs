@@ -1,7 +1,7 @@
 //! Integrator × tolerance × spin × class of ray.
 
+use super::Oracle;
 use super::rays::{Class, Draw, draw};
-use super::{Oracle, TrueError};
 use kerrlight_geodesic::{Error, Integrator, Kerr, Placement, RayTable, Request, Uncertainty};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -127,7 +127,7 @@ pub fn run(sweep: &Sweep, progress: impl Fn(usize, usize) -> bool) -> Result<Vec
 /// One ray by one setting.
 struct Judged {
     right_fate: bool,
-    truth: TrueError,
+    truth: Uncertainty,
     estimate: Uncertainty,
 }
 
@@ -160,7 +160,7 @@ fn judge(
 
 fn judged(table: &RayTable, class: Class, spin: f64, oracle: &Oracle) -> Judged {
     let samples = &table.samples;
-    let mut truth = TrueError::default();
+    let mut truth = Uncertainty::default();
     for k in 0..samples.len() {
         if counts(class, spin, samples.radius[k]) {
             let at = [samples.radius[k], samples.theta[k], samples.azimuth[k], samples.delay[k]];
@@ -223,6 +223,11 @@ fn quantiles(mut values: Vec<f64>) -> [f64; 3] {
     [0.5, 0.99, 1.0].map(|part| values[(part * last as f64).round() as usize])
 }
 
+/// The largest of the errors of r (relative), θ and φ.
+fn position(errors: &Uncertainty) -> f64 {
+    errors.radius.max(errors.theta).max(errors.azimuth)
+}
+
 fn summary(
     (integrator, tolerance): (Integrator, f64),
     spin: Option<f64>,
@@ -237,10 +242,7 @@ fn summary(
             && truth.theta <= estimate.theta
             && truth.azimuth <= estimate.azimuth
     };
-    let ratio = |ray: &&Judged| {
-        let estimate = ray.estimate.radius.max(ray.estimate.theta).max(ray.estimate.azimuth);
-        estimate / ray.truth.position().max(f64::EPSILON)
-    };
+    let ratio = |ray: &&Judged| position(&ray.estimate) / position(&ray.truth).max(f64::EPSILON);
     let count = right.len().max(1) as f64;
     Row {
         integrator,
@@ -249,7 +251,7 @@ fn summary(
         class,
         rays: rays.len(),
         wrong_fates: rays.len() - right.len(),
-        error: quantiles(right.iter().map(|ray| ray.truth.position()).collect()),
+        error: quantiles(right.iter().map(|ray| position(&ray.truth)).collect()),
         delay_error: quantiles(right.iter().map(|ray| ray.truth.delay).collect()),
         bounded: right.iter().filter(bounded).count() as f64 / count,
         overestimate: quantiles(right.iter().map(ratio).collect())[0],
