@@ -38,7 +38,7 @@ pub fn of(subject: &Subject, volumes: &Volumes) -> anyhow::Result<Value> {
         "sky": panorama.as_ref().map(|(png, _)| base64::encode(png)),
         "sky_brightness": panorama.as_ref().map_or(0.0, |(_, brightness)| *brightness),
         "volumes": volumes.described(),
-        "law": volumes.law(),
+        "law": volumes.law,
         "spots": matter::spots(subject)?,
         "reach": reach,
         "piece": piece,

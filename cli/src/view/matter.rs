@@ -21,9 +21,11 @@ pub struct Texture {
 
 /// The volumes of a subject, the first of its scene and the truth, and how their matter turns; whether it falls, so that
 /// there are none.
+#[derive(Default)]
 pub struct Volumes {
     pub textures: Vec<Texture>,
-    law: Value,
+    /// The law of their motion: numbers or a table; null if they do not turn.
+    pub law: Value,
     pub falls: bool,
     /// Radius in M beyond which they are dark.
     reach: f64,
@@ -35,12 +37,7 @@ impl Volumes {
         let (Some(source), Some(file)) =
             (subject.scene.volume.first(), subject.assets.volumes.first())
         else {
-            return Ok(Volumes {
-                textures: Vec::new(),
-                law: Value::Null,
-                falls: false,
-                reach: 0.0,
-            });
+            return Ok(Volumes::default());
         };
         let axis = source.axis.or(file.axis).unwrap_or([0.0, 0.0, 1.0]);
         let hole = Kerr::new(subject.scene.hole.spin)?;
@@ -62,11 +59,6 @@ impl Volumes {
     /// Describes them for the page.
     pub fn described(&self) -> Value {
         self.textures.iter().map(Texture::described).collect()
-    }
-
-    /// Returns the law of their motion: numbers or a table; null if they do not turn.
-    pub fn law(&self) -> &Value {
-        &self.law
     }
 
     /// The smallest distance of nodes, M.
@@ -120,17 +112,13 @@ impl Texture {
         json!({ "name": name, "nodes": volume.nodes(), "low": volume.low(), "high": volume.high(), "axis": axis, "scale": scale })
     }
 
-    /// Half floats, x fastest, of emission over the largest.
+    /// Half floats, x fastest, of emission over the largest; 0 for what is below.
     pub fn bytes(&self) -> Vec<u8> {
         // A dark volume has no largest value to divide by.
         let largest = self.volume.values().iter().copied().fold(f32::MIN_POSITIVE, f32::max);
-        self.volume.x_fastest().flat_map(|value| half(value / largest).to_le_bytes()).collect()
+        let bytes = |value: f32| half::f16::from_f32((value / largest).max(0.0)).to_le_bytes();
+        self.volume.x_fastest().flat_map(bytes).collect()
     }
-}
-
-/// The bits of the nearest half float of a number, 0 for those below.
-fn half(value: f32) -> u16 {
-    half::f16::from_f32(value.max(0.0)).to_bits()
 }
 
 /// Describes the spots for the page.
@@ -156,35 +144,4 @@ pub fn extent(subject: &Subject, volumes: &Volumes) -> [f64; 3] {
     let largest = volumes.textures.iter().map(|texture| texture.scale);
     let most = spots().map(|spot| spot.peak_emissivity).chain(largest).fold(0.0, f64::max);
     [reach, if piece.is_finite() { piece } else { 1.0 }, if most > 0.0 { most } else { 1.0 }]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::half;
-
-    /// A half float as a number.
-    fn value(bits: u16) -> f32 {
-        let (exponent, fraction) = (i32::from(bits >> 10), f32::from(bits & 0x3ff) / 1024.0);
-        if exponent == 0 {
-            fraction * 2f32.powi(-14)
-        } else {
-            (1.0 + fraction) * 2f32.powi(exponent - 15)
-        }
-    }
-
-    #[test]
-    fn exact_half_floats_are_the_nearest() {
-        assert_eq!([half(0.0), half(1.0), half(0.5), half(-1.0)], [0, 0x3c00, 0x3800, 0]);
-        for k in 1..20_000u16 {
-            let x = f32::from(k) / 20_000.0;
-            for x in [x, x * 1e-3, x * 1e-6] {
-                let bits = half(x);
-                let off = |bits: u16| (value(bits) - x).abs();
-                assert!(
-                    off(bits) <= off(bits + 1) && (bits == 0 || off(bits) <= off(bits - 1)),
-                    "{x}"
-                );
-            }
-        }
-    }
 }
