@@ -44,8 +44,11 @@ pub struct GainResults {
 struct StationGains {
     station: String,
     scans: usize,
+    /// exp of the mean of ln|g|.
     amplitude: f64,
+    /// Standard deviation of ln|g| about its mean.
     scatter: f64,
+    /// Root mean squares of the standard deviations of ln|g| and of arg g.
     amplitude_error: f64,
     phase_error_deg: Option<f64>,
     largest_log_amplitude: f64,
@@ -77,19 +80,6 @@ pub fn write_by_file(
         folder.file(&name)?.write(text.as_bytes())?;
     }
     Ok(())
-}
-
-/// Summary of the gains of a station.
-struct Summary<'a> {
-    station: &'a str,
-    scans: usize,
-    /// exp of the mean of ln|g|.
-    mean: f64,
-    /// Standard deviation of ln|g| about its mean.
-    scatter: f64,
-    /// Root mean squares of the standard deviations of ln|g| and of arg g (radians).
-    errors: [f64; 2],
-    largest: f64,
 }
 
 /// Adds the root mean square distance of the gains of other images to errors in quadrature.
@@ -204,18 +194,7 @@ impl Gains {
 
     /// Returns the gains for results.json.
     pub fn results(&self) -> GainResults {
-        let has_phases = self.table.has_phases();
-        let station = |s: Summary<'_>| StationGains {
-            station: s.station.to_owned(),
-            scans: s.scans,
-            amplitude: s.mean,
-            scatter: s.scatter,
-            amplitude_error: s.errors[0],
-            phase_error_deg: has_phases.then(|| s.errors[1].to_degrees()),
-            largest_log_amplitude: s.largest,
-        };
-        let stations = self.summaries().into_iter().map(station).collect();
-        GainResults { file: TABLE, stations, beside_the_truth: self.distance }
+        GainResults { file: TABLE, stations: self.stations(), beside_the_truth: self.distance }
     }
 
     /// Sentences for the report.
@@ -243,18 +222,15 @@ impl Gains {
 
     /// A line for every station.
     pub fn details(&self) -> Table {
-        let has_phases = self.table.has_phases();
-        let row = |s: Summary<'_>| {
+        let row = |s: StationGains| {
             vec![
-                s.station.to_owned(),
+                s.station,
                 s.scans.to_string(),
-                format!("{:.3}", s.mean),
+                format!("{:.3}", s.amplitude),
                 format!("{:.3}", s.scatter),
-                format!("{:.3}", s.errors[0]),
-                match has_phases {
-                    true => format!("{:.2}", s.errors[1].to_degrees()),
-                    false => "not solved for".to_owned(),
-                },
+                format!("{:.3}", s.amplitude_error),
+                s.phase_error_deg
+                    .map_or("not solved for".to_owned(), |error| format!("{error:.2}")),
             ]
         };
         let head = ["station", "frames", "amplitude", "scatter", "σ of ln|g|", "σ of phase (°)"];
@@ -262,7 +238,7 @@ impl Gains {
             title: "Station gains".to_owned(),
             caption: "Gains that explain the data best beside the model: what a station measures is its gain times what it should. Amplitude and scatter are mean and standard deviation over the frames; σ is what data and priors leave open in one frame beside the model, with the scatter of draws of a static image. Those of a static image are less what the method adds, where a simple shape explains the data. A mean far from 1 is an error of calibration, or of the model.".to_owned(),
             head: head.map(str::to_owned).to_vec(),
-            rows: self.summaries().into_iter().map(row).collect(),
+            rows: self.stations().into_iter().map(row).collect(),
             links: Vec::new(),
         }
     }
@@ -297,23 +273,25 @@ impl Gains {
         }
     }
 
-    fn summaries(&self) -> Vec<Summary<'_>> {
-        self.table.stations().into_iter().map(|name| self.summary(name)).collect()
+    fn stations(&self) -> Vec<StationGains> {
+        self.table.stations().into_iter().map(|name| self.station(name)).collect()
     }
 
-    fn summary<'a>(&self, station: &'a str) -> Summary<'a> {
+    fn station(&self, station: &str) -> StationGains {
         let logs: Vec<f64> = self.of(station).map(|gain| gain.gain.norm().ln()).collect();
         let scans = logs.len();
         let mean_of = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / scans as f64;
         let mean = mean_of(&mut logs.iter().copied());
-        let square = |k: usize| mean_of(&mut self.of(station).map(|gain| gain.errors[k].powi(2)));
-        Summary {
-            station,
+        let error =
+            |k: usize| mean_of(&mut self.of(station).map(|gain| gain.errors[k].powi(2))).sqrt();
+        StationGains {
+            station: station.to_owned(),
             scans,
-            mean: mean.exp(),
+            amplitude: mean.exp(),
             scatter: mean_of(&mut logs.iter().map(|x| (x - mean).powi(2))).sqrt(),
-            errors: [0, 1].map(|k| square(k).sqrt()),
-            largest: logs.iter().fold(0.0, |most: f64, x| most.max(x.abs())),
+            amplitude_error: error(0),
+            phase_error_deg: self.table.has_phases().then(|| error(1).to_degrees()),
+            largest_log_amplitude: logs.iter().fold(0.0, |most: f64, x| most.max(x.abs())),
         }
     }
 }
