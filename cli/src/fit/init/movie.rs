@@ -29,7 +29,7 @@ pub fn read_movie(path: &Path) -> anyhow::Result<Images> {
 
 pub fn of_movie(images: &Images, path: &str) -> anyhow::Result<String> {
     let Images { movie, times, field_uas } = images;
-    let (grid, frames) = (movie.grid, movie.frames());
+    let grid = movie.grid;
     if grid.width != grid.height {
         bail!("images of {} x {} pixels: a fit needs square images", grid.width, grid.height);
     }
@@ -52,7 +52,6 @@ pub fn of_movie(images: &Images, path: &str) -> anyhow::Result<String> {
     let fields = [
         ("title", "Images".to_owned()),
         ("pixels", grid.width.to_string()),
-        ("frames", frames.to_string()),
         ("jy", digits(jy)),
         ("upper", digits(10.0 * (peak / jy).max(1.0))),
         ("flux", digits(flux)),
