@@ -23,6 +23,7 @@ mod verdicts;
 use crate::answer::Answer;
 use crate::interrupt::{Interrupted, SignalGuard};
 use crate::lock::Lock;
+use crate::output::Output;
 use crate::plain;
 use crate::program::Program;
 use crate::progress;
@@ -149,9 +150,14 @@ impl Compare {
             .map_or(Status::Open, Status::Failed),
             status => status,
         };
-        let summary = page::results(experiment, choice.quick, &cases, status, &folder)?;
-        let page = Page { experiment, choice, summary: &summary };
-        let tables = page.write(&runner, &folder)?;
+        let (shown, left_out) = match choice.quick {
+            true => quick::look(experiment),
+            false => (experiment.clone(), Vec::new()),
+        };
+        let file = Output::new(&folder.join("results.json"), "")?;
+        let summary = Summary::written(&cases, status, &shown.title, choice.quick, &file)?;
+        let page = Page { experiment: &shown, choice, summary: &summary };
+        let tables = page.write(&runner, &folder, left_out)?;
         recorder.write_into(&folder)?;
         Ok(end(&tables, &summary, &folder, self.collect))
     }

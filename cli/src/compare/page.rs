@@ -1,6 +1,5 @@
 //! Results of a comparison: tables, pictures and one page of them.
 
-use super::cases::{Case, Status};
 use super::experiment::Experiment;
 use super::recipe::Choice;
 use super::runner::Runner;
@@ -23,7 +22,7 @@ pub fn files(folder: &Path) -> Vec<PathBuf> {
 
 /// All that a page is made of.
 pub struct Page<'a> {
-    /// Experiment.
+    /// Experiment, as it is shown.
     pub experiment: &'a Experiment,
     /// Choice of cases that were run.
     pub choice: &'a Choice,
@@ -31,33 +30,9 @@ pub struct Page<'a> {
     pub summary: &'a Summary<'a>,
 }
 
-/// Reads what was found, and writes all of it, results.json.
-pub fn results<'a>(
-    experiment: &Experiment,
-    quick: bool,
-    cases: &'a [Case],
-    status: impl Fn(&Case) -> Status + Sync,
-    folder: &Path,
-) -> anyhow::Result<Summary<'a>> {
-    let file = Output::new(&folder.join("results.json"), "")?;
-    if !quick {
-        return Summary::written(cases, status, &experiment.title, quick, &file);
-    }
-    let (look, _) = quick::look(experiment);
-    Summary::written(cases, status, &look.title, quick, &file)
-}
-
 impl Page<'_> {
-    /// Writes the results, tables.md, pictures and report.html; the text of the tables.
-    pub fn write(&self, runner: &Runner<'_>, folder: &Path) -> anyhow::Result<String> {
-        if !self.choice.quick {
-            return self.files(runner, folder, Vec::new());
-        }
-        let (look, left_out) = quick::look(self.experiment);
-        Page { experiment: &look, ..*self }.files(runner, folder, left_out)
-    }
-
-    fn files(
+    /// Writes the results, tables.md, pictures and report.html, which says what is left out; the text of the tables.
+    pub fn write(
         &self,
         runner: &Runner<'_>,
         folder: &Path,
