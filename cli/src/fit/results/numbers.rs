@@ -251,44 +251,20 @@ pub fn last_step(step: u64, of: u64) -> String {
     format!("Step {step} of {of} is the last: more would follow the noise of the data.")
 }
 
-/// A line of the table of results.
-struct Meaning {
-    of: Number,
-    name: &'static str,
-    digits: usize,
-    unit: &'static str,
-    text: &'static str,
-}
-
 /// A number of results; none where it is not defined.
 type Number = fn(&Results) -> Option<f64>;
 
-const fn meaning(
-    of: Number,
-    name: &'static str,
-    digits: usize,
-    unit: &'static str,
-    text: &'static str,
-) -> Meaning {
-    Meaning { of, name, digits, unit, text }
-}
-
-const MEANINGS: [Meaning; 15] = [
-    meaning(
-        |of| Some(of.loss),
-        "loss",
-        6,
-        "",
-        "what was minimised, of all data, without penalties",
-    ),
-    meaning(
+/// Lines of the table of results: numbers with their names, digits, units and meanings.
+const MEANINGS: [(Number, &str, usize, &str, &str); 15] = [
+    (|of| Some(of.loss), "loss", 6, "", "what was minimised, of all data, without penalties"),
+    (
         |of| of.validation_chi2_per_datum,
         "validation",
         4,
         "",
         "χ² per data point of the samples that were not fitted",
     ),
-    meaning(
+    (
         |of| of.closeness.as_ref()?.psnr_db,
         "PSNR",
         2,
@@ -296,86 +272,82 @@ const MEANINGS: [Meaning; 15] = [
         "peak signal-to-noise ratio of the volume: 10 log10(largest true value² / mean square error); 10 dB more is an \
          error about a third as large. An empty volume has tens of dB already, as most of space is dark",
     ),
-    meaning(
+    (
         |of| of.closeness.as_ref()?.psnr_inside_db,
         "PSNR inside",
         2,
         "dB",
         "the same, of the nodes inside the region of recovery alone",
     ),
-    meaning(
+    (
         |of| of.closeness.as_ref()?.over_time.as_ref()?.psnr_over_time_db,
         "PSNR over time",
         2,
         "dB",
         "the same of the volumes at the times of all frames together, for emission that changes",
     ),
-    meaning(
+    (
         |of| of.closeness.as_ref()?.over_time.as_ref()?.nrmse_over_time,
         "relative error over time",
         4,
         "",
         "root mean square error of the volumes at the times of all frames over that of the truth",
     ),
-    meaning(
+    (
         |of| of.closeness.as_ref()?.nrmse,
         "relative error",
         4,
         "",
         "root mean square error over that of the truth: 0 is perfect, 1 an empty volume",
     ),
-    meaning(
+    (
         |of| of.closeness.as_ref()?.correlation,
         "correlation",
         5,
         "",
         "normalised cross-correlation with the truth: 1 is perfect, whatever the scale",
     ),
-    meaning(
+    (
         |of| Some(of.closeness.as_ref()?.axis_dot_truth),
         "axis",
         6,
         "",
         "cosine of the angle between the recovered axis and the true one: 1 is perfect",
     ),
-    meaning(
+    (
         |of| of.mask_error,
         "masked light",
         6,
         "",
         "light in places that were taken for empty and left out, as a part of all, in two frames",
     ),
-    meaning(
+    (
         |of| of.quadrature_error,
         "sums along rays",
         3,
         "of the errors",
         "root mean square difference of the model from the same with twice the nodes on rays, over the errors of the data",
     ),
-    meaning(|of| Some(of.steps as f64), "steps", 0, "", "steps of the optimiser"),
-    meaning(
+    (|of| Some(of.steps as f64), "steps", 0, "", "steps of the optimiser"),
+    (
         |of| Some(of.seconds),
         "time",
         1,
         "s",
         "wall time of this run, from its start to these results",
     ),
-    meaning(|of| of.cpu_seconds, "processor time", 1, "s", "the same, of all threads together"),
-    meaning(|of| of.peak_memory_mib, "memory", 0, "MiB", "most memory that the process held"),
+    (|of| of.cpu_seconds, "processor time", 1, "s", "the same, of all threads together"),
+    (|of| of.peak_memory_mib, "memory", 0, "MiB", "most memory that the process held"),
 ];
 
 /// The same as lines of a table; what is not defined is left out.
 pub fn outcomes(results: &Results) -> Vec<report::Outcome> {
-    let one = |meaning: &Meaning| {
+    let one = |(of, name, digits, unit, meaning): &(Number, &str, usize, &str, &str)| {
         Some(report::Outcome {
-            name: meaning.name.to_owned(),
-            value: format!(
-                "{:.*}",
-                meaning.digits,
-                (meaning.of)(results).filter(|x| x.is_finite())?
-            ),
-            unit: meaning.unit.to_owned(),
-            meaning: meaning.text.to_owned(),
+            name: (*name).to_owned(),
+            value: format!("{:.*}", *digits, of(results).filter(|x| x.is_finite())?),
+            unit: (*unit).to_owned(),
+            meaning: (*meaning).to_owned(),
         })
     };
     MEANINGS.iter().filter_map(one).collect()
