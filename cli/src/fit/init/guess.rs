@@ -34,30 +34,34 @@ pub fn guess(data: &[PathBuf], model: Option<Model>) -> anyhow::Result<Guess> {
     // Absolute: guessed settings have no folder of their own, and runs are resumed from anywhere.
     let data: Vec<PathBuf> =
         data.iter().map(std::path::absolute).collect::<std::io::Result<_>>()?;
-    let plain = of_data(&data, Path::new(""), model)?;
-    let mut guess = Guess {
-        text: annotate(&plain),
-        read: Vec::new(),
-        assumed: Vec::new(),
-        missing: Vec::new(),
-    };
-    let mut table = String::new();
-    for line in plain.lines() {
-        if let Some(said) = line.strip_prefix(READ) {
-            guess.read.push(said.to_owned());
-        } else if line.starts_with('[') {
-            table = line.trim_matches(['[', ']']).to_owned();
-        } else {
-            guess.line(line, &table);
-        }
-    }
-    Ok(guess)
+    Ok(Guess::of(&of_data(&data, Path::new(""), model)?))
 }
 
 /// Begin of lines that say what was read.
 pub const READ: &str = "# Read: ";
 
 impl Guess {
+    /// The guesses in plain settings.
+    fn of(plain: &str) -> Self {
+        let mut guess = Guess {
+            text: annotate(plain),
+            read: Vec::new(),
+            assumed: Vec::new(),
+            missing: Vec::new(),
+        };
+        let mut table = "";
+        for line in plain.lines() {
+            if let Some(said) = line.strip_prefix(READ) {
+                guess.read.push(said.to_owned());
+            } else if line.starts_with('[') {
+                table = line.trim_matches(['[', ']']);
+            } else {
+                guess.line(line, table);
+            }
+        }
+        guess
+    }
+
     fn line(&mut self, line: &str, table: &str) {
         let path =
             |key: &str| if table.is_empty() { key.to_owned() } else { format!("{table}.{key}") };
@@ -137,27 +141,10 @@ fn is_still(table: &toml::Table, key: &str, value: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn guess_of(plain: &str) -> Guess {
-        let mut guess = Guess {
-            text: plain.to_owned(),
-            read: Vec::new(),
-            assumed: Vec::new(),
-            missing: Vec::new(),
-        };
-        let mut table = String::new();
-        for line in plain.lines() {
-            match line.starts_with('[') {
-                true => line.trim_matches(['[', ']']).clone_into(&mut table),
-                false => guess.line(line, &table),
-            }
-        }
-        guess
-    }
-
     #[test]
     fn exact_what_is_open_is_demanded_and_what_is_changed_is_no_guess() {
         let plain = "[hole]\nspin = 0.5 #! the data do not tell the spin\n#? mass_msun = 4e6 # no value for it\n";
-        let guess = guess_of(plain);
+        let guess = Guess::of(plain);
         let path = [PathBuf::from("a.uvfits")];
         let error = guess.check("[hole]\nspin = 0.5", &path).unwrap_err().to_string();
         assert!(
