@@ -230,18 +230,8 @@ fn compared<'a>(
     let of = |term: &dyn FrameTerm<f64>| {
         Statistics::of((0..measured.times.len()).map(|frame| term.residuals(frame, image)), 1)
     };
-    let names = file.loss.iter().map(|loss| name(loss.data)).collect();
+    let names = file.loss.iter().map(|loss| loss.data.label()).collect();
     Ok((names, terms.iter().map(|term| of(&*term.term)).collect()))
-}
-
-/// Returns the name of a kind of data in results.
-fn name(kind: LossKind) -> &'static str {
-    match kind {
-        LossKind::Amplitudes => "amplitudes",
-        LossKind::ClosurePhases => "closure phases",
-        LossKind::LogClosureAmplitudes => "log closure amplitudes",
-        _ => "visibilities",
-    }
 }
 
 /// χ² per datum of the gain-free data that were not fitted, from baselines above three times their noise.
@@ -257,7 +247,7 @@ fn beside(file: &StaticImageFile, measured: &FitData, survey: &Survey) -> Vec<(&
         // χ² alone is wanted: a weight of 0 adds no gradient.
         let of_frame = |frame| term.value_and_gradient(frame, image, 0.0, &mut none);
         let chi2: f64 = frames().map(of_frame).sum();
-        Some((name(kind), chi2 / count as f64))
+        Some((kind.label(), chi2 / count as f64))
     };
     let fitted = |kind: &LossKind| file.loss.iter().any(|loss| loss.data == *kind);
     let all = [LossKind::ClosurePhases, LossKind::LogClosureAmplitudes];

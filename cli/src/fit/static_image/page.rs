@@ -133,7 +133,7 @@ impl Found<'_> {
     /// Simple shapes with their sizes and what they fit, beside the image.
     fn shapes_table(&self) -> Table {
         let kinds: Vec<String> =
-            self.file.loss.iter().map(|loss| format!("χ² of {}", super::name(loss.data))).collect();
+            self.file.loss.iter().map(|loss| format!("χ² of {}", loss.data.label())).collect();
         let numbers =
             |chi2: &[f64]| chi2.iter().map(|chi2| format!("{chi2:.2}")).collect::<Vec<_>>();
         let shape = |fit: &ShapeFit| {
@@ -167,7 +167,7 @@ impl Found<'_> {
     /// Every image that was found, with what it fits.
     fn images_table(&self) -> Table {
         let kinds: Vec<String> =
-            self.file.loss.iter().map(|loss| format!("χ² of {}", super::name(loss.data))).collect();
+            self.file.loss.iter().map(|loss| format!("χ² of {}", loss.data.label())).collect();
         let row = |what: &str, image: &Candidate| {
             let ring =
                 image.ring.map_or("–".to_owned(), |ring| format!("{:.1}", ring.diameter_uas));

@@ -8,7 +8,6 @@ use anyhow::Context;
 use kerrlight_imaging::settings::{StaticImageFile, StaticPolarization};
 use kerrlight_imaging::{LinearPolarization, PolarizedSurvey};
 use kerrlight_tomo::fit::FrameTerm;
-use kerrlight_tomo::fit::settings::LossKind;
 use kerrlight_tomo::fit::setup::FitData;
 use kerrlight_tomo::fit::verdict::{Errors, Statistics, Tested};
 use serde::Serialize;
@@ -94,14 +93,6 @@ pub struct Polarized {
     count: usize,
 }
 
-/// Returns the name of a kind of data in results and on pages.
-fn name(kind: LossKind) -> &'static str {
-    match kind {
-        LossKind::PolarimetricRatios => "polarimetric ratios",
-        _ => "polarized visibilities",
-    }
-}
-
 /// Numbers of the polarisation, for results.json.
 #[derive(Serialize)]
 pub struct PolarizedNumbers {
@@ -147,7 +138,7 @@ impl Polarized {
         let errors =
             if measured.has_intrinsic_variability { Errors::Shared } else { Errors::Stated };
         let count = statistics.all.count;
-        let tested = (name(settings.data).to_owned(), Tested::gaussian(statistics, errors));
+        let tested = (settings.data.label().to_owned(), Tested::gaussian(statistics, errors));
         Ok(Some((Self { settings, survey, leakage, count }, tested)))
     }
 
@@ -158,7 +149,7 @@ impl Polarized {
 
     /// χ² over the number of its data, with their kind.
     pub fn chi2(&self) -> (&'static str, f64) {
-        (name(self.settings.data), self.survey.found.chi2)
+        (self.settings.data.label(), self.survey.found.chi2)
     }
 
     /// Numbers of results.json, with their errors.
@@ -219,7 +210,7 @@ impl Polarized {
              from {} {}. {} % of Stokes I from each station were added to errors of RL and LR for leakage. Slopes of the \
              fraction are penalised in proportion to light (weight {smoothness}, times {}).",
             self.count,
-            name(self.settings.data),
+            self.settings.data.label(),
             100.0 * leakage_left,
             self.survey.found.strength
         )];

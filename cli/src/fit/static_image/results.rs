@@ -162,7 +162,7 @@ impl Found<'_> {
     /// All numbers.
     pub fn results(&self) -> Results {
         let found = self.survey.found();
-        let kinds = || self.file.loss.iter().map(|loss| super::name(loss.data));
+        let kinds = || self.file.loss.iter().map(|loss| loss.data.label());
         let polarized = self.polarized.as_ref();
         let all = |images: &[Candidate]| images.iter().map(ImageNumbers::from).collect();
         let held = |held: &Held| HeldLoss {

@@ -270,7 +270,7 @@ fn calibrated(known: &Calibration) -> String {
 
 /// χ² of a kind of data, as it is computed.
 fn formula(kind: LossKind, has_gains: bool) -> String {
-    let name = super::name(kind);
+    let name = kind.label();
     let least = |of: &str, plain: &str| match has_gains {
         true => format!("the least {of} + Σ (ln|g|/s)² over gains g with the priors s"),
         false => plain.to_owned(),

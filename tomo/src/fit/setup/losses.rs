@@ -102,14 +102,8 @@ impl FitData {
 
     /// The visibilities of all frames, or what is made of them, in any precision.
     fn scans<T: Float>(&self, loss: &Loss, pixels: usize) -> Result<ScanTerm<T>> {
-        let (name, quadratic) = match loss.data {
-            LossKind::Visibilities => ("visibilities", self.gains.is_none()),
-            LossKind::Amplitudes => ("amplitudes", false),
-            LossKind::ClosurePhases => ("closure phases", false),
-            LossKind::PolarizedVisibilities => ("polarized visibilities", self.gains.is_none()),
-            LossKind::PolarimetricRatios => ("polarimetric ratios", false),
-            _ => ("log closure amplitudes", false),
-        };
+        let name = loss.data.label();
+        let quadratic = loss.data.is_visibilities() && self.gains.is_none();
         let scans: Vec<Option<Scan<T>>> =
             (0..self.times.len()).map(|frame| self.scan(frame, loss)).collect::<Result<_>>()?;
         if scans.iter().all(Option::is_none) {
