@@ -1,7 +1,6 @@
 //! A geometry that is not known: it is found before the emission is fitted in it.
 
 use super::folder::Folder;
-use crate::checksum::Sealed;
 use anyhow::Context;
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::recovery::Choice;
@@ -10,14 +9,9 @@ use kerrlight_tomo::recovery::results::GeometryResults;
 /// Name of the results in the folder of the run.
 pub const FILE: &str = "geometry.json";
 
-/// Returns the geometry that a run has found; none if it has not looked.
-pub fn found(folder: &Folder) -> anyhow::Result<Option<Sealed<GeometryResults>>> {
-    folder.found(FILE)
-}
-
 /// The geometry that a run has found, which is told; none if it has not looked.
 pub fn chosen(folder: &Folder, file: &FitFile) -> anyhow::Result<Option<Choice>> {
-    let Some(results) = found(folder)? else { return Ok(None) };
+    let Some(results) = folder.found::<GeometryResults>(FILE)? else { return Ok(None) };
     let Some(unknown) = file.unknown_geometry()? else { return Ok(None) };
     results.lines().iter().for_each(|line| eprintln!("{line}"));
     let geometry = results.geometry_in(file, &unknown.free);

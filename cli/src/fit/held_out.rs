@@ -1,7 +1,6 @@
 //! A weight of the linear problem that is chosen by frames that are held out.
 
 use super::folder::Folder;
-use crate::checksum::Sealed;
 use crate::report::{Axis, LinePlot, Marks, Series};
 use anyhow::Context;
 use kerrlight_tomo::fit::settings::FitFile;
@@ -12,14 +11,9 @@ use kerrlight_tomo::recovery::results::HeldOutResults;
 /// Name of the results in the folder of the run.
 pub const FILE: &str = "held_out.json";
 
-/// Returns what a run has found; none if it has not looked.
-pub fn found(folder: &Folder) -> anyhow::Result<Option<Sealed<HeldOutResults>>> {
-    folder.found(FILE)
-}
-
 /// The weight that a run has chosen, which is told; none if it has not.
 pub fn chosen(folder: &Folder) -> anyhow::Result<Option<Choice>> {
-    let Some(results) = found(folder)? else { return Ok(None) };
+    let Some(results) = folder.found::<HeldOutResults>(FILE)? else { return Ok(None) };
     results.sentence().iter().for_each(|line| eprintln!("{line}"));
     Ok(Some(Choice::Weight(weight(&results, folder)?)))
 }
@@ -30,7 +24,8 @@ fn weight(results: &HeldOutResults, folder: &Folder) -> anyhow::Result<f64> {
 
 /// The settings with the weight that a run has chosen.
 pub fn settled(file: &FitFile, folder: &Folder) -> anyhow::Result<FitFile> {
-    let (Some(settings), Some(results)) = (&file.held_out, found(folder)?) else {
+    let results = folder.found::<HeldOutResults>(FILE)?;
+    let (Some(settings), Some(results)) = (&file.held_out, results) else {
         return Ok(file.clone());
     };
     Ok(settings.setting.put(file.clone(), weight(&results, folder)?))

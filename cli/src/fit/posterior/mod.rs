@@ -192,7 +192,7 @@ fn add_up(
     path: &Path,
     all: &[Kept],
 ) -> anyhow::Result<Answer> {
-    let geometry = geometry_search::found(folder)?;
+    let geometry = folder.found::<GeometryResults>(geometry_search::FILE)?;
     let truth = prepared.measured.truth.as_ref();
     let truth = truth.map(|t| super::results::true_volume(&prepared.settings, t)).transpose()?;
     let found = summary::Summary::new(&prepared.settings, geometry.as_deref(), all, truth)?;
@@ -274,7 +274,7 @@ impl<'a> Drawing<'a> {
         samples: u32,
         path: &Path,
     ) -> anyhow::Result<Self> {
-        let geometry = geometry_search::found(folder)?;
+        let geometry = folder.found::<GeometryResults>(geometry_search::FILE)?;
         let complete = (1..=u64::from(samples)).all(|number| names(path, number)[1].is_file());
         let geometries = match (unknown, &geometry) {
             (Some(unknown), Some(geometry)) if !complete => {

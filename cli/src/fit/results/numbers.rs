@@ -164,8 +164,8 @@ impl Estimate<'_> {
     ) -> anyhow::Result<Results> {
         let names = trainer.objective.names().into_iter().map(str::to_owned);
         let now = &found.state.now;
-        let geometry = geometry_search::found(self.folder)?;
-        let band = band_search::found(self.folder)?;
+        let geometry = self.folder.found::<GeometryResults>(geometry_search::FILE)?;
+        let band = self.folder.found::<BandResults>(band_search::FILE)?;
         let log = self.folder.lines()?;
         // Samples that were not fitted have one χ²: with the errors that a flare's past leaves of them.
         let is_told = band.as_ref().is_some_and(|of| of.validation_chi2_per_datum.is_some());
@@ -194,7 +194,7 @@ impl Estimate<'_> {
             quadrature_error: found.quadrature,
             advice: self.advice(found, &log),
             linear: linear::outcome(self.file, &log),
-            held_out: held_out::found(self.folder)?,
+            held_out: self.folder.found(held_out::FILE)?,
             closures: closures::results(self.measured, &self.file.loss),
             of_searches: errors.chain(numbers).collect(),
             geometry,
