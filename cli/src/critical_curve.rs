@@ -5,7 +5,7 @@ use crate::columns::{self, Column};
 use crate::output::{self, Output};
 use anyhow::Context;
 use clap::Args;
-use kerrlight_geodesic::analytic::{CriticalCurve, CriticalPoint, HalfOrbit};
+use kerrlight_geodesic::analytic::{CriticalCurve, CriticalPoint};
 use kerrlight_geodesic::{Inclination, Kerr};
 use std::path::PathBuf;
 
@@ -27,8 +27,6 @@ pub struct CriticalCurveTable {
     output: Option<PathBuf>,
 }
 
-const COLUMNS: [&str; 8] = ["r", "lambda", "eta", "alpha", "beta", "gamma", "delta", "tau"];
-
 impl CriticalCurveTable {
     /// Computes and writes the curve.
     pub fn run(&self) -> anyhow::Result<Answer> {
@@ -36,8 +34,8 @@ impl CriticalCurveTable {
         let inclination = Inclination::from_degrees(self.inclination).context("--inclination")?;
         let output =
             self.output.as_deref().map(|path| Output::or_pipe(path, &["csv"])).transpose()?;
-        let points: Vec<_> =
-            CriticalCurve::new(&hole, inclination).points(self.points).map(values).collect();
+        let curve = CriticalCurve::new(&hole, inclination);
+        let points: Vec<_> = curve.points(self.points).map(|point| point.numbers()).collect();
         let endless = points.iter().filter(|point| !point.iter().all(|x| x.is_finite())).count();
         if endless > 0 {
             eprintln!(
@@ -46,7 +44,7 @@ impl CriticalCurveTable {
             );
         }
         let column = |k: usize| points.iter().map(|point| point[k]).collect();
-        let table: Vec<_> = COLUMNS
+        let table: Vec<_> = CriticalPoint::NAMES
             .iter()
             .enumerate()
             .map(|(k, name)| Column::Numbers((*name).to_owned(), column(k)))
@@ -62,11 +60,4 @@ impl CriticalCurveTable {
     pub fn pipes(&self) -> bool {
         self.output.as_deref().is_some_and(output::is_pipe)
     }
-}
-
-/// Returns the columns of a point.
-fn values(point: CriticalPoint) -> [f64; 8] {
-    let CriticalPoint { radius, lambda, eta, alpha, beta, .. } = point;
-    let HalfOrbit { gamma, delta, tau } = point.half_orbit();
-    [radius, lambda, eta, alpha, beta, gamma, delta, tau]
 }

@@ -3,7 +3,7 @@
 use crate::call::detached;
 use crate::rays::Place;
 use crate::refusal::refused;
-use kerrlight_geodesic::analytic::{CriticalCurve, CriticalPoint, HalfOrbit, LensingBand};
+use kerrlight_geodesic::analytic::{CriticalCurve, LensingBand};
 use kerrlight_geodesic::{Inclination, Kerr, interrupt};
 use numpy::{IntoPyArray, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -17,13 +17,8 @@ pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(band, module)?)
 }
 
+/// Names of the numbers of a point; `lambda` is a word of Python.
 const COLUMNS: [&str; 8] = ["r", "lam", "eta", "alpha", "beta", "gamma", "delta", "tau"];
-
-fn values(point: CriticalPoint) -> [f64; 8] {
-    let CriticalPoint { radius, lambda, eta, alpha, beta, .. } = point;
-    let HalfOrbit { gamma, delta, tau } = point.half_orbit();
-    [radius, lambda, eta, alpha, beta, gamma, delta, tau]
-}
 
 fn columns(py: Python<'_>, rows: Vec<[f64; 8]>) -> PyResult<Bound<'_, PyDict>> {
     let dict = PyDict::new(py);
@@ -49,7 +44,7 @@ fn critical_curve(
     let (hole, inclination) = curve(spin, place)?;
     let work = || {
         let points = CriticalCurve::new(&hole, inclination).points(count);
-        Ok::<_, Infallible>(points.map(values).collect())
+        Ok::<_, Infallible>(points.map(|point| point.numbers()).collect())
     };
     columns(py, detached(py, work)?)
 }
@@ -68,7 +63,7 @@ fn critical_points<'py>(
         let curve = CriticalCurve::new(&hole, inclination);
         let point = |angle: &f64| {
             interrupt::check();
-            values(curve.point(*angle))
+            curve.point(*angle).numbers()
         };
         Ok::<_, Infallible>(angles.iter().map(point).collect())
     };

@@ -119,6 +119,17 @@ impl CriticalCurve {
 }
 
 impl CriticalPoint {
+    /// Names of [`numbers`](Self::numbers), as tables have them.
+    pub const NAMES: [&str; 8] = ["r", "lambda", "eta", "alpha", "beta", "gamma", "delta", "tau"];
+
+    /// r (M), λ (M), η (M²), α (M), β (M), and γ, δ (radians) and τ (M) of the
+    /// [half orbit](Self::half_orbit).
+    pub fn numbers(&self) -> [f64; 8] {
+        let CriticalPoint { radius, lambda, eta, alpha, beta, .. } = *self;
+        let HalfOrbit { gamma, delta, tau } = self.half_orbit();
+        [radius, lambda, eta, alpha, beta, gamma, delta, tau]
+    }
+
     /// γ, δ and τ of this orbit (Gralla & Lupsasca 2020b), regular for a → 0
     /// and over the poles: with Z₊ = ½\[η + λ² − a² + √((η + λ² − a²)² + 4a²η)\] the polar
     /// motion is a rotation at the rate √(Z₊ + a²u₊ sin²χ), u = cos θ = √u₊ sin χ,
