@@ -52,6 +52,7 @@ mod help;
 mod inspect;
 mod interferometry;
 mod interrupt;
+mod keys;
 mod lock;
 mod memory;
 mod movie;

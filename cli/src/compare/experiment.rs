@@ -368,25 +368,17 @@ impl Factor {
                 _ => value.clone(),
             };
             let name = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-            let mut set = Table::new();
-            put(&mut set, key, scaled);
-            Level { name, number, fit: None, set, remove: Vec::new() }
+            Level { name, number, fit: None, set: nested(key, scaled), remove: Vec::new() }
         };
         self.values.iter().map(level).collect()
     }
 }
 
-/// Sets a key with dots.
-fn put(table: &mut Table, key: &str, value: Value) {
-    match key.split_once('.') {
-        None => {
-            table.insert(key.to_owned(), value);
-        }
-        Some((first, rest)) => {
-            let inner = table.entry(first.to_owned()).or_insert_with(|| Value::Table(Table::new()));
-            if let Value::Table(inner) = inner {
-                put(inner, rest, value);
-            }
-        }
-    }
+/// A table in which a key with dots has a value.
+fn nested(key: &str, value: Value) -> Table {
+    let (first, value) = match key.split_once('.') {
+        None => (key, value),
+        Some((first, rest)) => (first, Value::Table(nested(rest, value))),
+    };
+    Table::from_iter([(first.to_owned(), value)])
 }

@@ -4,6 +4,7 @@ use super::cases::{Case, without_seeds};
 use super::experiment::{Experiment, FigureKind, QUALITIES, TableAsked};
 use super::labels::{ONE_CHI2, pairs};
 use super::summary::{Summary, is_at};
+use crate::keys;
 use crate::paths;
 use crate::report::Table;
 use anyhow::bail;
@@ -25,14 +26,6 @@ const SHOWN: [(&str, &str); 9] = [
     ("output.nodes", "nodes along each side of the volume that is judged"),
 ];
 
-/// The value of a key with dots.
-fn at(settings: &toml::Table, key: &str) -> Option<String> {
-    let mut words = key.split('.');
-    let first = settings.get(words.next()?)?;
-    let value = words.try_fold(first, |value, word| value.as_table()?.get(word))?;
-    Some(value.as_str().map_or_else(|| value.to_string(), str::to_owned))
-}
-
 /// Most values of a setting that are told.
 const TOLD: usize = 20;
 
@@ -44,7 +37,7 @@ pub fn check_data(cases: &[Case]) -> anyhow::Result<()> {
     for case in cases.iter().take(LOOKED_AT) {
         let Some(settings) = case.table() else { continue };
         for kind in ["visibilities", "light-curve"] {
-            let Some(path) = at(&settings, &format!("data.{kind}.path")) else { continue };
+            let Some(path) = keys::text(&settings, &format!("data.{kind}.path")) else { continue };
             // Only a file of public data has a place of its own; the fit looks for others.
             if path.starts_with('$') {
                 let place = paths::of_data(Path::new(&path), Path::new(""))?;
@@ -92,7 +85,7 @@ pub fn table(summary: &Summary) -> Table {
     // Of each combination of levels the settings that are shown, and how many cases have them.
     let shown = |case: &&Case| {
         let settings = case.table()?;
-        let values = SHOWN.map(|(key, _)| at(&settings, key));
+        let values = SHOWN.map(|(key, _)| keys::text(&settings, key));
         Some((values, counts[case.chosen()]))
     };
     let of_levels = without_seeds(cases.iter().copied());

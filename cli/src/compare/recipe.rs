@@ -5,6 +5,7 @@ use super::experiment::{Experiment, Factor, Level};
 use super::source::Source;
 use crate::changed::Changed;
 use crate::fit;
+use crate::keys;
 use crate::paths;
 use anyhow::{Context, anyhow, bail};
 use kerrlight_tomo::fit::settings::merge;
@@ -357,21 +358,19 @@ fn remove(table: &mut Table, key: &str) -> anyhow::Result<()> {
 
 /// Rays that steps look at: a measure of its time against that of others of its kind.
 fn cost(settings: &Table) -> f64 {
-    let number = |path: &[&str]| -> Option<f64> {
-        let first = settings.get(path[0])?;
-        let value = path[1..].iter().try_fold(first, |value, key| value.get(key))?;
+    let number = |key: &str| -> Option<f64> {
+        let value = keys::at(settings, key)?;
         value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
     };
-    let side =
-        number(&["screen", "pixels"]).or_else(|| number(&["image", "pixels"])).unwrap_or(1.0);
-    let frames = number(&["simulation", "observation", "scans"])
-        .or_else(|| number(&["simulation", "movie", "frames"]));
-    let rays = match number(&["training", "batch", "pixels"]) {
+    let side = number("screen.pixels").or_else(|| number("image.pixels")).unwrap_or(1.0);
+    let frames =
+        number("simulation.observation.scans").or_else(|| number("simulation.movie.frames"));
+    let rays = match number("training.batch.pixels") {
         Some(pixels) => pixels,
         None => {
-            let of_step = number(&["training", "batch", "frames"]).or(frames).unwrap_or(1.0);
+            let of_step = number("training.batch.frames").or(frames).unwrap_or(1.0);
             of_step * side * side
         }
     };
-    number(&["training", "steps"]).unwrap_or(1.0) * rays
+    number("training.steps").unwrap_or(1.0) * rays
 }

@@ -1,6 +1,7 @@
 //! Contents of the folder of a fit.
 
 use crate::answer::Answer;
+use crate::keys;
 use crate::output;
 use crate::plain;
 use anyhow::{Context, bail};
@@ -23,13 +24,14 @@ pub fn describe(folder: &Path) -> anyhow::Result<Answer> {
     let mut text = format!("{shown}: a fit\n\n");
     let mut line =
         |key: &str, value: String| text += &format!("{key:<16}{}\n", plain::line(&value));
-    line("title", string(&table, &["title"]));
+    let told = |key: &str| keys::text(&table, key).unwrap_or("not told".to_owned());
+    line("title", told("title"));
     line("data", data(&table));
-    match table.get("image").and_then(|image| image.get("pixels")) {
+    match keys::at(&table, "image.pixels") {
         Some(pixels) => line("model", format!("static image of {pixels} x {pixels} pixels")),
         None => {
-            line("representation", string(&table, &["representation", "kind"]));
-            line("steps", steps(&table, log.as_ref(), results.is_some()));
+            line("representation", told("representation.kind"));
+            line("steps", steps(&told("training.steps"), log.as_ref(), results.is_some()));
         }
     }
     for (key, value) in results.iter().flatten().filter(|(key, _)| *key != "steps") {
@@ -50,16 +52,6 @@ pub fn describe(folder: &Path) -> anyhow::Result<Answer> {
         .with("last_step", log.map(|line| line["step"].clone()))
         .with("results", results.map(Value::Object))
         .with("contents", json!(files)))
-}
-
-fn string(table: &Table, keys: &[&str]) -> String {
-    let (last, parents) = keys.split_last().unwrap_or((&"", &[]));
-    let inner = parents.iter().try_fold(table, |table, key| table.get(*key)?.as_table());
-    let value = inner.and_then(|table| table.get(*last));
-    value.map_or("not told".to_owned(), |value| match value.as_str() {
-        Some(text) => text.to_owned(),
-        None => value.to_string(),
-    })
 }
 
 fn data(table: &Table) -> String {
@@ -97,8 +89,7 @@ fn results(path: &Path) -> anyhow::Result<Option<serde_json::Map<String, Value>>
     serde_json::from_str(&output::read_text(path)?).map(Some).with_context(name)
 }
 
-fn steps(table: &Table, log: Option<&Value>, ended: bool) -> String {
-    let asked = string(table, &["training", "steps"]);
+fn steps(asked: &str, log: Option<&Value>, ended: bool) -> String {
     let done = log.and_then(|line| line["step"].as_u64());
     match (done, ended) {
         (Some(done), true) => format!("{done} of {asked}"),

@@ -2,6 +2,7 @@
 
 use super::annotate::annotate;
 use super::{Model, of_data};
+use crate::keys;
 use anyhow::bail;
 use std::path::{Path, PathBuf};
 
@@ -82,7 +83,7 @@ impl Guess {
     /// Names all of it, with what to write.
     pub fn check(&self, settings: &str, data: &[PathBuf]) -> anyhow::Result<()> {
         let table: toml::Table = settings.parse()?;
-        let is_open = |missing: &&Missing| !has(&table, &missing.key);
+        let is_open = |missing: &&Missing| keys::at(&table, &missing.key).is_none();
         let open: Vec<&Missing> = self.missing.iter().filter(is_open).collect();
         if open.is_empty() {
             return Ok(());
@@ -91,7 +92,7 @@ impl Guess {
             |m: &&Missing| format!("\n  {} ({}): --set '{}={}'", m.key, m.why, m.key, m.example);
         let lines: String = open.iter().map(line).collect();
         let names: Vec<String> = data.iter().map(|path| path.display().to_string()).collect();
-        let image = match has(&table, "data.visibilities") {
+        let image = match keys::at(&table, "data.visibilities").is_some() {
             true => {
                 "\nor, for a source that does not change while it is observed, --model image: it needs none of these"
             }
@@ -117,24 +118,10 @@ impl Guess {
     }
 }
 
-fn find<'a>(table: &'a toml::Table, key: &str) -> Option<&'a toml::Value> {
-    let mut words = key.split('.');
-    let first = table.get(words.next()?)?;
-    words.try_fold(first, |value, word| match value {
-        // Of a list of tables the last one is meant that has the key.
-        toml::Value::Array(list) => list.iter().rev().find_map(|item| item.get(word)),
-        value => value.get(word),
-    })
-}
-
-fn has(table: &toml::Table, key: &str) -> bool {
-    find(table, key).is_some()
-}
-
 fn is_still(table: &toml::Table, key: &str, value: &str) -> bool {
     let guessed: Option<toml::Table> = format!("value = {value}").parse().ok();
     let guessed = guessed.and_then(|table| table.get("value").cloned());
-    guessed.is_none() || find(table, key) == guessed.as_ref()
+    guessed.is_none() || keys::at(table, key) == guessed.as_ref()
 }
 
 #[cfg(test)]
