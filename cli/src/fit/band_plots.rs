@@ -29,13 +29,13 @@ pub fn of_runs(runs: &[(String, BandResults)], caption: &str) -> Vec<LinePlot> {
     let plot = |(of, words, unit): (fn(&BandResults) -> &Shares, &str, &str)| {
         let curve = |(name, results): &(String, BandResults)| {
             let points = of(results).to_vec();
-            (points.len() > 1).then(|| line(name, points))
+            (points.len() > 1).then(|| Series::new(name, points, Marks::Joined))
         };
         let mut series: Vec<Series> = runs.iter().filter_map(curve).take(CURVES).collect();
         let first = series.first()?;
         if words == INCLINATION && series.len() < CURVES {
             let prior = prior(&first.points);
-            series.push(line("before any data", prior));
+            series.push(Series::new("before any data", prior, Marks::Joined));
         }
         Some(LinePlot {
             title: format!("Probability of the {words}"),
@@ -46,10 +46,6 @@ pub fn of_runs(runs: &[(String, BandResults)], caption: &str) -> Vec<LinePlot> {
         })
     };
     QUANTITIES.into_iter().filter_map(plot).collect()
-}
-
-fn line(name: &str, points: Vec<[f64; 2]>) -> Series {
-    Series { name: name.to_owned(), points, errors: Vec::new(), marks: Marks::Joined }
 }
 
 /// Returns the prior of axes in any direction, at the inclinations that were looked at.
@@ -72,8 +68,8 @@ pub fn loop_plot(table: &str, name: &str) -> Option<LinePlot> {
     };
     let rows: Vec<[f64; 4]> = lines.map(row).filter(|r| r.iter().all(|x| x.is_finite())).collect();
     let points = |a: usize| rows.iter().map(|row| [row[a], row[a + 1]]).collect::<Vec<_>>();
-    let data = Series { marks: Marks::Points, ..line("data", points(0)) };
-    let model = Series { marks: Marks::Line, ..line("model", points(2)) };
+    let data = Series::new("data", points(0), Marks::Points);
+    let model = Series::new("model", points(2), Marks::Line);
     let axis = |label: &str| Axis { label: label.to_owned(), unit: "Jy".to_owned(), log: false };
     (rows.len() > 1).then(|| LinePlot {
         title: format!("Loop in Q and U{name}"),

@@ -8,7 +8,7 @@ fn series(lines: &[Value], name: &str, of: impl Fn(&Value) -> Option<f64>) -> Se
     let points: Vec<[f64; 2]> = lines.iter().filter_map(point).collect();
     // A line through one point cannot be seen.
     let marks = if points.len() == 1 { Marks::Points } else { Marks::Line };
-    Series { name: name.to_owned(), points, errors: Vec::new(), marks }
+    Series::new(name, points, marks)
 }
 
 /// Loss and χ² of each kind of data against steps, if any were logged.

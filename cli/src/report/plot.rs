@@ -77,6 +77,13 @@ impl Axis {
     }
 }
 
+impl Series {
+    /// One without errors.
+    pub fn new(name: impl Into<String>, points: Vec<[f64; 2]>, marks: Marks) -> Self {
+        Series { name: name.into(), points, errors: Vec::new(), marks }
+    }
+}
+
 /// A point and the error of its y.
 type Point = ([f64; 2], f64);
 

@@ -41,11 +41,9 @@ fn text(words: &str) -> String {
 }
 
 fn loss() -> LinePlot {
-    let curve = |name: &str, scale: f64| Series {
-        name: text(name),
-        points: (0..200).map(f64::from).map(|k| [k, scale * (-k / 40.0).exp()]).collect(),
-        errors: Vec::new(),
-        marks: Marks::Line,
+    let curve = |name: &str, scale: f64| {
+        let points = (0..200).map(f64::from).map(|k| [k, scale * (-k / 40.0).exp()]);
+        Series::new(name, points.collect(), Marks::Line)
     };
     LinePlot {
         title: text("Loss"),

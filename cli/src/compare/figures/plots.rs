@@ -39,8 +39,7 @@ impl Figures<'_> {
                 }
                 points.sort_by(|a, b| a[0].total_cmp(&b[0]));
                 // One without points keeps the colours of the others as they are in other plots.
-                let name = called(&row);
-                series.push(Series { name, points, errors: Vec::new(), marks });
+                series.push(Series::new(called(&row), points, marks));
             }
             let (unit, _) = described(value);
             let seeds = self.summary.seeds_told();
@@ -118,12 +117,8 @@ impl Figures<'_> {
             }
             // The sky is real: V(−u, −v) is the conjugate of V(u, v), and both are measured.
             let points = uv.iter().flat_map(|[u, v]| [[*u, *v], [-*u, -*v]]);
-            let series = vec![Series {
-                name: format!("{} visibilities", uv.len()),
-                points: points.map(|p| p.map(|x| x * 1e-9)).collect(),
-                errors: Vec::new(),
-                marks: Marks::Points,
-            }];
+            let points = points.map(|p| p.map(|x| x * 1e-9)).collect();
+            let name = format!("{} visibilities", uv.len());
             let axis = |label: &str| Axis {
                 label: label.to_owned(),
                 unit: "10⁹ wavelengths".to_owned(),
@@ -134,7 +129,7 @@ impl Figures<'_> {
                 caption: format!("{} Both ends of every baseline.", asked.caption),
                 x: axis("u"),
                 y: axis("v"),
-                series,
+                series: vec![Series::new(name, points, Marks::Points)],
             });
         }
         Ok(plots)
@@ -149,16 +144,10 @@ impl Figures<'_> {
                 continue;
             };
             let [assumed, simulated] = fit::velocities(&case.settings().unwrap_or_default())?;
-            let curve = |name: String, points| Series {
-                name,
-                points,
-                errors: Vec::new(),
-                marks: Marks::Line,
-            };
             if series.is_empty() {
-                series.push(curve("assumed".to_owned(), assumed));
+                series.push(Series::new("assumed", assumed, Marks::Line));
             }
-            series.push(curve(called(&row), simulated));
+            series.push(Series::new(called(&row), simulated, Marks::Line));
         }
         let plot = |series| LinePlot {
             title: asked.title.clone(),
@@ -183,7 +172,7 @@ const BINS: usize = 100;
 /// A curve of points in order: as they are, or of too many their means in groups.
 fn binned(name: String, points: Vec<[f64; 2]>) -> Series {
     if points.len() <= POINTS {
-        return Series { name, points, errors: Vec::new(), marks: Marks::Joined };
+        return Series::new(name, points, Marks::Joined);
     }
     let group = |part: &[[f64; 2]]| {
         let mean = |k: usize| part.iter().map(|point| point[k]).sum::<f64>() / part.len() as f64;

@@ -128,11 +128,8 @@ impl Leakage {
                 errors: errors.collect(),
                 marks: Marks::Points,
             });
-            series.extend(self.truth.as_ref().map(|truth| Series {
-                name: format!("{name}, truth"),
-                points: points(truth, hand),
-                errors: Vec::new(),
-                marks: Marks::Points,
+            series.extend(self.truth.as_ref().map(|truth| {
+                Series::new(format!("{name}, truth"), points(truth, hand), Marks::Points)
             }));
         }
         LinePlot {

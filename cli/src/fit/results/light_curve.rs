@@ -72,12 +72,8 @@ impl Estimate<'_> {
         for (plane, parameter) in curve.parameters.iter().enumerate() {
             let line = |what: &str, of: &dyn Fn(usize) -> f64| {
                 let hours = curve.hours.iter().enumerate();
-                Series {
-                    name: format!("{} of the {what}", parameter.name()),
-                    points: hours.map(|(k, hour)| [*hour, of(k * count + plane)]).collect(),
-                    errors: Vec::new(),
-                    marks: Marks::Line,
-                }
+                let points = hours.map(|(k, hour)| [*hour, of(k * count + plane)]).collect();
+                Series::new(format!("{} of the {what}", parameter.name()), points, Marks::Line)
             };
             series.push(line("model", &|k| f64::from(seen[k]) + curve.background_at(k)[0]));
             if curve.background.is_some() {

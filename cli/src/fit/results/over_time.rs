@@ -77,14 +77,9 @@ impl Changes {
     pub fn plot(&self) -> LinePlot {
         let points =
             |values: &[f64]| self.times.iter().zip(values).map(|(t, x)| [*t, *x]).collect();
-        let series = |name: &str, values: &[f64], marks| Series {
-            name: name.to_owned(),
-            points: points(values),
-            errors: Vec::new(),
-            marks,
-        };
-        let mut all = vec![series("recovered", &self.recovered, Marks::Line)];
-        all.extend(self.truth.as_ref().map(|truth| series("truth", truth, Marks::Points)));
+        let mut all = vec![Series::new("recovered", points(&self.recovered), Marks::Line)];
+        let truth = self.truth.as_ref();
+        all.extend(truth.map(|truth| Series::new("truth", points(truth), Marks::Points)));
         LinePlot {
             title: "Emission over time".to_owned(),
             caption: "All emission in the volume at the time of each frame. Matter carries emission; where this curve rises, emission appears, where it falls, emission fades or leaves the volume.".to_owned(),

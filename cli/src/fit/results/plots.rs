@@ -11,19 +11,9 @@ impl Estimate<'_> {
     pub fn light_curve(&self, movie: &Frames<f32>) -> anyhow::Result<LinePlot> {
         let times = &self.measured.times;
         let points = |fluxes: Vec<f64>| times.iter().zip(fluxes).map(|(t, f)| [*t, f]).collect();
-        let mut series = vec![Series {
-            name: "recovered".to_owned(),
-            points: points(movie.sums()?),
-            errors: Vec::new(),
-            marks: Marks::Line,
-        }];
+        let mut series = vec![Series::new("recovered", points(movie.sums()?), Marks::Line)];
         if let Some(truth) = &self.measured.movie {
-            series.push(Series {
-                name: self.known_movie().to_owned(),
-                points: points(truth.sums()?),
-                errors: Vec::new(),
-                marks: Marks::Points,
-            });
+            series.push(Series::new(self.known_movie(), points(truth.sums()?), Marks::Points));
         }
         let points = match (&self.measured.movie, &self.measured.truth) {
             (Some(_), Some(_)) => " Points are the true movie, the line is the recovered one.",
@@ -69,12 +59,7 @@ pub fn amplitudes(
             errors: rows.iter().map(|(_, i)| i.noise_sigma).collect(),
             marks: Marks::Points,
         },
-        Series {
-            name: "recovered".to_owned(),
-            points: fitted.collect(),
-            errors: Vec::new(),
-            marks: Marks::Points,
-        },
+        Series::new("recovered", fitted.collect(), Marks::Points),
     ];
     Ok(Some(LinePlot {
         title: "Visibilities".to_owned(),

@@ -40,11 +40,8 @@ fn plot(
     if log {
         series.iter_mut().for_each(|series| series.errors.clear());
     }
-    series.extend(expected.map(|expected| Series {
-        name: "expected".to_owned(),
-        points: vec![[first, expected], [last, expected]],
-        errors: Vec::new(),
-        marks: Marks::Line,
+    series.extend(expected.map(|expected| {
+        Series::new("expected", vec![[first, expected], [last, expected]], Marks::Line)
     }));
     Some(LinePlot {
         title: title.to_owned(),
