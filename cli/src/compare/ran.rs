@@ -104,14 +104,12 @@ pub fn table(summary: &Summary) -> Table {
     }
     rows.push(line("seeds", "seed", summary.seeds.to_string()));
     rows.push(line("cases", "", cases.len().to_string()));
-    Table {
-        title: "What ran".to_owned(),
-        caption: "Settings of the cases themselves; results.json has all of them, case by case."
-            .to_owned(),
-        head: ["", "setting", "value"].map(str::to_owned).to_vec(),
+    Table::new(
+        "What ran",
+        "Settings of the cases themselves; results.json has all of them, case by case.",
+        ["", "setting", "value"],
         rows,
-        links: Vec::new(),
-    }
+    )
 }
 
 /// Kinds of data that a fit with these settings compares.

@@ -76,16 +76,11 @@ pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> 
             lines.push([vec![name], cells.into_iter().map(text).collect()].concat());
         }
     }
+    let title = format!("{}: {unit}", asked.title);
     if lines.is_empty() {
-        return Table {
-            title: format!("{}: {unit}", asked.title),
-            caption: format!(
-                "Nothing to show: no case that was run to its end has this value ({unit})."
-            ),
-            head: Vec::new(),
-            rows: Vec::new(),
-            links: Vec::new(),
-        };
+        let caption =
+            format!("Nothing to show: no case that was run to its end has this value ({unit}).");
+        return Table::new(title, caption, [""; 0], lines);
     }
     lines.extend(asked.beside.iter().map(|row| beside(experiment, asked, row, &columns, digits)));
     let gaps = lines.iter().flatten().any(|cell| cell == NONE);
@@ -102,13 +97,8 @@ pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> 
     let best =
         asked.best_of.as_ref().map(|name| format!(" In brackets: the best level of {name}."));
     let best = best.unwrap_or_default();
-    Table {
-        title: format!("{}: {unit}", asked.title),
-        caption: format!("{} {spread}{best}{gaps}", asked.caption).trim_start().to_owned(),
-        head: std::iter::once(head).chain(names).collect(),
-        rows: lines,
-        links: Vec::new(),
-    }
+    let caption = format!("{} {spread}{best}{gaps}", asked.caption);
+    Table::new(title, caption.trim_start(), std::iter::once(head).chain(names), lines)
 }
 
 /// Text where there is no number.
@@ -153,13 +143,12 @@ pub fn levels_told(experiment: &Experiment) -> Table {
             rows.push(vec![format!("{}: {}", factor.name, level.name), changes]);
         }
     }
-    Table {
-        title: "What the cases differ in".to_owned(),
-        caption: "Settings that each level changes; all others are those of its fit.".to_owned(),
-        head: vec!["level".to_owned(), "settings".to_owned()],
+    Table::new(
+        "What the cases differ in",
+        "Settings that each level changes; all others are those of its fit.",
+        ["level", "settings"],
         rows,
-        links: Vec::new(),
-    }
+    )
 }
 
 /// Keys with dots and their values.

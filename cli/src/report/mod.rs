@@ -136,6 +136,19 @@ pub struct Outcome {
     pub meaning: String,
 }
 
+impl Table {
+    /// One without links.
+    pub fn new(
+        title: impl Into<String>,
+        caption: impl Into<String>,
+        head: impl IntoIterator<Item = impl Into<String>>,
+        rows: Vec<Vec<String>>,
+    ) -> Self {
+        let head = head.into_iter().map(Into::into).collect();
+        Table { title: title.into(), caption: caption.into(), head, rows, links: Vec::new() }
+    }
+}
+
 impl Report {
     /// The page.
     ///

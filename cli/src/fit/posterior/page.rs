@@ -134,18 +134,14 @@ fn ranks(found: &[Ranks; 3]) -> report::Table {
     };
     let names =
         ["random nodes of the region", "nodes where the mean is bright", "radius of feature 1"];
-    report::Table {
-        title: "Where the truth lies among the draws".to_owned(),
-        caption: "Part of the nodes at which the simulated emission lies within the middle 68 % and 95 % of the draws, \
-                  and how many have their rank in each tenth, the lowest first: equally many, over many simulations, if the \
-                  draws are those of the posterior. Equal numbers, as dark nodes have, are in random order."
-            .to_owned(),
-        head: ["", "number", "middle 68 %", "middle 95 %", "ranks by tenths"]
-            .map(str::to_owned)
-            .to_vec(),
-        rows: names.into_iter().zip(found).map(row).collect(),
-        links: Vec::new(),
-    }
+    report::Table::new(
+        "Where the truth lies among the draws",
+        "Part of the nodes at which the simulated emission lies within the middle 68 % and 95 % of the draws, \
+         and how many have their rank in each tenth, the lowest first: equally many, over many simulations, if the \
+         draws are those of the posterior. Equal numbers, as dark nodes have, are in random order.",
+        ["", "number", "middle 68 %", "middle 95 %", "ranks by tenths"],
+        names.into_iter().zip(found).map(row).collect(),
+    )
 }
 
 fn of_nodes(found: &Summary) -> Vec<report::Table> {
@@ -155,14 +151,12 @@ fn of_nodes(found: &Summary) -> Vec<report::Table> {
         vec![name.to_owned(), c.nodes.to_string(), percent(c.one), percent(c.two)]
     };
     let names = ["random nodes of the region", "nodes that shine"];
-    vec![report::Table {
-        title: "How often the truth lies inside".to_owned(),
-        caption: "Part of the nodes at which the simulated emission lies within 1 and 1.96 standard deviations of the \
-                  mean: 68 % and 95 % for independent normal errors. Nodes in the dark are inside more often: emission \
-                  is not negative."
-            .to_owned(),
-        head: ["nodes", "number", "within 1 σ", "within 1.96 σ"].map(str::to_owned).to_vec(),
-        rows: names.into_iter().zip(coverage).map(row).collect(),
-        links: Vec::new(),
-    }]
+    vec![report::Table::new(
+        "How often the truth lies inside",
+        "Part of the nodes at which the simulated emission lies within 1 and 1.96 standard deviations of the \
+         mean: 68 % and 95 % for independent normal errors. Nodes in the dark are inside more often: emission \
+         is not negative.",
+        ["nodes", "number", "within 1 σ", "within 1.96 σ"],
+        names.into_iter().zip(coverage).map(row).collect(),
+    )]
 }

@@ -95,17 +95,15 @@ pub fn table(checks: &[Check]) -> Option<report::Table> {
         let all = [Some(check.larger_chi2), check.larger_on_a_baseline, check.larger_in_a_frame];
         [check.data.clone(), chi2].into_iter().chain(all.map(cell)).collect()
     };
-    (!checks.is_empty()).then(|| report::Table {
-        title: "Posterior predictive checks".to_owned(),
-        caption: "Probability of data that are at least as far from a draw as the measured ones, if the model and the draw are \
-                  right: by χ² of all data, by the least probable baseline (triangle, quadrangle), and by the least \
-                  probable frame. Means over the draws. Near 0 the model cannot make such data; near 1 it follows their \
-                  noise, or their errors are overestimated."
-            .to_owned(),
-        head: ["data", "χ² per data point", "larger χ²", "on a baseline", "in a frame"]
-            .map(str::to_owned)
-            .to_vec(),
-        rows: checks.iter().map(row).collect(),
-        links: Vec::new(),
+    (!checks.is_empty()).then(|| {
+        report::Table::new(
+            "Posterior predictive checks",
+            "Probability of data that are at least as far from a draw as the measured ones, if the model and the draw are \
+             right: by χ² of all data, by the least probable baseline (triangle, quadrangle), and by the least \
+             probable frame. Means over the draws. Near 0 the model cannot make such data; near 1 it follows their \
+             noise, or their errors are overestimated.",
+            ["data", "χ² per data point", "larger χ²", "on a baseline", "in a frame"],
+            checks.iter().map(row).collect(),
+        )
     })
 }

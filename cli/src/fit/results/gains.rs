@@ -234,13 +234,12 @@ impl Gains {
             ]
         };
         let head = ["station", "frames", "amplitude", "scatter", "σ of ln|g|", "σ of phase (°)"];
-        Table {
-            title: "Station gains".to_owned(),
-            caption: "Gains that explain the data best beside the model: what a station measures is its gain times what it should. Amplitude and scatter are mean and standard deviation over the frames; σ is what data and priors leave open in one frame beside the model, with the scatter of draws of a static image. Those of a static image are less what the method adds, where a simple shape explains the data. A mean far from 1 is an error of calibration, or of the model.".to_owned(),
-            head: head.map(str::to_owned).to_vec(),
-            rows: self.stations().into_iter().map(row).collect(),
-            links: Vec::new(),
-        }
+        Table::new(
+            "Station gains",
+            "Gains that explain the data best beside the model: what a station measures is its gain times what it should. Amplitude and scatter are mean and standard deviation over the frames; σ is what data and priors leave open in one frame beside the model, with the scatter of draws of a static image. Those of a static image are less what the method adds, where a simple shape explains the data. A mean far from 1 is an error of calibration, or of the model.",
+            head,
+            self.stations().into_iter().map(row).collect(),
+        )
     }
 
     /// Amplitudes of all stations over time, some stations a plot.

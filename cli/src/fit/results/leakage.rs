@@ -104,13 +104,12 @@ impl Leakage {
             [vec![s.station.clone()], of(0).to_vec(), of(1).to_vec()].concat()
         };
         let head = ["station", "Re d_R", "Im d_R", "σ of d_R", "Re d_L", "Im d_L", "σ of d_L"];
-        Table {
-            title: "Leakage".to_owned(),
-            caption: "Leakage of the other hand into each feed, in per cent, with the standard deviation of each part that data and prior leave open, the model taken for granted.".to_owned(),
-            head: head.map(str::to_owned).to_vec(),
-            rows: self.table.stations.iter().map(row).collect(),
-            links: Vec::new(),
-        }
+        Table::new(
+            "Leakage",
+            "Leakage of the other hand into each feed, in per cent, with the standard deviation of each part that data and prior leave open, the model taken for granted.",
+            head,
+            self.table.stations.iter().map(row).collect(),
+        )
     }
 
     /// All terms in the complex plane, beside the true ones where these are known.

@@ -179,16 +179,13 @@ pub fn table(judged: &DataVerdict) -> Table {
             worst_parts(judged, tested),
         ]
     };
-    Table {
-        title: "Residuals".to_owned(),
-        caption: "Model minus data in units of σ, over all frames. With the right model and errors χ² per data point is as \
-                  expected, and the mean and the correlation between frames vanish. Fitted parameters lower χ².\
-                  "
-            .to_owned(),
-        head: head.map(str::to_owned).to_vec(),
-        rows: judged.terms.iter().map(row).collect(),
-        links: Vec::new(),
-    }
+    Table::new(
+        "Residuals",
+        "Model minus data in units of σ, over all frames. With the right model and errors χ² per data point is as \
+         expected, and the mean and the correlation between frames vanish. Fitted parameters lower χ².",
+        head,
+        judged.terms.iter().map(row).collect(),
+    )
 }
 
 /// The worst station, group of stations and frame with their χ² per data point.

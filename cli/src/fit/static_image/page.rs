@@ -147,21 +147,15 @@ impl Found<'_> {
         let flux = format!("{:.3}", found.solution.image.iter().sum::<f64>());
         let head = ["the image".to_owned(), String::new(), flux];
         let image = [&head[..], &numbers(&found.chi2)[..], &["–".to_owned()]].concat();
-        Table {
-            title: "Simple shapes".to_owned(),
-            caption: "Shapes that were fitted to the same data with the same gains, for a sanity check: χ² per data point, and χ² of \
-                      all independent data plus the number of parameters times the logarithm of that of the data. The less \
-                      that is, the better; 10 less is strong evidence."
-                .to_owned(),
-            head: ["shape", "sizes", "flux (Jy)"]
-                .map(str::to_owned)
-                .into_iter()
-                .chain(kinds)
-                .chain(["criterion".to_owned()])
-                .collect(),
-            rows: self.shapes.iter().map(shape).chain([image]).collect(),
-            links: Vec::new(),
-        }
+        let first = ["shape", "sizes", "flux (Jy)"].map(str::to_owned).into_iter();
+        Table::new(
+            "Simple shapes",
+            "Shapes that were fitted to the same data with the same gains, for a sanity check: χ² per data point, and χ² of \
+             all independent data plus the number of parameters times the logarithm of that of the data. The less \
+             that is, the better; 10 less is strong evidence.",
+            first.chain(kinds).chain(["criterion".to_owned()]),
+            self.shapes.iter().map(shape).chain([image]).collect(),
+        )
     }
 
     /// Every image that was found, with what it fits.
@@ -185,19 +179,17 @@ impl Found<'_> {
         };
         let survey = &self.survey;
         let first = ["image", "start", "factor", "loss"].map(str::to_owned).into_iter();
-        Table {
-            title: "All images".to_owned(),
-            caption: "Images from all starts, with other factors on the penalties that predict held-out frames as well, and of \
-                      measurements of the best image with other noise: the loss, χ² per data point and the diameter of the ring, µas."
-                .to_owned(),
-            head: first.chain(kinds).chain(["diameter".to_owned()]).collect(),
-            rows: [
+        Table::new(
+            "All images",
+            "Images from all starts, with other factors on the penalties that predict held-out frames as well, and of \
+             measurements of the best image with other noise: the loss, χ² per data point and the diameter of the ring, µas.",
+            first.chain(kinds).chain(["diameter".to_owned()]),
+            [
                 rows("start", &survey.starts),
                 rows("other factor", &survey.strengths),
                 rows("draw", &survey.draws),
             ]
             .concat(),
-            links: Vec::new(),
-        }
+        )
     }
 }

@@ -108,12 +108,12 @@ pub fn by_station(judged: &DataVerdict) -> Option<Table> {
     };
     let heads =
         measured.iter().flat_map(|(name, _)| [format!("χ² of {name}"), "number".to_owned()]);
-    (!stations.is_empty()).then(|| Table {
-        title: "Residuals of stations".to_owned(),
-        caption: "χ² per data point of all data that a station is part of, and their number."
-            .to_owned(),
-        head: ["station".to_owned()].into_iter().chain(heads).collect(),
-        rows: stations.iter().map(|station| row(*station)).collect(),
-        links: Vec::new(),
+    (!stations.is_empty()).then(|| {
+        Table::new(
+            "Residuals of stations",
+            "χ² per data point of all data that a station is part of, and their number.",
+            ["station".to_owned()].into_iter().chain(heads),
+            stations.iter().map(|station| row(*station)).collect(),
+        )
     })
 }
