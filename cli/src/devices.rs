@@ -5,7 +5,7 @@ use clap::Args;
 use kerrlight_geodesic::RayDevice;
 use kerrlight_tomo::fit::{Objective, StepDevice, Training};
 use kerrlight_tomo::representation::Representation;
-use serde_json::{Value, json};
+use serde::Serialize;
 use std::sync::Arc;
 
 /// Arguments of `kerrlight devices`.
@@ -47,15 +47,18 @@ pub type TakeSteps = Box<
 pub type FitDevice = (CheckSteps, TakeSteps);
 
 /// A graphics device as it is listed.
+#[derive(Serialize)]
 struct Listed {
     name: String,
     kind: &'static str,
     interface: &'static str,
     driver: String,
     /// Bytes of the largest buffer that a shader may see.
-    largest_buffer: u64,
-    /// Invocations of the largest workgroup, and bytes of its memory.
-    workgroup: (u32, u32),
+    largest_buffer_bytes: u64,
+    /// Invocations of the largest workgroup.
+    workgroup_invocations: u32,
+    /// Bytes of its memory.
+    workgroup_bytes: u32,
 }
 
 impl Devices {
@@ -71,32 +74,21 @@ impl Devices {
             true => graphics::ABSENT,
             false => "--device gpu takes the first graphics device, --device NAME another one\n",
         };
-        let devices: Vec<Value> = devices.iter().map(Listed::json).collect();
+        let devices = serde_json::to_value(devices)?;
         Ok(Answer::text(text).with("threads", threads).with("devices", devices))
     }
 }
 
 impl Listed {
     fn line(&self) -> String {
-        let Listed { name, kind, interface, driver, largest_buffer, workgroup } = self;
-        let (invocations, memory) = (workgroup.0, workgroup.1 >> 10);
+        let Listed { name, kind, interface, driver, .. } = self;
         let limits = format!(
-            "buffers up to {} MiB, workgroups of {invocations} with {memory} KiB",
-            largest_buffer >> 20
+            "buffers up to {} MiB, workgroups of {} with {} KiB",
+            self.largest_buffer_bytes >> 20,
+            self.workgroup_invocations,
+            self.workgroup_bytes >> 10
         );
         format!("{name}: {kind}, {interface}, driver {driver}; {limits}")
-    }
-
-    fn json(&self) -> Value {
-        json!({
-            "name": self.name,
-            "kind": self.kind,
-            "interface": self.interface,
-            "driver": self.driver,
-            "largest_buffer_bytes": self.largest_buffer,
-            "workgroup_invocations": self.workgroup.0,
-            "workgroup_bytes": self.workgroup.1,
-        })
     }
 }
 
@@ -145,13 +137,17 @@ mod graphics {
                               software device\n(Debian, Ubuntu: apt install mesa-vulkan-drivers)\n";
 
     pub fn listed() -> Vec<Listed> {
-        let list = |adapter: &gpu::Adapter| Listed {
-            name: adapter.name().to_owned(),
-            kind: adapter.kind(),
-            interface: adapter.interface(),
-            driver: adapter.driver(),
-            largest_buffer: adapter.largest_buffer(),
-            workgroup: adapter.workgroup(),
+        let list = |adapter: &gpu::Adapter| {
+            let (workgroup_invocations, workgroup_bytes) = adapter.workgroup();
+            Listed {
+                name: adapter.name().to_owned(),
+                kind: adapter.kind(),
+                interface: adapter.interface(),
+                driver: adapter.driver(),
+                largest_buffer_bytes: adapter.largest_buffer(),
+                workgroup_invocations,
+                workgroup_bytes,
+            }
         };
         gpu::adapters().iter().map(list).collect()
     }
