@@ -51,14 +51,14 @@ pub struct Posterior {
     samples: Option<u32>,
     /// Draw numbers A to B alone, beside other processes that draw others; --samples adds up later
     #[arg(long, value_name = "A..B", conflicts_with = "samples", value_parser = numbers)]
-    draws: Option<Numbers>,
+    draws: Option<RangeInclusive<u32>>,
 }
 
 impl Posterior {
     /// Draws, and writes what follows from the draws.
     pub fn run(&self, registry: &Registry) -> anyhow::Result<Answer> {
-        if let Some(Numbers(first, last)) = self.draws {
-            return self.some(registry, first..=last);
+        if let Some(numbers) = &self.draws {
+            return self.some(registry, numbers.clone());
         }
         let (folder, text) = Folder::open(&self.run, Duration::ZERO)?;
         let prepared = self.prepared(&text, registry)?;
@@ -106,17 +106,14 @@ impl Posterior {
     }
 }
 
-/// First and last number of a range of draws.
-#[derive(Debug, Clone, Copy)]
-struct Numbers(u32, u32);
-
 /// `A..B`, both included.
-fn numbers(text: &str) -> Result<Numbers, String> {
+fn numbers(text: &str) -> Result<RangeInclusive<u32>, String> {
     let ends = text
         .split_once("..")
-        .and_then(|(first, last)| Some(Numbers(first.parse().ok()?, last.parse().ok()?)));
-    let allowed = |Numbers(first, last): &Numbers| 1 <= *first && first <= last && *last <= 100_000;
-    ends.filter(allowed).ok_or_else(|| "A..B with 1 <= A <= B <= 100000 is allowed".to_owned())
+        .and_then(|(first, last)| Some(first.parse().ok()?..=last.parse().ok()?));
+    let is_allowed =
+        |all: &RangeInclusive<u32>| *all.start() >= 1 && !all.is_empty() && *all.end() <= 100_000;
+    ends.filter(is_allowed).ok_or_else(|| "A..B with 1 <= A <= B <= 100000 is allowed".to_owned())
 }
 
 /// One draw as it is kept.
