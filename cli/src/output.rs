@@ -154,22 +154,21 @@ impl Output {
         write: impl FnOnce(&mut BufWriter<&File>) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
         let name = || format!("cannot write {}", plain::path(&self.path));
+        let fill = |file: &File| -> anyhow::Result<()> {
+            let mut buffer = BufWriter::new(file);
+            write(&mut buffer).with_context(name)?;
+            buffer.flush().with_context(name)
+        };
         if self.piped {
             // The bytes are kept in a file without a name until they are whole.
             let file = tempfile::tempfile_in(&self.folder).with_context(name)?;
-            let mut buffer = BufWriter::new(&file);
-            write(&mut buffer).with_context(name)?;
-            buffer.flush().with_context(name)?;
-            drop(buffer);
+            fill(&file)?;
             return pour(&file);
         }
         self.sweep();
         let file = self.beside()?;
         let _unfinished = Unfinished::new(file.path());
-        let mut buffer = BufWriter::new(file.as_file());
-        write(&mut buffer).with_context(name)?;
-        buffer.flush().with_context(name)?;
-        drop(buffer);
+        fill(file.as_file())?;
         // On the disk before the rename: a crash of the machine leaves the old file or the new one.
         file.as_file().sync_all().with_context(name)?;
         file.persist(&self.path).with_context(name)?;
