@@ -54,18 +54,8 @@ pub struct Compare {
     /// Folder of the results [default: the experiment's name]
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
-    /// Seeds of every case
-    #[arg(long, value_name = "N")]
-    seeds: Option<u64>,
-    /// Run these cases alone, e.g. scene=1; may be repeated
-    #[arg(long, value_name = "FACTOR=LEVEL")]
-    only: Vec<String>,
-    /// Change a setting of all fits, e.g. training.steps=100
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
-    /// A look at whether it runs: few steps, few cases
-    #[arg(long)]
-    quick: bool,
+    #[command(flatten)]
+    choice: Choice,
     /// Resume in an existing folder: finished cases are not run again
     #[arg(long)]
     resume: bool,
@@ -187,12 +177,13 @@ impl Compare {
         words.extend(name);
         words.extend(["-o".to_owned(), asked.folder.display().to_string()]);
         let mut add = |option: &str, value: String| words.extend([option.to_owned(), value]);
-        self.seeds.iter().for_each(|seeds| add("--seeds", seeds.to_string()));
-        self.only.iter().for_each(|only| add("--only", only.clone()));
-        self.set.iter().for_each(|set| add("--set", set.clone()));
+        let Choice { seeds, only, set, quick, .. } = &self.choice;
+        seeds.iter().for_each(|seeds| add("--seeds", seeds.to_string()));
+        only.iter().for_each(|only| add("--only", only.clone()));
+        set.iter().for_each(|set| add("--set", set.clone()));
         threads.iter().for_each(|threads| add("--threads", threads.to_string()));
         memory.iter().for_each(|memory| add("--memory", memory.to_string()));
-        words.extend(self.quick.then(|| "--quick".to_owned()));
+        words.extend(quick.then(|| "--quick".to_owned()));
         words
     }
 
@@ -209,14 +200,7 @@ impl Compare {
             }
             None => {
                 let (source, text) = Source::find(name)?;
-                let choice = Choice {
-                    seeds: self.seeds,
-                    only: self.only.clone(),
-                    quick: self.quick,
-                    set: self.set.clone(),
-                    registry: program.registry.clone(),
-                };
-                (Plan::new(&source, &choice)?, text, self.folder_for(name))
+                (Plan::new(&source, &self.choice)?, text, self.folder_for(name))
             }
         };
         let experiment = Experiment::parse(&text).with_context(|| name.display().to_string())?;
@@ -226,8 +210,7 @@ impl Compare {
 
     /// Refuses to change what a folder was begun with.
     fn adds_nothing(&self, folder: &Path) -> anyhow::Result<()> {
-        let is_plain = self.seeds.is_none() && self.only.is_empty() && self.set.is_empty();
-        if !is_plain || self.quick {
+        if self.choice != Choice::default() {
             bail!(
                 "{} has its cases: --seeds, --only, --set and --quick go with an experiment",
                 folder.display()

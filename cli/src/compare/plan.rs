@@ -31,12 +31,9 @@ pub struct Plan {
     version: String,
     /// Folder from which paths in the experiment start; none for one that the program carries.
     base: Option<PathBuf>,
-    /// Seeds on the command line.
-    seeds: Option<u64>,
-    only: Vec<String>,
-    quick: bool,
-    /// Assignments, whose paths start from the root.
-    set: Vec<String>,
+    /// The command line's; paths in assignments start from the root.
+    #[serde(flatten)]
+    choice: Choice,
 }
 
 impl Plan {
@@ -47,14 +44,8 @@ impl Plan {
             Source::Folder(folder) => Some(folder.clone()),
         };
         let set = choice.set.iter().map(|set| paths::from_here(set, None));
-        Ok(Plan {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            base,
-            seeds: choice.seeds,
-            only: choice.only.clone(),
-            quick: choice.quick,
-            set: set.collect::<anyhow::Result<_>>()?,
-        })
+        let choice = Choice { set: set.collect::<anyhow::Result<_>>()?, ..choice.clone() };
+        Ok(Plan { version: env!("CARGO_PKG_VERSION").to_owned(), base, choice })
     }
 
     /// Reads the plan in a folder, with the text of the experiment; nothing if no comparison was begun there.
@@ -91,13 +82,7 @@ impl Plan {
 
     /// Returns the choice of cases.
     pub fn choice(&self, registry: &Registry) -> Choice {
-        Choice {
-            seeds: self.seeds,
-            only: self.only.clone(),
-            quick: self.quick,
-            set: self.set.clone(),
-            registry: registry.clone(),
-        }
+        Choice { registry: registry.clone(), ..self.choice.clone() }
     }
 
     /// Refuses to work on the cases of another plan, or of another version.

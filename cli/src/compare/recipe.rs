@@ -8,26 +8,41 @@ use crate::fit;
 use crate::keys;
 use crate::paths;
 use anyhow::{Context, anyhow, bail};
+use clap::Args;
 use kerrlight_tomo::fit::settings::merge;
 use kerrlight_tomo::representation::Registry;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use toml::{Table, Value};
 
 /// Choice of cases, and how they are run.
-#[derive(Clone, Default)]
+#[derive(Debug, Clone, Default, Args, Serialize, Deserialize)]
 pub struct Choice {
-    /// Seeds, in place of the experiment's.
+    /// Seeds of every case
+    #[arg(long, value_name = "N")]
     pub seeds: Option<u64>,
-    /// `factor=level` that are kept.
+    /// Run these cases alone, e.g. scene=1; may be repeated
+    #[arg(long, value_name = "FACTOR=LEVEL")]
     pub only: Vec<String>,
-    /// True if the experiment's quick settings are used.
-    pub quick: bool,
-    /// `key=value` for all cases.
+    /// Change a setting of all fits, e.g. training.steps=100
+    #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
+    /// A look at whether it runs: few steps, few cases
+    #[arg(long)]
+    pub quick: bool,
     /// Representations that the program adds.
+    #[arg(skip)]
+    #[serde(skip)]
     pub registry: Registry,
+}
+
+/// Of what is asked for alone: what the program adds cannot be compared.
+impl PartialEq for Choice {
+    fn eq(&self, o: &Self) -> bool {
+        (self.seeds, &self.only, &self.set, self.quick) == (o.seeds, &o.only, &o.set, o.quick)
+    }
 }
 
 impl Choice {
