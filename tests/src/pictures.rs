@@ -117,17 +117,6 @@ fn exact_spots_move_to_the_right_in_front() {
     assert!(late > early + 3.0, "{early} {late}");
 }
 
-/// The picture does not depend on the number of threads, bit for bit.
-#[test]
-fn exact_same_picture_on_any_number_of_threads() {
-    let text = file("hot_spots.toml");
-    let on = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| small(&text, &[]))
-    };
-    assert_eq!(on(1), on(3));
-}
-
 /// The flux requested is the flux of the picture.
 #[test]
 fn exact_total_flux() {

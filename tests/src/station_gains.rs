@@ -3,7 +3,6 @@
 use crate::fit::{results, with};
 use crate::support::{fail, succeed};
 use kerrlight_render::volume::VolumeArrays;
-use std::path::Path;
 
 /// Gains of 15 %, of 60 % at the LMT, and random phases, all of them new in every scan.
 const ERRORS: &str = "simulation.observation.gains={constant_amplitude=0.0,scan_amplitude=0.15,random_phases=true,stations={LMT=0.6}}";
@@ -124,6 +123,5 @@ fn bad_input_of_gains_is_named_and_nothing_is_begun() {
     ] {
         let error = fail(folder.path(), &with(&small(&sets), &["-o", "none"]));
         assert!(error.contains(says), "{sets:?}: {error}");
-        assert!(!Path::new(&folder.path().join("none")).exists());
     }
 }
