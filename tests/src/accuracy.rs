@@ -1,6 +1,6 @@
 //! Error estimates and hard rays, against numbers of twice the precision.
 
-use crate::support::{fail, kerrlight};
+use crate::support::{fail, succeed};
 use kerrlight_geodesic::Integrator;
 use kerrlight_validation::accuracy::estimates;
 use kerrlight_validation::accuracy::hard;
@@ -88,8 +88,7 @@ fn code_estimates_bound_errors_of_every_class() {
 fn hard_rays_as_a_command() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path();
-    let done = kerrlight(path, &["accuracy", "--hard", "400", "-o", "results"]);
-    assert!(done.status.success(), "{done:?}");
+    succeed(path, &["accuracy", "--hard", "400", "-o", "results"]);
     for name in ["hard.csv", "hard.json"] {
         let text = std::fs::read_to_string(path.join("results").join(name)).expect("results");
         assert!(text.contains("near-critical"), "{text}");

@@ -1,6 +1,6 @@
 //! Bad input gets one clear message, exit code 2, and nothing written.
 
-use crate::support::{fail, kerrlight, root};
+use crate::support::{fail, kerrlight, message, root, succeed, told};
 
 #[test]
 fn files_that_cannot_be_read() {
@@ -68,7 +68,7 @@ fn pictures_that_mean_nothing() {
         let small = ["--set", "screen.width=8", "--set", "screen.height=8", "-o", "a.exr"];
         let output =
             kerrlight(folder.path(), &[&["render", "--set", setting], &small[..]].concat());
-        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+        (output.status.code(), message(&output))
     };
     for (setting, said) in [
         ("hole.mass_msun=1e300", "`hole.mass_msun` = 1e300 is not allowed: 1e-20 to 1e15"),
@@ -201,7 +201,7 @@ fn outputs_spare_inputs() {
     let arguments = ["render", "sky_image.toml", "--preview", "graticule.png"];
     assert!(fail(path, &arguments).contains("is an input"));
     let small = ["--set", "screen.width=8", "--set", "screen.height=8", "-o", "a.exr"];
-    assert!(kerrlight(path, &[&["render"][..], &small[..]].concat()).status.success());
+    succeed(path, &[&["render"][..], &small[..]].concat());
     assert!(fail(path, &["render", "a.exr", "-o", "a.exr"]).contains("is an input"));
     let mut permissions = std::fs::metadata(path.join("a.exr")).unwrap().permissions();
     permissions.set_readonly(true);
@@ -256,11 +256,9 @@ fn files_that_have_changed_are_told() {
     }
     let small = ["--set", "screen.width=16", "--set", "screen.height=10"];
     let words = [&["render", "mesh.toml", "-o", "first.exr"][..], &small[..]].concat();
-    crate::support::succeed(at, &words);
+    succeed(at, &words);
     let said = |name: &str| {
-        let output = kerrlight(at, &["render", "first.exr", "-o", name]);
-        assert!(output.status.success());
-        String::from_utf8_lossy(&output.stderr).contains("the picture will differ")
+        told(at, &["render", "first.exr", "-o", name]).contains("the picture will differ")
     };
     assert!(!said("second.exr"));
     let mesh = at.join("ring_and_moon.obj");
@@ -277,9 +275,8 @@ fn samples_within_huge_spheres_end() {
     std::fs::write(folder.path().join("rays.csv"), rays).unwrap();
     for radius in ["1e6", "1e9"] {
         let words = ["trace", "--rays", "rays.csv", "--samples", "3", "--within", radius];
-        let output = kerrlight(folder.path(), &words);
-        let table = String::from_utf8_lossy(&output.stdout);
-        assert!(output.status.success() && !table.contains("NaN"), "{table}");
+        let table = succeed(folder.path(), &words);
+        assert!(!table.contains("NaN"), "{table}");
     }
     let words = ["trace", "--rays", "rays.csv", "--samples", "3", "--within", "1e300"];
     assert!(fail(folder.path(), &words).contains("1 to 1e9 (M)"));

@@ -1,7 +1,6 @@
 //! Cases of a comparison as commands of their own, run by an engine: each once, none lost, the same bytes.
 
-use crate::support::{binary, fail, kerrlight, root, start, succeed, until};
-use serde_json::Value;
+use crate::support::{binary, fail, json, kerrlight, message, object, root, start, succeed, until};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -56,8 +55,7 @@ fn volumes(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 fn counts(folder: &Path, name: &str) -> [u64; 4] {
-    let status: Value =
-        serde_json::from_str(&succeed(folder, &["compare", name, "--status", "--json"])).unwrap();
+    let status = object(folder, &["compare", name, "--status"]);
     let failed = status["failed"].as_array().unwrap().len() as u64;
     let count = |key: &str| status[key].as_u64().unwrap();
     [count("done"), count("running"), failed, count("open")]
@@ -73,7 +71,7 @@ fn runs_each_case_once(engine: &str) {
         format!("kerrlight compare seeds.toml -o out --list --threads 1 | cut -f 3 | {engine}");
     let written = [(); 2].map(|()| {
         let output = shell(at, &script).output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.status.success(), "{}", message(&output));
         let entries = std::fs::read_dir(at.join("out/cases")).unwrap().flatten();
         let time = |entry: std::fs::DirEntry| {
             let record = entry.path().join("record.json").metadata().ok()?;
@@ -125,10 +123,8 @@ fn exact_many_cases_are_listed_counted_and_collected() {
     std::fs::write(at.join("out/cases").join(format!("{}.failed", ids[2000])), "why").unwrap();
     assert_eq!(counts(at, "out"), [2000, 0, 1, 7999]);
     succeed(at, &["compare", "out", "--collect"]);
-    let read =
-        |path: PathBuf| -> Value { serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap() };
-    let all = read(at.join("out/results.json"));
-    let one = read(run(ids[0]).join("results.json"));
+    let all = json(&at.join("out/results.json"));
+    let one = json(&run(ids[0]).join("results.json"));
     let cases = all["cases"].as_array().unwrap();
     assert_eq!(cases.len(), 10_000);
     for (k, (case, id)) in cases.iter().zip(&ids).enumerate() {
@@ -183,7 +179,7 @@ impl Slurm {
     fn start(folder: &Path) -> Option<Self> {
         let slurm = Slurm(folder.join("slurm"));
         let output = slurm.script("start.sh");
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        let said = message(&output);
         if output.status.code() == Some(77) {
             eprintln!("SLURM IS NOT TESTED: {said}");
             return None;
@@ -200,7 +196,7 @@ impl Slurm {
     fn says(&self, folder: &Path, script: &str) -> String {
         let output = shell(folder, script).env("SLURM_CONF", self.0.join("slurm.conf")).output();
         let output = output.unwrap();
-        assert!(output.status.success(), "{script}: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.status.success(), "{script}: {}", message(&output));
         String::from_utf8_lossy(&output.stdout).trim().to_owned()
     }
 }

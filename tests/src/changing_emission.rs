@@ -1,6 +1,7 @@
 //! Fits of emission that changes while matter carries it.
 
-use crate::support::{fail, kerrlight, root};
+use crate::fit::results;
+use crate::support::{fail, json, root, succeed};
 use serde_json::Value;
 use std::path::Path;
 
@@ -20,9 +21,8 @@ fn fit(folder: &Path, changes: &[&str]) -> Value {
     std::fs::write(folder.join("fit.toml"), settings()).unwrap();
     let mut arguments = vec!["fit", "fit.toml", "-o", "run"];
     arguments.extend(changes.iter().flat_map(|change| ["--set", change]));
-    let run = kerrlight(folder, &arguments);
-    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    serde_json::from_slice(&std::fs::read(folder.join("run/results.json")).unwrap()).unwrap()
+    succeed(folder, &arguments);
+    results(&folder.join("run"))
 }
 
 /// Columns of `emission.csv`: time, recovered, truth.
@@ -131,12 +131,8 @@ fn exact_geometries_are_drawn_where_emission_changes() {
         fine={trials=20,nodes=14,iterations=40,pixels=20,frames=15}}";
     let truth = "simulation.observer.inclination_deg=60.0";
     fit(folder.path(), &[prior, truth, search, "linear.iterations=15", "linear.rounds=1"]);
-    let run = kerrlight(folder.path(), &["posterior", "run", "--samples", "3"]);
-    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    let read = |name: &str| -> Value {
-        serde_json::from_slice(&std::fs::read(folder.path().join("run").join(name)).unwrap())
-            .unwrap()
-    };
+    succeed(folder.path(), &["posterior", "run", "--samples", "3"]);
+    let read = |name: &str| json(&folder.path().join("run").join(name));
     let known = read("geometry.json");
     let sigma = known["sigma"]["inclination_deg"].as_f64().unwrap();
     let best = known["geometry"]["inclination_deg"].as_f64().unwrap();
@@ -164,14 +160,11 @@ fn exact_hard_motion_is_recognised_as_wrong() {
         format!("{}\n{}", &text[..start], &text[end..]),
     )
     .unwrap();
-    let run = kerrlight(folder.path(), &["fit", "hard.toml", "-o", "run"]);
-    let told = String::from_utf8_lossy(&run.stdout).into_owned();
-    assert!(told.starts_with("The model does not explain its data"), "{told} {run:?}");
-    let results: Value =
-        serde_json::from_slice(&std::fs::read(folder.path().join("run/results.json")).unwrap())
-            .unwrap();
-    assert!(chi2(&results) > 10.0 * chi2(&soft), "{} {}", chi2(&results), chi2(&soft));
-    assert!(error(&soft) < 0.8 * error(&results), "{} {}", error(&soft), error(&results));
+    let told = succeed(folder.path(), &["fit", "hard.toml", "-o", "run"]);
+    assert!(told.starts_with("The model does not explain its data"), "{told}");
+    let hard = results(&folder.path().join("run"));
+    assert!(chi2(&hard) > 10.0 * chi2(&soft), "{} {}", chi2(&hard), chi2(&soft));
+    assert!(error(&soft) < 0.8 * error(&hard), "{} {}", error(&soft), error(&hard));
     assert!(folder.path().join("run/emission.csv").exists());
 }
 

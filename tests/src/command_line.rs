@@ -1,6 +1,6 @@
 //! The binary as a user runs it.
 
-use crate::support::{kerrlight, root, succeed};
+use crate::support::{done, message, root, succeed};
 use kerrlight_render::image::exr;
 
 const SIZE: [&str; 4] = ["--set", "screen.width=48", "--set", "screen.height=40"];
@@ -8,9 +8,8 @@ const SIZE: [&str; 4] = ["--set", "screen.width=48", "--set", "screen.height=40"
 #[test]
 fn render_without_a_scene_says_so_and_writes_both_files() {
     let folder = tempfile::tempdir().unwrap();
-    let output = kerrlight(folder.path(), &[&["render"][..], &SIZE[..]].concat());
-    assert!(output.status.success());
-    assert!(String::from_utf8_lossy(&output.stderr).contains("built-in scene"));
+    let output = done(folder.path(), &[&["render"][..], &SIZE[..]].concat());
+    assert!(message(&output).contains("built-in scene"));
     let told = String::from_utf8_lossy(&output.stdout).into_owned();
     let lines: Vec<&str> = told.lines().collect();
     assert_eq!(lines.len(), 2, "{told}");

@@ -1,6 +1,7 @@
 //! `kerrlight compare`: cases that are whole, cached, gone on with, or failed and named.
 
-use crate::support::{cramped, fail, kerrlight, root, succeed};
+use crate::fit::results;
+use crate::support::{cramped, fail, json, kerrlight, message, root, succeed, told};
 use serde_json::Value;
 use std::path::Path;
 
@@ -55,10 +56,6 @@ pub fn experiment(folder: &Path, changes: &[(&str, &str)]) {
     std::fs::write(folder.join("rates.toml"), text).unwrap();
 }
 
-pub(crate) fn results(folder: &Path) -> Value {
-    serde_json::from_slice(&std::fs::read(folder.join("results.json")).unwrap()).unwrap()
-}
-
 pub(crate) fn cases(results: &Value) -> &Vec<Value> {
     results["cases"].as_array().unwrap()
 }
@@ -103,15 +100,14 @@ fn exact_cases_are_whole_and_not_done_twice() {
     // A full folder is not written to by accident; what is done is not done again.
     let refused = fail(at, &["compare", "rates.toml", "-o", "out"]);
     assert!(refused.contains("--resume"), "{refused}");
-    let output = kerrlight(at, &["compare", "rates.toml", "-o", "out", "--resume"]);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("4 cases, 0 of them to be run"));
+    let resume = ["compare", "rates.toml", "-o", "out", "--resume"];
+    assert!(told(at, &resume).contains("4 cases, 0 of them to be run"));
     assert_eq!(results(&at.join("out")), first);
     // A case whose folder was lost half-way is done again, to the same numbers.
     let lost = at.join("out").join(cases(&first)[2]["folder"].as_str().unwrap());
     std::fs::remove_file(lost.join("report.html")).unwrap();
     std::fs::remove_file(lost.join("results.json")).unwrap();
-    let output = kerrlight(at, &["compare", "rates.toml", "-o", "out", "--resume"]);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("4 cases, 1 of them to be run"));
+    assert!(told(at, &resume).contains("4 cases, 1 of them to be run"));
     let again = results(&at.join("out"));
     for (a, b) in cases(&first).iter().zip(cases(&again)) {
         assert_eq!(a["results"]["psnr_db"], b["results"]["psnr_db"]);
@@ -122,14 +118,10 @@ fn exact_cases_are_whole_and_not_done_twice() {
     let version = format!("\"version\": \"{}\"", env!("CARGO_PKG_VERSION"));
     assert!(found.contains(&version), "{found}");
     std::fs::write(&file, found.replace(&version, "\"version\": \"0.0.1\"")).unwrap();
-    let output = kerrlight(at, &["compare", "rates.toml", "-o", "out", "--resume"]);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("4 cases, 1 of them to be run"));
+    assert!(told(at, &resume).contains("4 cases, 1 of them to be run"));
     assert!(std::fs::read_to_string(&file).unwrap().contains(&version));
     // What is chosen to be run does not hide what is known.
-    succeed(
-        at,
-        &["compare", "rates.toml", "-o", "out", "--resume", "--only", "rate=0.1", "--seeds", "3"],
-    );
+    succeed(at, &[&resume[..], &["--only", "rate=0.1", "--seeds", "3"]].concat());
     let more = results(&at.join("out"));
     assert_eq!(cases(&more).len(), 5);
     assert!(cases(&more).iter().all(|case| case["status"] == "done"));
@@ -142,7 +134,7 @@ fn a_case_that_fails_is_named_and_the_others_are_whole() {
     experiment(at, &[("[0.1, 0.4]", "[0.1, -0.4]")]);
     let output = kerrlight(at, &["compare", "rates.toml", "-o", "out", "--seeds", "1"]);
     assert_eq!(output.status.code(), Some(1));
-    let said = String::from_utf8_lossy(&output.stderr);
+    let said = message(&output);
     assert!(said.contains("1 of 2 cases failed: rate -0.4, seed 1"), "{said}");
     let results = results(&at.join("out"));
     assert_eq!(cases(&results)[0]["status"], "done");
@@ -166,7 +158,7 @@ fn a_case_that_fills_the_disk_is_named_and_done_later() {
     experiment(at, &nodes);
     let words = ["compare", "rates.toml", "-o", "out", "--seeds", "1"];
     let output = cramped(at, 1024, &words);
-    let said = String::from_utf8_lossy(&output.stderr);
+    let said = message(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("1 of 2 cases failed: nodes 128, seed 1"), "{said}");
     let found = results(&at.join("out"));
@@ -176,8 +168,8 @@ fn a_case_that_fills_the_disk_is_named_and_done_later() {
     );
     let error = cases(&found)[0]["error"].as_str().unwrap();
     assert!(error.contains("volume.npz") && error.contains("File too large"), "{error}");
-    let output = kerrlight(at, &[&words[..], &["--resume"]].concat());
-    assert!(String::from_utf8_lossy(&output.stderr).contains("2 cases, 1 of them to be run"));
+    let said = told(at, &[&words[..], &["--resume"]].concat());
+    assert!(said.contains("2 cases, 1 of them to be run"), "{said}");
     assert!(cases(&results(&at.join("out"))).iter().all(|case| case["status"] == "done"));
 }
 
@@ -305,18 +297,14 @@ fn exact_draws_are_results_of_cases() {
     let within = &cases(&first)[0]["results"]["random_nodes_within_95"];
     assert!((0.0..=1.0).contains(&within.as_f64().unwrap()), "{within}");
     let run = at.join("out").join(cases(&first)[0]["folder"].as_str().unwrap());
-    let numbers = std::fs::read(run.join("posterior/posterior.json")).unwrap();
-    let numbers: Value = serde_json::from_slice(&numbers).unwrap();
+    let numbers = json(&run.join("posterior/posterior.json"));
     assert_eq!((&numbers["samples"], &numbers["random_nodes_within_95"]), (&2.into(), within));
     // Without what follows from the draws the case is not done; with it nothing is done again.
     std::fs::remove_file(run.join("posterior/posterior.json")).unwrap();
-    let told = |expected: &str| {
-        let output = kerrlight(at, &["compare", "rates.toml", "-o", "out", "--resume"]);
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(told.contains(expected), "{told}");
-    };
-    told("1 cases, 1 of them to be run");
-    told("1 cases, 0 of them to be run");
+    for expected in ["1 cases, 1 of them to be run", "1 cases, 0 of them to be run"] {
+        let said = told(at, &["compare", "rates.toml", "-o", "out", "--resume"]);
+        assert!(said.contains(expected), "{said}");
+    }
     assert_eq!(&cases(&results(&at.join("out")))[0]["results"]["random_nodes_within_95"], within);
 }
 

@@ -1,7 +1,8 @@
 //! Files of data as others write them: visibilities of every kind that the EHT has published, arrays,
 //! pictures of the sky, empty files; and where paths of settings start.
 
-use crate::support::{fail, kerrlight, root, succeed};
+use crate::fit::results;
+use crate::support::{fail, kerrlight, message, root, succeed, told};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::array::built_in;
 use kerrlight_vlbi::earth::{Frame, SourcePosition, Ut1};
@@ -26,13 +27,11 @@ fn fit(folder: &Path, scene: &str, data: &Path, out: &str) -> Result<(), String>
     let set = SMALL.into_iter().chain([path.as_str()]).flat_map(|set| ["--set", set]);
     let words: Vec<&str> = ["fit", &scene, "-o", out].into_iter().chain(set).collect();
     let output = kerrlight(folder, &words);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
     if !output.status.success() {
-        return Err(said);
+        return Err(message(&output));
     }
-    let results = std::fs::read_to_string(folder.join(out).join("results.json")).unwrap();
-    let results: serde_json::Value = serde_json::from_str(&results).unwrap();
-    let chi2 = results["chi2_per_datum"].as_object().unwrap();
+    let found = results(&folder.join(out));
+    let chi2 = found["chi2_per_datum"].as_object().unwrap();
     let is_number = |value: &serde_json::Value| value.as_f64().is_some_and(|x| x > 0.0);
     if chi2.len() == 2 && chi2.values().all(is_number) { Ok(()) } else { Err(format!("{chi2:?}")) }
 }
@@ -340,16 +339,14 @@ fn exact_flags_over_midnight() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     std::fs::write(path.join("data.uvfits"), files::write_uvfits(&measured()).unwrap()).unwrap();
-    let convert = |interval: &str| {
-        let output = kerrlight(path, &["convert", "data.uvfits", "a.csv", "--flag-utc", interval]);
-        (output.status.success(), String::from_utf8_lossy(&output.stderr).into_owned())
-    };
+    let convert =
+        |interval: &'static str| ["convert", "data.uvfits", "a.csv", "--flag-utc", interval];
     let all = measured().rows.len();
     let third = measured().rows.iter().filter(|row| row.time_h < 11.1).count();
-    let (ok, said) = convert("20-11.1");
-    assert!(ok && said.contains(&format!("{} rows, {third} flagged", all - third)), "{said}");
-    let (ok, said) = convert("20-10");
-    assert!(ok && said.contains("--flag-utc 20-10: no visibility lies in it"), "{said}");
-    let (ok, said) = convert("30-20");
-    assert!(!ok && said.contains("30-20 is not allowed"), "{said}");
+    let said = told(path, &convert("20-11.1"));
+    assert!(said.contains(&format!("{} rows, {third} flagged", all - third)), "{said}");
+    let said = told(path, &convert("20-10"));
+    assert!(said.contains("--flag-utc 20-10: no visibility lies in it"), "{said}");
+    let said = fail(path, &convert("30-20"));
+    assert!(said.contains("30-20 is not allowed"), "{said}");
 }

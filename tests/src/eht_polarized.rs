@@ -2,7 +2,7 @@
 //! [`crate::eht_data`] do: light curves beside numbers that another program reads, and data that survive being written.
 
 use crate::eht_data::folder;
-use crate::support::{kerrlight, succeed};
+use crate::support::{succeed, told};
 use kerrlight_vlbi::files;
 
 const NIGHTS: [&str; 2] = ["096", "097"];
@@ -191,9 +191,8 @@ fn exact_leakage_of_a_table_is_taken_out_of_a_night() {
         let others = ["AP", "AZ", "PV", "SM", "SP"].map(|name| format!("{name},0,0,,0,0,\n"));
         let table = format!("{heading}\nAA,{of_alma},0,,0,0,\n{}", others.concat());
         std::fs::write(here.path().join("leakage.csv"), table).unwrap();
-        let output = kerrlight(here.path(), &["convert", file, name, "--leakage", "leakage.csv"]);
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.success() && told.contains("rows have no leakage"), "{told}");
+        let said = told(here.path(), &["convert", file, name, "--leakage", "leakage.csv"]);
+        assert!(said.contains("rows have no leakage"), "{said}");
         read(&here.path().join(name))
     };
     let (same, moved) = (cleaned(0.0, "same.uvfits"), cleaned(0.05, "moved.uvfits"));

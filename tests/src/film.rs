@@ -1,6 +1,6 @@
 //! Films: frames that are those of `render`, that are kept, and that do not flicker.
 
-use crate::support::{fail, kerrlight, succeed};
+use crate::support::{fail, object, succeed, told};
 use kerrlight_render::Error;
 use kerrlight_render::image::exr;
 use kerrlight_render::scene::Scene;
@@ -141,9 +141,8 @@ fn exact_second_run_goes_on() {
     succeed(folder.path(), &MOVIE);
     let before: Vec<_> = (0..3).map(|k| frame(folder.path(), k)).collect();
     std::fs::remove_file(folder.path().join("film/frame_0001.exr")).unwrap();
-    let output = kerrlight(folder.path(), &[&MOVIE[..], &["--gif", "a.gif"][..]].concat());
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(told.contains("1 frames rendered") && told.contains("2 were there"), "{told}");
+    let said = told(folder.path(), &[&MOVIE[..], &["--gif", "a.gif"][..]].concat());
+    assert!(said.contains("1 frames rendered") && said.contains("2 were there"), "{said}");
     let after: Vec<_> = (0..3).map(|k| frame(folder.path(), k)).collect();
     assert!(before == after);
     let gif = std::fs::read(folder.path().join("a.gif")).unwrap();
@@ -165,10 +164,8 @@ fn exact_parts_are_frames_of_the_whole() {
     let at = folder.path();
     let film = |frames: &str, output: &str, more: &[&str]| {
         let words = ["movie", "spot.toml", "--duration", "60", "--frames", frames, "-o", output];
-        let scale = ["--set", "screen.total_flux_jy=2.5", "--json"];
-        let said = kerrlight(at, &[&words, &scale[..], more].concat());
-        assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
-        let said: serde_json::Value = serde_json::from_slice(&said.stdout).unwrap();
+        let scale = ["--set", "screen.total_flux_jy=2.5"];
+        let said = object(at, &[&words, &scale[..], more].concat());
         [said["frames"].as_u64().unwrap(), said["rendered"].as_u64().unwrap()]
     };
     assert_eq!(film("5", "whole", &["--gif", "whole.gif"]), [5, 5]);

@@ -1,6 +1,6 @@
 //! `kerrlight fit`, from settings to a report.
 
-use crate::support::{binary, fail, kerrlight, root, succeed};
+use crate::support::{binary, fail, json, kerrlight, root, succeed};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
@@ -42,7 +42,7 @@ pub fn with<'a>(small: &'a [String], more: &[&'a str]) -> Vec<&'a str> {
 }
 
 pub fn results(folder: &Path) -> serde_json::Value {
-    serde_json::from_slice(&std::fs::read(folder.join("results.json")).unwrap()).unwrap()
+    json(&folder.join("results.json"))
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! `kerrlight fit --data FILE`: settings that are guessed from a file, with every guess told.
 
 use crate::eht_data::folder;
-use crate::support::{fail, kerrlight, succeed};
+use crate::support::{fail, succeed, told};
 use std::path::Path;
 
 const SEEN: &str = "observe image.csv --fov-uas 100 --array EHT2017 --mjd 57850 --utc 5-7 --frames 6 --tint 60 --noise thermal --seed 1";
@@ -10,9 +10,7 @@ const FEW: [&str; 6] =
 
 /// Returns the messages of a fit of data, with the settings in the run's folder.
 fn said(folder: &Path, words: &[&str], run: &str) -> (String, String) {
-    let output = kerrlight(folder, &[&["fit"], words, &FEW, &["-o", run]].concat());
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{said}");
+    let said = told(folder, &[&["fit"], words, &FEW, &["-o", run]].concat());
     (said, std::fs::read_to_string(folder.join(run).join("fit.toml")).unwrap())
 }
 

@@ -1,7 +1,7 @@
 //! `kerrlight fit` with data that are not convex in the emission: amplitudes and closure quantities.
 
 use crate::fit::{results, with};
-use crate::support::{fail, kerrlight, succeed};
+use crate::support::{fail, kerrlight, message, succeed};
 use std::path::Path;
 
 const AMPLITUDES: &str = r#"loss=[{data="amplitudes",weight=1.0}]"#;
@@ -106,7 +106,7 @@ fn exact_data_without_light_and_axes_that_are_all_alike_fail() {
     let dark = r#"simulation.truth={spot=[{center=[5.5,0.0,0.0],sigma=0.7,amplitude=0.0}]}"#;
     let failed = |sets: &[&str], name: &str| {
         let output = kerrlight(folder.path(), &with(&small(sets), &["-o", name]));
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        let said = message(&output);
         assert_eq!(output.status.code(), Some(1), "{said}");
         assert!(!folder.path().join(name).join("results.json").exists());
         said

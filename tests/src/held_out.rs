@@ -1,8 +1,7 @@
 //! Weights that are chosen by frames that are held out.
 
+use crate::fit::results;
 use crate::support::{fail, succeed};
-use serde_json::Value;
-use std::path::Path;
 
 const SMALL: [&str; 17] = [
     "fit",
@@ -24,10 +23,6 @@ const SMALL: [&str; 17] = [
     "screen.jy_per_pixel=0.125",
 ];
 const HELD_OUT: &str = "held_out={setting=\"linear.smoothness\",values=[0.0,0.1,30.0],folds=2}";
-
-fn results(folder: &Path) -> Value {
-    serde_json::from_slice(&std::fs::read(folder.join("results.json")).unwrap()).unwrap()
-}
 
 /// Without smoothness voxels follow the noise, with too much of it they cannot be a flare: frames that were left out
 /// tell, and the volume is that of a fit with the chosen weight to the bit.

@@ -2,7 +2,7 @@
 //! motion in closed form.
 
 use crate::fit_start::array;
-use crate::support::{even, root, succeed, within};
+use crate::support::{even, json, root, succeed, within};
 use kerrlight_render::dynamics::Velocity;
 use kerrlight_tomo::fit::settings::{FitFile, PriorSettings};
 use kerrlight_tomo::fit::setup::{Drawn, FitData, Instrument};
@@ -137,8 +137,7 @@ fn searched(
     let mut words = vec!["fit", "fit.toml", "-o", "run"];
     sets.iter().chain(of_data).for_each(|set| words.extend(["--set", set]));
     succeed(folder, &words);
-    let text = std::fs::read(folder.join("run/geometry.json")).expect("a geometry");
-    serde_json::from_slice(&text).expect("JSON")
+    json(&folder.join("run/geometry.json"))
 }
 
 /// Asserts that a geometry is that of a sky, within these distances and three standard deviations, which are no wider than this,

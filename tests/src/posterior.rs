@@ -1,9 +1,7 @@
 //! Draws around a finished fit.
 
-use crate::support::{binary, fail, kerrlight, root};
+use crate::support::{binary, fail, json, kerrlight, message, root, succeed, told};
 use crate::unknown_geometry::{NEAR, of_unknown_view};
-use serde_json::Value;
-use std::path::Path;
 
 /// The built-in flare, few pixels, scans and voxels.
 pub fn settings() -> String {
@@ -18,27 +16,16 @@ pub fn settings() -> String {
         .replace("nodes = 64", "nodes = 20")
 }
 
-fn run(folder: &Path, arguments: &[&str]) -> String {
-    let run = kerrlight(folder, arguments);
-    let told = String::from_utf8_lossy(&run.stderr).into_owned();
-    assert!(run.status.success(), "{arguments:?}: {told}");
-    told
-}
-
-fn read(path: &Path) -> Value {
-    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
-}
-
 #[test]
 fn exact_draws_of_voxels_resume_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
     let kind =
         ["--set", "representation=linear-grid", "--set", "representation.linear-grid.nodes=20"];
-    run(folder.path(), &[&["fit", "fit.toml", "-o", "run"][..], &kind[..]].concat());
-    run(folder.path(), &["posterior", "run", "--samples", "4"]);
+    succeed(folder.path(), &[&["fit", "fit.toml", "-o", "run"][..], &kind[..]].concat());
+    succeed(folder.path(), &["posterior", "run", "--samples", "4"]);
     let of = |name: &str| std::fs::read(folder.path().join("run/posterior").join(name)).unwrap();
-    let numbers = read(&folder.path().join("run/posterior/posterior.json"));
+    let numbers = json(&folder.path().join("run/posterior/posterior.json"));
     assert_eq!((&numbers["samples"], &numbers["geometry"]), (&4.into(), &serde_json::json!({})));
     let feature = &numbers["features"][0];
     let [radius, azimuth] = ["radius", "azimuth_deg"].map(|key| feature[key][0].as_f64().unwrap());
@@ -63,11 +50,11 @@ fn exact_draws_of_voxels_resume_to_the_same_bytes() {
     for name in ["sample_0002.json", "sample_0003.npz", "sample_0003.json", "mean.npz"] {
         std::fs::remove_file(folder.path().join("run/posterior").join(name)).unwrap();
     }
-    run(folder.path(), &["posterior", "run", "--samples", "4", "--threads", "1"]);
+    succeed(folder.path(), &["posterior", "run", "--samples", "4", "--threads", "1"]);
     assert_eq!(all, ["mean.npz", "deviation.npz", "posterior.json"].map(of));
     // More draws keep those that there are.
     let first = of("sample_0001.json");
-    run(folder.path(), &["posterior", "run", "--samples", "5"]);
+    succeed(folder.path(), &["posterior", "run", "--samples", "5"]);
     assert_eq!(first, of("sample_0001.json"));
 }
 
@@ -93,8 +80,8 @@ fn exact_draws_of_a_right_model_predict_the_data() {
     ];
     let mut arguments = vec!["fit", "-o", "run", "--samples", "12"];
     sets.iter().for_each(|set| arguments.extend(["--set", set]));
-    run(folder.path(), &arguments);
-    let numbers = read(&folder.path().join("run/posterior/posterior.json"));
+    succeed(folder.path(), &arguments);
+    let numbers = json(&folder.path().join("run/posterior/posterior.json"));
     let check = &numbers["predicted"][0];
     let chi2 = check["chi2_per_datum"].as_f64().unwrap();
     assert!((chi2 - 1.0).abs() < 0.15, "{check}");
@@ -117,9 +104,9 @@ fn exact_draws_survive_a_kill() {
     let kind =
         ["--set", "representation=linear-grid", "--set", "representation.linear-grid.nodes=20"];
     for name in ["run", "killed"] {
-        run(folder.path(), &[&["fit", "fit.toml", "-o", name][..], &kind[..]].concat());
+        succeed(folder.path(), &[&["fit", "fit.toml", "-o", name][..], &kind[..]].concat());
     }
-    run(folder.path(), &["posterior", "run", "--samples", "4"]);
+    succeed(folder.path(), &["posterior", "run", "--samples", "4"]);
     for after in ["sample_0001.npz", "sample_0003.json"] {
         let mut child = std::process::Command::new(binary())
             .current_dir(folder.path())
@@ -134,7 +121,7 @@ fn exact_draws_survive_a_kill() {
         child.kill().unwrap();
         child.wait().unwrap();
     }
-    run(folder.path(), &["posterior", "killed", "--samples", "4"]);
+    succeed(folder.path(), &["posterior", "killed", "--samples", "4"]);
     for name in ["sample_0001.npz", "sample_0004.json", "mean.npz", "posterior.json"] {
         let [whole, killed] = ["run", "killed"]
             .map(|of| std::fs::read(folder.path().join(of).join("posterior").join(name)).unwrap());
@@ -161,10 +148,13 @@ fn same_again(prior: &str) {
     let kind =
         ["--set", "representation=linear-grid", "--set", "representation.linear-grid.nodes=14"];
     let kind = [&kind[..], &["--set", prior]].concat();
-    run(folder.path(), &[&["fit", "fit.toml", "-o", "run", "--samples", "3"][..], &kind].concat());
+    succeed(
+        folder.path(),
+        &[&["fit", "fit.toml", "-o", "run", "--samples", "3"][..], &kind].concat(),
+    );
     let of = |name: &str| std::fs::read(folder.path().join("run/posterior").join(name)).unwrap();
     assert_ne!(of("sample_0001.npz"), of("sample_0002.npz"));
-    let numbers = read(&folder.path().join("run/posterior/posterior.json"));
+    let numbers = json(&folder.path().join("run/posterior/posterior.json"));
     for name in ["random_nodes", "bright_nodes", "feature_radius"] {
         let [one, two] = ["68", "95"].map(|part| numbers[format!("{name}_within_{part}")].as_f64());
         assert!(one.unwrap() <= two.unwrap() && two.unwrap() <= 1.0, "{name} {one:?} {two:?}");
@@ -177,7 +167,7 @@ fn same_again(prior: &str) {
     for name in ["sample_0002.json", "sample_0002.npz", "mean.npz"] {
         std::fs::remove_file(folder.path().join("run/posterior").join(name)).unwrap();
     }
-    run(folder.path(), &["posterior", "run", "--samples", "3", "--threads", "1"]);
+    succeed(folder.path(), &["posterior", "run", "--samples", "3", "--threads", "1"]);
     assert_eq!(all, ["sample_0002.npz", "mean.npz", "posterior.json"].map(of));
 }
 
@@ -243,14 +233,12 @@ fn exact_draws_of_an_unknown_geometry_have_geometries() {
     std::fs::write(folder.path().join("fit.toml"), text).unwrap();
     let kind =
         ["--set", "representation=linear-grid", "--set", "representation.linear-grid.nodes=20"];
-    let told = run(
-        folder.path(),
-        &[&["fit", "fit.toml", "-o", "run", "--samples", "3"][..], &kind[..]].concat(),
-    );
-    assert!(told.contains("inclination_deg = "), "{told}");
-    let geometry = read(&folder.path().join("run/geometry.json"));
+    let words = [&["fit", "fit.toml", "-o", "run", "--samples", "3"][..], &kind[..]].concat();
+    let said = told(folder.path(), &words);
+    assert!(said.contains("inclination_deg = "), "{said}");
+    let geometry = json(&folder.path().join("run/geometry.json"));
     assert!(geometry["sigma"]["inclination_deg"].as_f64().unwrap() > 0.0, "{geometry}");
-    let numbers = read(&folder.path().join("run/posterior/posterior.json"));
+    let numbers = json(&folder.path().join("run/posterior/posterior.json"));
     let inclination = &numbers["geometry"]["inclination_deg"];
     assert!((inclination["mean"].as_f64().unwrap() - 60.0).abs() < 3.0, "{inclination}");
     assert_eq!(inclination["quantiles"].as_array().map(Vec::len), Some(5));
@@ -273,7 +261,7 @@ fn exact_draws_without_a_finished_fit_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |arguments: &[&str], expected: &str| {
         let run = kerrlight(folder.path(), arguments);
-        let told = String::from_utf8_lossy(&run.stderr).into_owned();
+        let told = message(&run);
         assert_eq!(run.status.code(), Some(2), "{arguments:?}: {told}");
         assert!(told.contains(expected), "{arguments:?}: {told}");
     };

@@ -1,6 +1,7 @@
 //! `kerrlight compare --quick` of every experiment that the program carries.
 
-use crate::compare::{cases, results};
+use crate::compare::cases;
+use crate::fit::results;
 use crate::static_sky;
 use crate::support::succeed;
 

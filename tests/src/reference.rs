@@ -2,7 +2,7 @@
 //! program does not have.
 
 use crate::documents::read;
-use crate::support::{kerrlight, root};
+use crate::support::{kerrlight, message, root};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -70,7 +70,7 @@ fn code_words(text: &str) -> BTreeSet<&str> {
 fn allowed(folder: &Path, arguments: &[&str]) -> Vec<String> {
     const AROUND: [&str; 7] = ["expected", "one", "of", "or", "in", "available", "keys"];
     let output = kerrlight(folder, arguments);
-    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    let errors = message(&output);
     assert!(!output.status.success() && errors.contains("nonsense"), "{arguments:?}: {errors}");
     let list = errors.rsplit("nonsense").next().unwrap();
     let words = list.split(|c: char| !c.is_ascii_alphanumeric() && c != '_' && c != '-');

@@ -1,19 +1,12 @@
 //! Output of verbs at their end: two lines for a person, one JSON object for a script, or a file with `-o -`; and the
 //! command line's own help.
 
-use crate::support::{fail, kerrlight, root, succeed};
+use crate::support::{done, fail, message, object, root, succeed};
 use kerrlight_render::image::exr;
-use serde_json::{Value, json};
-use std::path::Path;
+use serde_json::json;
 
 const SIZE: [&str; 4] = ["--set", "screen.width=48", "--set", "screen.height=40"];
 const RAYS: &str = "spin,inclination_deg,alpha,beta\n0.9,60,-6,1\n0,90,0.5,0\n";
-
-/// The one object that a run prints.
-fn object(folder: &Path, arguments: &[&str]) -> Value {
-    let printed = succeed(folder, &[arguments, &["--json"]].concat());
-    serde_json::from_str(&printed).unwrap_or_else(|error| panic!("{error}: {printed}"))
-}
 
 fn rays() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -75,20 +68,15 @@ fn exact_critical_curve_as_json() {
 fn exact_standard_output_carries_the_bytes_of_files() {
     let folder = rays();
     let at = folder.path();
-    let piped = |words: &[&str]| {
-        let output = kerrlight(at, words);
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.success(), "{words:?}: {told}");
-        (output.stdout, told)
-    };
     succeed(at, &["trace", "--rays", "rays.csv", "-o", "rays_out.csv"]);
-    let (table, _) = piped(&["trace", "--rays", "rays.csv", "-o", "-"]);
+    let table = done(at, &["trace", "--rays", "rays.csv", "-o", "-"]).stdout;
     assert!(table == std::fs::read(at.join("rays_out.csv")).unwrap());
     succeed(at, &[&["render", "-o", "a.exr", "--preview", "a.png"][..], &SIZE].concat());
-    let (picture, told) = piped(&[&["render", "-o", "-"][..], &SIZE].concat());
-    assert!(picture == std::fs::read(at.join("a.exr")).unwrap());
-    assert!(told.lines().any(|line| line.starts_with("flux ")), "{told}");
-    let (preview, _) = piped(&[&["render", "--preview", "-"][..], &SIZE].concat());
+    let picture = done(at, &[&["render", "-o", "-"][..], &SIZE].concat());
+    assert!(picture.stdout == std::fs::read(at.join("a.exr")).unwrap());
+    let said = message(&picture);
+    assert!(said.lines().any(|line| line.starts_with("flux ")), "{said}");
+    let preview = done(at, &[&["render", "--preview", "-"][..], &SIZE].concat()).stdout;
     assert!(preview == std::fs::read(at.join("a.png")).unwrap());
     let names: Vec<_> = std::fs::read_dir(at).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert_eq!(names.len(), 4, "{names:?}");
@@ -164,8 +152,7 @@ fn exact_fit_ends_with_its_verdict_and_results() {
     for file in told["files"].as_array().unwrap() {
         assert!(folder.path().join(file.as_str().unwrap()).is_file(), "{file}");
     }
-    let text = std::fs::read_to_string(folder.path().join("run/results.json")).unwrap();
-    let mut written: Value = serde_json::from_str(&text).unwrap();
+    let mut written = crate::fit::results(&folder.path().join("run"));
     written.as_object_mut().unwrap().remove("checksum");
     told.as_object_mut().unwrap().retain(|key, _| !["files", "folder"].contains(&key.as_str()));
     assert_eq!(told, written);

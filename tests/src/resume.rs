@@ -1,6 +1,6 @@
 //! Pictures that are interrupted end in the same bytes.
 
-use crate::support::{binary, fail, kerrlight, root, start, succeed};
+use crate::support::{binary, fail, message, root, start, succeed, told};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
@@ -68,20 +68,18 @@ fn exact_same_bytes_after_an_interrupt() {
     let pid = child.id().to_string();
     assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
     let ended = child.wait_with_output().unwrap();
-    let message = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert_eq!(ended.status.code(), Some(130), "{message}");
-    assert!(message.contains("a.exr.partial") && message.contains("same command"), "{message}");
+    let said = message(&ended);
+    assert_eq!(ended.status.code(), Some(130), "{said}");
+    assert!(said.contains("a.exr.partial") && said.contains("same command"), "{said}");
     let kept = std::fs::read(&partial).unwrap();
 
     let changed = [&arguments(&scene)[..], &["--set", "hole.spin=0.4"]].concat();
-    let output = kerrlight(folder.path(), &changed);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("to another picture"));
+    assert!(told(folder.path(), &changed).contains("to another picture"));
     assert!(std::fs::read(folder.path().join("a.exr")).unwrap() != whole);
 
     std::fs::write(&partial, kept).unwrap();
     let tiles = [&arguments(&scene)[..], &["--tile", "7", "--threads", "3"]].concat();
-    let output = kerrlight(folder.path(), &tiles);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("bands are done"));
+    assert!(told(folder.path(), &tiles).contains("bands are done"));
     assert!(std::fs::read(folder.path().join("a.exr")).unwrap() == whole);
     assert!(!partial.exists());
 }
@@ -97,9 +95,9 @@ fn exact_same_bytes_after_a_full_disk() {
     let mut command = Command::new("sh");
     command.current_dir(folder.path()).arg("-c").arg(limited).arg(binary());
     let output = command.args(arguments(&scene)).output().unwrap();
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(message.contains("cannot write") && message.contains("same command"), "{message}");
+    let said = message(&output);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("cannot write") && said.contains("same command"), "{said}");
     assert!(!folder.path().join("a.exr").exists());
     succeed(folder.path(), &arguments(&scene));
     assert!(std::fs::read(folder.path().join("a.exr")).unwrap() == whole);

@@ -1,7 +1,7 @@
 //! Fits that are resumed: with the data, settings and state they had, alone, or not at all.
 
 use crate::fit::{results, small, with};
-use crate::support::{fail, holds, kerrlight, killed, root, start, succeed, until};
+use crate::support::{fail, holds, kerrlight, killed, root, start, succeed, told, until};
 use std::path::Path;
 
 /// A fit of a movie that a simulation has left, stopped after its first checkpoint: its words and its folder `run`.
@@ -221,9 +221,8 @@ fn exact_comparisons_are_resumed_alone_with_the_same_data() {
     let at_digit = flipped.iter().rposition(u8::is_ascii_digit).unwrap();
     flipped[at_digit] ^= 1;
     std::fs::write(&path, flipped).unwrap();
-    let output = kerrlight(at, &resume);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success() && said.contains("2 cases, 2 of them to be run"), "{said}");
+    let said = told(at, &resume);
+    assert!(said.contains("2 cases, 2 of them to be run"), "{said}");
     let lock = std::fs::File::open(at.join("out/lock")).unwrap();
     lock.try_lock().unwrap();
     assert!(fail(at, &resume).contains("another kerrlight compares in it"));

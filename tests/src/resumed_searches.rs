@@ -1,6 +1,6 @@
 //! Searches for what a fit does not know: killed, they resume where they were, to the same bytes.
 
-use crate::support::{kerrlight, killed, root, succeed};
+use crate::support::{killed, root, succeed, told};
 use crate::unknown_geometry::{NEAR, of_unknown_view};
 use std::path::Path;
 
@@ -20,18 +20,16 @@ fn killed_and_resumed(at: &Path, words: &[&str], results: usize) -> String {
     let is_there =
         || std::fs::read_to_string(&log).is_ok_and(|text| text.lines().count() > results);
     killed(at, &[words, &["-o", "killed"]].concat(), "results of a search", is_there);
-    let resumed = kerrlight(at, &["fit", "--resume", "killed"]);
-    let told = String::from_utf8_lossy(&resumed.stderr).into_owned();
-    assert!(resumed.status.success(), "{told}");
+    let said = told(at, &["fit", "--resume", "killed"]);
     assert!(!log.exists(), "nothing is left of the search but its result");
-    told
+    said
 }
 
 /// A fit whose search is killed after so many results ends with the bytes of one that is not.
 fn resumes_to_the_same_bytes(at: &Path, words: &[&str], results: usize, names: &[&str]) {
     succeed(at, &[words, &["-o", "whole"]].concat());
-    let told = killed_and_resumed(at, words, results);
-    assert!(told.contains("an interrupted search is resumed"), "{told}");
+    let said = killed_and_resumed(at, words, results);
+    assert!(said.contains("an interrupted search is resumed"), "{said}");
     for name in names {
         let [whole, killed] =
             ["whole", "killed"].map(|run| std::fs::read(at.join(run).join(name)).unwrap());

@@ -1,6 +1,6 @@
 //! Files that a scene names: what they may refer to, and the ranges of what they hold.
 
-use crate::support::{fail, kerrlight};
+use crate::support::{fail, told};
 use kerrlight_render::volume::{Volume, VolumeFile};
 use std::fs;
 use std::path::Path;
@@ -12,14 +12,6 @@ fn mesh(folder: &Path, name: &str) {
     let source = "scale = 1.0\nopaque = true\nbrightness = 1.0\nvelocity = \"static\"\n";
     let text = format!("{SCENE}[[mesh]]\npath = \"{name}\"\n{source}");
     fs::write(folder.join("s.toml"), text).unwrap();
-}
-
-/// The words on standard error of a run that ends well.
-fn warned(folder: &Path, arguments: &[&str]) -> String {
-    let output = kerrlight(folder, arguments);
-    let words = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(0), "{words}");
-    words
 }
 
 const RENDER: [&str; 4] = ["render", "s.toml", "-o", "o.exr"];
@@ -49,11 +41,11 @@ fn regress_meshes_stay_in_their_folder() {
         assert!(said.contains("--allow-outside"), "{said}");
     }
     fs::write(inside.join("m.obj"), &texts[0]).unwrap();
-    assert!(!warned(at, &[&RENDER[..], &["--allow-outside"]].concat()).contains("warning: `mesh"));
+    assert!(!told(at, &[&RENDER[..], &["--allow-outside"]].concat()).contains("warning: `mesh"));
     fs::write(inside.join("m.obj"), format!("mtllib below/in.mtl\n{TRIANGLE}")).unwrap();
-    assert!(!warned(at, &RENDER).contains("warning: `mesh"));
+    assert!(!told(at, &RENDER).contains("warning: `mesh"));
     fs::write(inside.join("m.obj"), format!("mtllib none.mtl\n{TRIANGLE}")).unwrap();
-    assert!(warned(at, &RENDER).contains("line 1: there is no `none.mtl`"));
+    assert!(told(at, &RENDER).contains("line 1: there is no `none.mtl`"));
 }
 
 /// Corners and axes of a file have the ranges of the scene's own keys.
@@ -78,5 +70,5 @@ fn regress_volumes_of_files_have_the_ranges_of_scenes() {
     write(10.0, 1.0, 1e200);
     assert!(fail(at, &RENDER).contains("array axis"));
     write(10.0, 1.0, 2.0);
-    warned(at, &RENDER);
+    told(at, &RENDER);
 }

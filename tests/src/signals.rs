@@ -2,17 +2,13 @@
 //! parent.
 
 use crate::fit::{small, with};
-use crate::support::{binary, holds, kerrlight, root, start, succeed, until};
+use crate::support::{binary, holds, kerrlight, message, root, start, succeed, until};
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 fn signal(pid: u32, name: &str) {
     assert!(Command::new("kill").args([name, &pid.to_string()]).status().unwrap().success());
-}
-
-fn message(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 /// The fit of a comparison: the only child of its process.

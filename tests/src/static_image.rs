@@ -4,7 +4,7 @@ use crate::fit::results;
 use crate::fit_start::array;
 use crate::known_skies::bell;
 use crate::static_sky;
-use crate::support::{binary, fail, kerrlight, root, succeed};
+use crate::support::{binary, done, fail, message, root, succeed, told};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::noise::add_thermal_noise;
@@ -61,9 +61,8 @@ fn exact_a_ring_is_found_at_once() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     observed(path);
-    let output = kerrlight(path, &quick(&["--data", "data.uvfits", "-o", "run"]));
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{said}");
+    let output = done(path, &quick(&["--data", "data.uvfits", "-o", "run"]));
+    let said = message(&output);
     for sentence in [
         "read: data.uvfits: M87*, recognised by position or name",
         "assumed: image.flux_jy = 0.6: published for what is compact",
@@ -122,9 +121,7 @@ fn exact_two_bands_make_one_image() {
     let low = SEEN.replace("229.1", "227.1").replace("--seed 3 -o data", "--seed 4 -o low");
     succeed(path, &low.split(' ').collect::<Vec<_>>());
     let words = ["--data", "low.uvfits", "data.uvfits", "--model", "image", "-o", "both"];
-    let output = kerrlight(path, &quick(&words));
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{said}");
+    let said = told(path, &quick(&words));
     assert!(said.contains("read: low.uvfits: M87*") && said.contains("read: data.uvfits: M87*"));
     let found = results(&path.join("both"));
     let ring = number(&found, "ring_diameter_uas");
@@ -203,7 +200,7 @@ fn exact_an_experiment_without_its_data_is_refused() {
         let mut command = std::process::Command::new(binary());
         command.current_dir(&folder).env("KERRLIGHT_EHT_DATA", place);
         let output = command.args(["compare", name, "--quick", "-o", "out"]).output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr);
+        let said = message(&output);
         let says = if place.is_empty() { "KERRLIGHT_EHT_DATA is not set" } else { "is not there" };
         assert!(output.status.code() == Some(2) && said.contains(says), "{said}");
         assert!(!folder.path().join("out").exists());
@@ -303,10 +300,7 @@ fn exact_polarisation_of_a_ring_is_found() {
         polarized(path, file);
         let strength = "polarization.strength={values=[1.0,10.0],folds=3}";
         let words = quick(&["--data", file, "--set", strength, "-o", kind]);
-        let output = kerrlight(path, &words);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.success(), "{said}");
-        let told = String::from_utf8_lossy(&output.stdout);
+        let told = succeed(path, &words);
         assert!(told.contains("of the light is linearly polarised"), "{told}");
         let found = results(&path.join(kind));
         for (key, truth) in [("net_fraction", 0.2), ("mean_fraction", 0.2), ("net_evpa_deg", 30.0)]

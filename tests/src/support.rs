@@ -3,6 +3,7 @@
 use kerrlight_render::image::Picture;
 use kerrlight_render::scene::{Scene, apply_override};
 use kerrlight_render::volume::VolumeArrays;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::OnceLock;
@@ -57,12 +58,38 @@ pub fn cramped(folder: &Path, kib: u32, words: &[&str]) -> Output {
     command.output().expect("bash runs")
 }
 
+/// Standard error of a run.
+pub fn message(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A run that must succeed.
+pub fn done(folder: &Path, arguments: &[&str]) -> Output {
+    let output = kerrlight(folder, arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", message(&output));
+    output
+}
+
 /// Standard output of a run that must succeed.
 pub fn succeed(folder: &Path, arguments: &[&str]) -> String {
-    let output = kerrlight(folder, arguments);
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {errors}");
-    String::from_utf8(output.stdout).expect("text")
+    String::from_utf8(done(folder, arguments).stdout).expect("text")
+}
+
+/// Standard error of a run that must succeed.
+pub fn told(folder: &Path, arguments: &[&str]) -> String {
+    message(&done(folder, arguments))
+}
+
+/// The one object that a run prints.
+pub fn object(folder: &Path, arguments: &[&str]) -> Value {
+    let printed = succeed(folder, &[arguments, &["--json"]].concat());
+    serde_json::from_str(&printed).unwrap_or_else(|error| panic!("{error}: {printed}"))
+}
+
+/// The object of a file.
+pub fn json(path: &Path) -> Value {
+    let text = std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    serde_json::from_slice(&text).expect("JSON")
 }
 
 /// All scene files of the repository with their texts.
@@ -157,7 +184,7 @@ pub fn fail(folder: &Path, arguments: &[&str]) -> String {
     };
     let before = list();
     let output = kerrlight(folder, arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    let message = message(&output);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
     assert_eq!(list(), before, "{arguments:?} left files");
     assert!(output.stdout.is_empty(), "{arguments:?}");

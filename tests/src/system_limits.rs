@@ -1,6 +1,6 @@
 //! Limits of the system: threads, a closed standard output; and what is left behind by kills.
 
-use crate::support::{binary, root, succeed};
+use crate::support::{binary, message, root, succeed};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -23,7 +23,7 @@ fn regress_no_more_threads_is_an_error_that_says_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
     let cramped = |threads: &str| format!("ulimit -v 400000; {threads} exec \"$@\"");
     let ended = after(folder.path(), &cramped("RAYON_NUM_THREADS=1024"), &CURVE);
-    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    let said = message(&ended);
     assert_eq!(ended.status.code(), Some(2), "{said}");
     for word in ["cannot start 1024 threads", "ulimit -u", "pids.max", "--threads"] {
         assert!(said.contains(word), "{word}: {said}");
@@ -33,7 +33,7 @@ fn regress_no_more_threads_is_an_error_that_says_what_to_do() {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     if cores <= 4 {
         let ended = after(folder.path(), &cramped(""), &many);
-        assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+        assert!(ended.status.success(), "{}", message(&ended));
     }
 }
 
@@ -55,7 +55,7 @@ fn exact_what_cannot_be_printed_is_an_error() {
         }
         for (script, reason) in ways {
             let ended = after(folder.path(), script, words);
-            let said = String::from_utf8_lossy(&ended.stderr);
+            let said = message(&ended);
             assert_eq!(ended.status.code(), Some(2), "{words:?} {script}: {said}");
             assert!(said.contains("standard output") && said.contains(reason), "{words:?}: {said}");
         }

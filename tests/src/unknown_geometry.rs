@@ -1,8 +1,7 @@
 //! Fits that do not know the geometry.
 
 use crate::fit::killed_fit;
-use crate::support::{fail, kerrlight, root, succeed};
-use serde_json::Value;
+use crate::support::{fail, json, root, succeed, told};
 
 /// The built-in flare seen by the ngEHT, few pixels and scans, from another inclination and orientation than its
 /// settings say.
@@ -35,20 +34,14 @@ pub fn of_unknown_view(text: &str, [inclination, angle]: [&str; 2], search: &str
     format!("{text}\n[simulation.observer]\n{known}position_angle_deg = 0.0\n\n[search]\n{search}")
 }
 
-fn read(path: &std::path::Path) -> Value {
-    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
-}
-
 #[test]
 #[ignore = "long"]
 fn exact_inclination_and_position_angle_are_found_from_visibilities() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fit.toml"), settings(300)).unwrap();
-    let run = kerrlight(folder.path(), &["fit", "fit.toml", "-o", "run"]);
-    let told = String::from_utf8_lossy(&run.stderr).into_owned();
-    assert!(run.status.success(), "{told}");
-    assert!(told.contains("inclination_deg = "), "{told}");
-    let geometry = read(&folder.path().join("run/geometry.json"));
+    let said = told(folder.path(), &["fit", "fit.toml", "-o", "run"]);
+    assert!(said.contains("inclination_deg = "), "{said}");
+    let geometry = json(&folder.path().join("run/geometry.json"));
     let inclination = geometry["geometry"]["inclination_deg"].as_f64().unwrap();
     let angle = geometry["geometry"]["position_angle_deg"].as_f64().unwrap();
     assert!((inclination - 60.0).abs() < 3.0 && angle.abs() < 3.0, "{geometry}");
@@ -59,8 +52,7 @@ fn exact_inclination_and_position_angle_are_found_from_visibilities() {
     let first = std::fs::read(folder.path().join("run/geometry.json")).unwrap();
     std::fs::remove_file(folder.path().join("run/checkpoint.safetensors")).unwrap();
     std::fs::remove_file(folder.path().join("run/geometry.json")).unwrap();
-    let again = kerrlight(folder.path(), &["fit", "--resume", "run"]);
-    assert!(again.status.success(), "{}", String::from_utf8_lossy(&again.stderr));
+    succeed(folder.path(), &["fit", "--resume", "run"]);
     assert_eq!(first, std::fs::read(folder.path().join("run/geometry.json")).unwrap());
 }
 
@@ -84,7 +76,7 @@ fn exact_a_search_without_phases_claims_no_more_than_it_has_found() {
     let mut words = vec!["fit", "fit.toml", "-o", "run"];
     words.extend(sets.iter().flat_map(|set| ["--set", set]));
     succeed(folder.path(), &words);
-    let geometry = read(&folder.path().join("run/geometry.json"));
+    let geometry = json(&folder.path().join("run/geometry.json"));
     let left = geometry["chi2_per_datum"].as_f64().unwrap();
     for (name, truth) in [("inclination_deg", 60.0), ("position_angle_deg", 0.0)] {
         let found = geometry["geometry"][name].as_f64().unwrap();
@@ -170,7 +162,7 @@ fn exact_geometry_of_a_movie_with_one_ray_a_pixel_is_found() {
     let mut words = vec!["fit", "fit.toml", "-o", "run"];
     sets.iter().for_each(|set| words.extend(["--set", set]));
     succeed(path, &words);
-    let geometry = read(&path.join("run/geometry.json"));
+    let geometry = json(&path.join("run/geometry.json"));
     for (name, truth, most) in
         [("spin", 0.6, 0.01), ("inclination_deg", 150.0, 0.3), ("position_angle_deg", 0.0, 0.3)]
     {
