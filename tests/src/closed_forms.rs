@@ -1,20 +1,9 @@
 //! The closed forms of rays and lensing bands, against 25-digit references, published numbers
 //! and the tracer, with which they share the constants of motion only.
 
-use crate::support::root;
+use crate::kerr_references::references;
 use kerrlight_geodesic::analytic::{ClosedForm, LensingBand};
 use kerrlight_geodesic::{Inclination, Kerr, Observer, Path, Quantities, Tracer};
-use std::collections::HashMap;
-
-fn references() -> Vec<HashMap<String, String>> {
-    let file = root().join("tests/reference/kerr_crossings.csv");
-    let text = std::fs::read_to_string(file).expect("the references");
-    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
-    let header: Vec<String> = lines.next().unwrap().split(',').map(str::to_owned).collect();
-    lines
-        .map(|line| header.iter().cloned().zip(line.split(',').map(str::to_owned)).collect())
-        .collect()
-}
 
 /// All 268 rays: numbers of crossings exactly, Mino times to a few roundings, radii to 1e-15
 /// or 30 times what the input's own rounding moves them by (`cond`), as for the tracer.

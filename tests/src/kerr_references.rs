@@ -4,6 +4,9 @@
 use crate::support::{root, succeed};
 use std::collections::HashMap;
 
+/// The table of the references, from the root of the repository.
+const TABLE: &str = "tests/reference/kerr_crossings.csv";
+
 /// Rows of a CSV text as maps from column to text.
 fn rows(text: &str) -> Vec<HashMap<String, String>> {
     let mut lines = text.lines().filter(|line| !line.starts_with('#') && !line.is_empty());
@@ -16,17 +19,20 @@ fn rows(text: &str) -> Vec<HashMap<String, String>> {
         .collect()
 }
 
+/// The rays of the references.
+pub fn references() -> Vec<HashMap<String, String>> {
+    rows(&std::fs::read_to_string(root().join(TABLE)).expect("the references"))
+}
+
 fn number(row: &HashMap<String, String>, column: &str) -> Option<f64> {
     row.get(column).filter(|text| !text.is_empty()).map(|text| text.parse().expect("a number"))
 }
 
 /// Largest errors over all rays: [relative r and r_min, Mino time, azimuth, delay].
 fn compare(integrator: &str, tolerance: &str) -> [f64; 4] {
-    let reference = root().join("tests/reference/kerr_crossings.csv");
-    let expected = rows(&std::fs::read_to_string(&reference).expect("the references"));
-    let file = reference.to_str().expect("a UTF-8 path");
+    let expected = references();
     let how = ["--integrator", integrator, "--tolerance", tolerance];
-    let arguments = [&["trace", "--rays", file, "--crossings", "3"][..], &how].concat();
+    let arguments = [&["trace", "--rays", TABLE, "--crossings", "3"][..], &how].concat();
     let found = rows(&succeed(&root(), &arguments));
     assert_eq!(expected.len(), found.len());
     assert!(expected.len() > 250);
@@ -90,10 +96,9 @@ fn code_mpmath_crossings_follow_the_tolerance() {
 fn code_oracle_and_mpmath_agree_to_the_last_digit() {
     use kerrlight_validation::accuracy::Oracle;
     use kerrlight_validation::accuracy::rays::{Angle, Draw};
-    let text = std::fs::read_to_string(root().join("tests/reference/kerr_crossings.csv"));
     let mut oracle = Oracle::default();
     let mut compared = 0;
-    for row in rows(&text.expect("the references")) {
+    for row in references() {
         let value = |name: &str| number(&row, name);
         let given = |name: &str| value(name).expect("an input");
         let inclination = Angle::Radians(given("inclination_rad"));
