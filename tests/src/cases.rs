@@ -1,6 +1,8 @@
 //! Cases of a comparison as commands of their own, run by an engine: each once, none lost, the same bytes.
 
-use crate::support::{binary, fail, json, kerrlight, message, object, root, start, succeed, until};
+use crate::support::{
+    binary, fail, json, kerrlight, kill, message, object, root, start, succeed, until,
+};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -151,13 +153,12 @@ fn exact_a_case_has_one_process_and_survives_kills() {
     let listed = succeed(at, &["compare", "seeds.toml", "-o", "out", "--list"]);
     let id = listed.split('\t').next().unwrap();
     let words = ["compare", "seeds.toml", "-o", "out", "--case", id];
-    let mut first = start(at, &words);
+    let first = start(at, &words);
     let log = at.join("out/cases").join(id).join("log.jsonl");
     until("a logged step", || log.metadata().map_or(0, |log| log.len()) > 0);
     assert_eq!(kerrlight(at, &words).status.code(), Some(75));
     assert_eq!(counts(at, "out"), [0, 1, 0, 0]);
-    first.kill().unwrap();
-    first.wait().unwrap();
+    kill(first);
     assert_eq!(counts(at, "out"), [0, 0, 0, 1]);
     succeed(at, &words);
     assert_eq!(counts(at, "out"), [1, 0, 0, 0]);

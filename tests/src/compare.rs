@@ -177,32 +177,16 @@ fn a_case_that_fills_the_disk_is_named_and_done_later() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_killed_case_is_gone_on_with() {
-    use std::time::{Duration, Instant};
+    use crate::signals::{child_of, first_case, signal};
+    use crate::support::{start, until};
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     experiment(at, &[("steps = 30", "steps = 1200"), ("[0.1, 0.4]", "[0.1]")]);
     let words = ["compare", "rates.toml", "-o", "out", "--seeds", "1"];
-    let mut running = std::process::Command::new(crate::support::binary())
-        .current_dir(at)
-        .args(words)
-        .stderr(std::process::Stdio::null())
-        .stdout(std::process::Stdio::null())
-        .spawn()
-        .unwrap();
-    let (begun, parent) = (Instant::now(), running.id());
-    let child = loop {
-        assert!(begun.elapsed() < Duration::from_secs(120), "no fit has begun");
-        std::thread::sleep(Duration::from_millis(20));
-        let path = format!("/proc/{parent}/task/{parent}/children");
-        let children = std::fs::read_to_string(path).unwrap_or_default();
-        let is_running = std::fs::read_dir(at.join("out/cases"))
-            .is_ok_and(|all| all.flatten().any(|case| case.path().join("log.jsonl").exists()));
-        if let (Some(child), true) = (children.split_whitespace().next(), is_running) {
-            break child.to_owned();
-        }
-    };
-    assert!(std::process::Command::new("kill").args(["-9", &child]).status().unwrap().success());
-    assert_eq!(running.wait().unwrap().code(), Some(1));
+    let running = start(at, &words);
+    until("a fit", || first_case(at).is_some_and(|case| case.join("log.jsonl").exists()));
+    signal(child_of(running.id()).expect("a fit"), "-KILL");
+    assert_eq!(running.wait_with_output().unwrap().status.code(), Some(1));
     let killed = results(&at.join("out"));
     assert_eq!(cases(&killed)[0]["error"], "killed by signal 9");
     succeed(at, &[&words[..], &["--resume"]].concat());

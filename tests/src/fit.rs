@@ -1,8 +1,7 @@
 //! `kerrlight fit`, from settings to a report.
 
-use crate::support::{binary, fail, json, kerrlight, root, succeed};
+use crate::support::{fail, json, kill, root, start, succeed};
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::time::Instant;
 
 /// A fit of a file with fewer pixels, frames and nodes than BH-NeRF's scene 1 has, so that it takes a moment.
@@ -137,12 +136,9 @@ pub fn killed_fit(words: &[String], set: &[&str], moments: u32) {
             false => begin.clone(),
         };
         gone_on += u32::from(run.join("checkpoint.safetensors").exists());
-        let mut command = Command::new(binary());
-        command.current_dir(folder.path()).args(&words);
-        let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let child = start(folder.path(), &words);
         std::thread::sleep(taken.mul_f64((0.618_034 * f64::from(kills)).fract()));
-        child.kill().unwrap();
-        child.wait().unwrap();
+        kill(child);
         kills += 1;
     }
     assert!(gone_on >= moments / 2, "{gone_on} runs went on with another's work");
@@ -174,22 +170,17 @@ fn bad_input_is_named_and_nothing_is_begun() {
     }
     std::fs::create_dir(folder.path().join("full")).unwrap();
     std::fs::write(folder.path().join("full/mine.txt"), "mine").unwrap();
-    let refuse = |words: &[&str]| {
-        let output = kerrlight(folder.path(), words);
-        assert_eq!(output.status.code(), Some(2), "{words:?}");
-        String::from_utf8_lossy(&output.stderr).into_owned()
-    };
-    let error = refuse(&with(&small, &["-o", "full"]));
+    let error = fail(folder.path(), &with(&small, &["-o", "full"]));
     assert!(error.contains("not an empty folder"), "{error}");
-    let error = refuse(&["fit", "--resume", "full"]);
+    let error = fail(folder.path(), &["fit", "--resume", "full"]);
     assert!(error.contains("holds no run"), "{error}");
     let text = std::fs::read_to_string(root().join("scenes/fits/scene_1.toml")).unwrap();
     std::fs::write(folder.path().join("a.toml"), text.replace("seed = 1", "seed = 2")).unwrap();
     succeed(folder.path(), &with(&small, &["-o", "run"]));
-    let error = refuse(&["fit", "a.toml", "--resume", "run"]);
+    let error = fail(folder.path(), &["fit", "a.toml", "--resume", "run"]);
     assert!(error.contains("differs from the settings"), "{error}");
     std::fs::write(folder.path().join("run/checkpoint.safetensors"), b"broken").unwrap();
-    let error = refuse(&["fit", "--resume", "run"]);
+    let error = fail(folder.path(), &["fit", "--resume", "run"]);
     assert!(error.contains("checkpoint"), "{error}");
 }
 

@@ -1,9 +1,8 @@
 //! `kerrlight fit` with bad input and bad luck: one clear message, and nothing lost or half-written.
 
 use crate::fit::{changed, results, small, with};
-use crate::support::{binary, cramped, fail, message, root, succeed, told};
+use crate::support::{cramped, fail, message, root, start, succeed, told};
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 /// Files of a folder and below, sorted; temporary ones would show.
 fn files(folder: &Path) -> Vec<String> {
@@ -264,12 +263,7 @@ fn exact_visibilities_without_errors_are_named() {
 fn exact_fits_that_begin_at_once_have_a_folder_each() {
     let (small, folder) = (small(), tempfile::tempdir().unwrap());
     let words = with(&small, &["--set", "training.steps=1"]);
-    let start = |_| {
-        let mut command = Command::new(binary());
-        command.current_dir(folder.path()).args(&words);
-        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
-    };
-    let running: Vec<_> = (0..4).map(start).collect();
+    let running: Vec<_> = (0..4).map(|_| start(folder.path(), &words)).collect();
     for mut fit in running {
         assert_eq!(fit.wait().unwrap().code(), Some(0));
     }

@@ -1,6 +1,6 @@
 //! Draws around a finished fit.
 
-use crate::support::{binary, fail, json, kerrlight, message, root, succeed, told};
+use crate::support::{fail, json, kill, root, start, succeed, told, until};
 use crate::unknown_geometry::{NEAR, of_unknown_view};
 
 /// The built-in flare, few pixels, scans and voxels.
@@ -108,18 +108,10 @@ fn exact_draws_survive_a_kill() {
     }
     succeed(folder.path(), &["posterior", "run", "--samples", "4"]);
     for after in ["sample_0001.npz", "sample_0003.json"] {
-        let mut child = std::process::Command::new(binary())
-            .current_dir(folder.path())
-            .args(["posterior", "killed", "--samples", "4"])
-            .stderr(std::process::Stdio::null())
-            .spawn()
-            .unwrap();
+        let child = start(folder.path(), &["posterior", "killed", "--samples", "4"]);
         let path = folder.path().join("killed/posterior").join(after);
-        while !path.exists() && child.try_wait().unwrap().is_none() {
-            std::thread::sleep(std::time::Duration::from_millis(2));
-        }
-        child.kill().unwrap();
-        child.wait().unwrap();
+        until("a draw", || path.exists());
+        kill(child);
     }
     succeed(folder.path(), &["posterior", "killed", "--samples", "4"]);
     for name in ["sample_0001.npz", "sample_0004.json", "mean.npz", "posterior.json"] {
@@ -260,10 +252,8 @@ fn exact_draws_of_an_unknown_geometry_have_geometries() {
 fn exact_draws_without_a_finished_fit_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |arguments: &[&str], expected: &str| {
-        let run = kerrlight(folder.path(), arguments);
-        let told = message(&run);
-        assert_eq!(run.status.code(), Some(2), "{arguments:?}: {told}");
-        assert!(told.contains(expected), "{arguments:?}: {told}");
+        let said = fail(folder.path(), arguments);
+        assert!(said.contains(expected), "{arguments:?}: {said}");
     };
     refused(&["posterior", "nowhere", "--samples", "4"], "nowhere");
     refused(&["posterior", "nowhere", "--samples", "1"], "2..=100000");
@@ -282,10 +272,8 @@ fn exact_draws_without_a_finished_fit_are_refused() {
         ("effects.absorption={coefficient=0.1,radius=5.0,height=2.0}", "exclude each other"),
     ] {
         refused(&["fit", "fit.toml", "-o", "run", "--set", change], expected);
-        assert!(!folder.path().join("run").exists(), "{change}");
     }
     let unknown = "axis={from={start=[0.0,0.0,1.0],rate=0.1,last_rate=0.1}}";
     let arguments = ["fit", "fit.toml", "-o", "run", "--samples", "3", "--set", unknown];
     refused(&arguments, "a posterior needs [axis.known]");
-    assert!(!folder.path().join("run").exists());
 }

@@ -1,9 +1,8 @@
 //! Pictures that are interrupted end in the same bytes.
 
-use crate::support::{binary, fail, message, root, start, succeed, told};
+use crate::support::{binary, cramped, fail, kill, message, root, start, succeed, told, until};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::Command;
 use std::time::{Duration, Instant};
 
 /// Ten bands of a scene whose rays are slow enough to be interrupted.
@@ -36,10 +35,9 @@ fn exact_same_bytes_after_kills_at_twenty_moments() {
         // Multiples of the golden ratio fall everywhere.
         let moment = taken.mul_f64((0.618_034 * f64::from(k)).fract() * 0.6);
         resumed += usize::from(folder.path().join("a.exr.partial").exists());
-        let mut child = start(folder.path(), &arguments(&scene));
+        let child = start(folder.path(), &arguments(&scene));
         std::thread::sleep(moment);
-        child.kill().unwrap();
-        child.wait().unwrap();
+        kill(child);
         if output.exists() {
             assert!(std::fs::read(&output).unwrap() == whole, "a half file after kill {k}");
             std::fs::remove_file(&output).unwrap();
@@ -65,8 +63,7 @@ fn exact_same_bytes_after_an_interrupt() {
     while head() < 4096 && clock.elapsed() < 20 * taken + Duration::from_secs(60) {
         std::thread::sleep(Duration::from_millis(1));
     }
-    let pid = child.id().to_string();
-    assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    crate::signals::signal(child.id(), "-INT");
     let ended = child.wait_with_output().unwrap();
     let said = message(&ended);
     assert_eq!(ended.status.code(), Some(130), "{said}");
@@ -91,10 +88,7 @@ fn exact_same_bytes_after_a_full_disk() {
     let scene = root().join("scenes/hot_spots.toml");
     let (whole, _) = undisturbed(&scene);
     let folder = tempfile::tempdir().unwrap();
-    let limited = "trap '' XFSZ; ulimit -f 32; exec \"$0\" \"$@\"";
-    let mut command = Command::new("sh");
-    command.current_dir(folder.path()).arg("-c").arg(limited).arg(binary());
-    let output = command.args(arguments(&scene)).output().unwrap();
+    let output = cramped(folder.path(), 16, &arguments(&scene));
     let said = message(&output);
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(said.contains("cannot write") && said.contains("same command"), "{said}");
@@ -128,13 +122,10 @@ fn exact_same_film_of_a_volume_after_kills() {
     let folder = tempfile::tempdir().unwrap();
     let (film, mut kept) = (folder.path().join("film"), 0);
     for k in [0, 2, 3, 6] {
-        let mut child = start(folder.path(), &movie);
+        let child = start(folder.path(), &movie);
         let frame = film.join(format!("frame_{k:04}.exr"));
-        while !frame.exists() && child.try_wait().unwrap().is_none() {
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        child.kill().unwrap();
-        child.wait().unwrap();
+        until("a frame", || frame.exists());
+        kill(child);
         let there = files(&film);
         let frames = there.iter().filter(|(name, _)| name.ends_with(".exr"));
         for (name, bytes) in frames {

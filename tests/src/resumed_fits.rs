@@ -1,7 +1,7 @@
 //! Fits that are resumed: with the data, settings and state they had, alone, or not at all.
 
 use crate::fit::{results, small, with};
-use crate::support::{fail, holds, kerrlight, killed, root, start, succeed, told, until};
+use crate::support::{fail, holds, kerrlight, kill, killed, root, start, succeed, told, until};
 use std::path::Path;
 
 /// A fit of a movie that a simulation has left, stopped after its first checkpoint: its words and its folder `run`.
@@ -144,24 +144,17 @@ fn exact_a_folder_belongs_to_one_process() {
     let words = of_an_array(at);
     let mut words: Vec<&str> = words.iter().map(String::as_str).collect();
     words.extend(["--set", "training.steps=1000000", "-o", "run"]);
-    let mut child = start(at, &words);
+    let child = start(at, &words);
     until("a checkpoint", || at.join("run/checkpoint.safetensors").exists());
-    let said = |words: &[&str]| {
-        let output = kerrlight(at, words);
-        assert_eq!(output.status.code(), Some(2));
-        String::from_utf8(output.stderr).unwrap()
-    };
-    assert!(
-        said(&["fit", "--resume", "run"]).contains("run is in use: another kerrlight fits in it")
-    );
-    assert!(said(&words).contains("is not an empty folder"));
-    child.kill().unwrap();
-    child.wait().unwrap();
+    let resume = ["fit", "--resume", "run"];
+    assert!(fail(at, &resume).contains("run is in use: another kerrlight fits in it"));
+    assert!(fail(at, &words).contains("is not an empty folder"));
+    kill(child);
     // Not the lock is in the way now.
     let mut array = std::fs::read_to_string(at.join("array.txt")).unwrap();
     array.push_str("# changed\n");
     std::fs::write(at.join("array.txt"), array).unwrap();
-    assert!(said(&["fit", "--resume", "run"]).contains("array.txt has changed"));
+    assert!(fail(at, &resume).contains("array.txt has changed"));
 }
 
 /// `-o` takes an empty folder, as its help says.

@@ -7,12 +7,13 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-fn signal(pid: u32, name: &str) {
+/// Sends a signal to a process.
+pub fn signal(pid: u32, name: &str) {
     assert!(Command::new("kill").args([name, &pid.to_string()]).status().unwrap().success());
 }
 
 /// The fit of a comparison: the only child of its process.
-fn child_of(parent: u32) -> Option<u32> {
+pub fn child_of(parent: u32) -> Option<u32> {
     let path = format!("/proc/{parent}/task/{parent}/children");
     std::fs::read_to_string(path).ok()?.split_whitespace().next()?.parse().ok()
 }
@@ -91,7 +92,7 @@ fn experiment(folder: &Path) {
 }
 
 /// The folder of the first case.
-fn first_case(folder: &Path) -> Option<std::path::PathBuf> {
+pub fn first_case(folder: &Path) -> Option<std::path::PathBuf> {
     let entries = std::fs::read_dir(folder.join("out/cases")).ok()?.flatten();
     entries.map(|entry| entry.path()).find(|path| path.is_dir())
 }

@@ -49,13 +49,17 @@ pub fn kerrlight(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(binary()).current_dir(folder).args(arguments).output().expect("the binary runs")
 }
 
+/// Runs the binary in a shell that has done something before: `"$@"` is the command line.
+pub fn after(folder: &Path, script: &str, words: &[&str]) -> Output {
+    let mut command = Command::new("bash");
+    command.current_dir(folder).args(["-c", script, "bash"]).arg(binary()).args(words);
+    command.output().expect("bash runs")
+}
+
 /// A run whose files may not grow beyond a number of KiB, as on a disk that is full.
 #[cfg(unix)]
 pub fn cramped(folder: &Path, kib: u32, words: &[&str]) -> Output {
-    let script = format!("trap '' XFSZ; ulimit -f {kib}; exec \"$@\"");
-    let mut command = Command::new("bash");
-    command.current_dir(folder).args(["-c", &script, "bash"]).arg(binary()).args(words);
-    command.output().expect("bash runs")
+    after(folder, &format!("trap '' XFSZ; ulimit -f {kib}; exec \"$@\""), words)
 }
 
 /// Standard error of a run.
@@ -165,13 +169,18 @@ pub fn holds(path: &Path, text: &str) -> bool {
     std::fs::read_to_string(path).is_ok_and(|all| all.contains(text))
 }
 
+/// Kills a process that may have ended.
+pub fn kill(mut child: Child) {
+    child.kill().expect("killed");
+    child.wait().expect("ended");
+}
+
 /// Starts the binary and kills it once something is so.
 pub fn killed(folder: &Path, arguments: &[&str], what: &str, is_so: impl FnMut() -> bool) {
     let mut child = start(folder, arguments);
     until(what, is_so);
     assert!(child.try_wait().expect("a child").is_none(), "{what}: it has ended before");
-    child.kill().expect("killed");
-    child.wait().expect("ended");
+    kill(child);
 }
 
 /// The message of a run that must fail, leaving `folder` as it was.

@@ -1,16 +1,7 @@
 //! Limits of the system: threads, a closed standard output; and what is left behind by kills.
 
-use crate::support::{binary, message, root, succeed};
+use crate::support::{after, message, root, succeed};
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
-
-/// The program in a shell that has done something before: `"$@"` is the command line.
-fn after(folder: &Path, script: &str, words: &[&str]) -> Output {
-    let mut command = Command::new("bash");
-    command.current_dir(folder).args(["-c", script, "bash"]).arg(binary()).args(words);
-    command.output().expect("bash runs")
-}
 
 const CURVE: [&str; 7] =
     ["critical-curve", "--spin", "0.5", "--inclination", "30", "--points", "3"];

@@ -1,7 +1,7 @@
 //! The page of `kerrlight view`: its files, and what a browser makes of it beside what `render` makes of its scene.
 
 use crate::browser::{Browser, address};
-use crate::support::{binary, fail, root, succeed};
+use crate::support::{after, fail, kill, message, root, start, succeed};
 use kerrlight_geodesic::wgsl;
 use kerrlight_geodesic::{
     Camera, Inclination, Kerr, Motion, Observer, Outcome, Quantities, Tracer,
@@ -13,7 +13,6 @@ use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 #[test]
 fn exact_the_page_has_the_tracer_and_loads_nothing() {
@@ -61,10 +60,9 @@ fn rendered(folder: &Path, browser: &mut Browser, [width, height]: [u32; 2]) -> 
     let command = browser.value(&format!("command({width}, {height})"));
     let words = command.as_str().unwrap().strip_prefix("kerrlight ").unwrap();
     let plain = "--set screen.rings=regular-grid --set screen.samples_per_pixel=1";
-    let script = format!("exec \"$0\" {words} {plain}");
-    let mut shell = Command::new("sh");
-    let done = shell.current_dir(folder).args(["-c", &script]).arg(binary()).output().unwrap();
-    assert!(done.status.success(), "{script}: {}", String::from_utf8_lossy(&done.stderr));
+    let script = format!("exec \"$@\" {words} {plain}");
+    let ended = after(folder, &script, &[]);
+    assert!(ended.status.success(), "{script}: {}", message(&ended));
     exr::decode(&std::fs::read(folder.join("view.exr")).unwrap()).unwrap().0
 }
 
@@ -365,11 +363,7 @@ fn exact_the_page_is_served() {
     let folder = tempfile::tempdir().unwrap();
     succeed(folder.path(), &["view", "--web", "page"]);
     let expected = std::fs::read_to_string(folder.path().join("page/index.html")).unwrap();
-    let mut server = Command::new(binary())
-        .args(["view", "--no-browser"])
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut server = start(folder.path(), &["view", "--no-browser"]);
     let mut told = String::new();
     BufReader::new(server.stderr.take().unwrap()).read_line(&mut told).unwrap();
     let address = told.strip_prefix("http://").unwrap().split('/').next().unwrap().to_owned();
@@ -394,8 +388,7 @@ fn exact_the_page_is_served() {
     };
     let foreign = ["Host: evil.example:80\r\n", "Host: 127.0.0.1.evil.example\r\n", ""].map(named);
     let local = ["host: LOCALHOST:9\r\n", "Host: [::1]:80\r\n"].map(named);
-    server.kill().unwrap();
-    server.wait().unwrap();
+    kill(server);
     assert!(foreign.iter().all(|answer| answer.starts_with("HTTP/1.1 403")), "{foreign:?}");
     assert!(local.iter().all(|answer| answer.starts_with("HTTP/1.1 200")), "{local:?}");
     assert!(page.starts_with("HTTP/1.1 200 OK") && page.ends_with(&expected));
