@@ -1,6 +1,6 @@
 //! Bad input gets one clear message, exit code 2, and nothing written.
 
-use crate::support::{fail, kerrlight, message, root, succeed, told};
+use crate::support::{fail, kerrlight, message, root, sets, succeed, told};
 
 #[test]
 fn files_that_cannot_be_read() {
@@ -215,9 +215,8 @@ fn pictures_that_cannot_be() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     let run = |assignments: &[&str]| {
-        let mut arguments = vec!["render", "--set", "screen.width=8", "--set", "screen.height=8"];
-        assignments.iter().for_each(|a| arguments.extend(["--set", *a]));
-        fail(path, &arguments)
+        let small = ["render", "--set", "screen.width=8", "--set", "screen.height=8"];
+        fail(path, &[&small[..], &sets(assignments)].concat())
     };
     assert!(run(&["disc.peak_intensity=1e39"]).contains("0 to 1e12"));
     assert!(run(&["spot.0.sheared_since=-1e4"]).contains("wound up"));

@@ -1,7 +1,7 @@
 //! Memory is estimated before it is taken: numbers of users and of headers that cannot be meant end in a message that says
 //! what would be needed and what there is, never in a signal.
 
-use crate::support::{fail, succeed};
+use crate::support::{fail, scene_path, sets, succeed};
 use std::io::Write;
 use std::path::Path;
 
@@ -51,8 +51,7 @@ fn exact_numbers_that_would_take_too_much_are_named() {
         [&set("representation=grid")[..], &["--set", "representation.grid.nodes=1000"]].concat();
     refused(at, "2GiB", &nodes, "1000000000 parameters");
     refused(at, "64MiB", &["render", "--set", "screen.width=16384"], "screen.width = 16384");
-    let scene = crate::support::root().join("scenes/disc_face_on.toml");
-    let scene = scene.to_str().unwrap();
+    let scene = &scene_path("disc_face_on.toml");
     let movie = ["movie", scene, "--frames", "1000000", "--from", "0", "--to", "9", "-o", "m"];
     refused(at, "1GiB", &movie, "1000000 frames");
     let large = ["--set", "screen.width=16384", "--set", "screen.height=16384"];
@@ -130,22 +129,34 @@ fn exact_a_limit_of_the_shell_counts() {
     assert!(said.contains("screen.pixels = 4000"), "{said}");
 }
 
-/// A movie that is larger than its part of the memory is kept in a file, and nothing that comes out is another byte.
-#[test]
-fn exact_a_movie_in_a_file_gives_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let scene = crate::support::root().join("scenes/fits/flare_images.toml");
-    let set = [
+/// Few pixels, steps and nodes, with a start.
+fn small(start: &'static str) -> Vec<&'static str> {
+    sets(&[
         "screen.pixels=16",
         "training.steps=4",
         "output.nodes=12",
         "representation=grid",
         "representation.grid.nodes=12",
-        "training.start={linear={nodes=12,stride=400,steps=4}}",
-    ];
-    let set: Vec<&str> = set.iter().flat_map(|change| ["--set", *change]).collect();
-    let words = ["fit", scene.to_str().unwrap(), "-o"];
+        start,
+    ])
+}
+
+/// Writes settings of a scene without its truth, for data.
+fn without_truth(at: &Path, scene: &str) {
+    let text = std::fs::read_to_string(scene).unwrap();
+    let (head, rest) = text.split_once("[[simulation.truth.spot]]").unwrap();
+    let (_, tail) = rest.split_once("[[loss]]").unwrap();
+    std::fs::write(at.join("data.toml"), format!("{head}[[loss]]{tail}")).unwrap();
+}
+
+/// A movie that is larger than its part of the memory is kept in a file, and nothing that comes out is another byte.
+#[test]
+fn exact_a_movie_in_a_file_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let scene = scene_path("fits/flare_images.toml");
+    let set = small("training.start={linear={nodes=12,stride=400,steps=4}}");
+    let words = ["fit", &scene, "-o"];
     let frames = ["--set", "simulation.movie.frames=17000"];
     for (run, memory) in [("all", "4GiB"), ("little", "256MiB")] {
         succeed(at, &[&["--memory", memory][..], &words, &[run], &set, &frames].concat());
@@ -157,10 +168,7 @@ fn exact_a_movie_in_a_file_gives_the_same_bytes() {
     }
     // The same of its results as data.
     let data = ["--set", "data.movie={path=\"all/movie.npz\",from=0.0,to=120.0}"];
-    let truth = std::fs::read_to_string(&scene).unwrap();
-    let (head, rest) = truth.split_once("[[simulation.truth.spot]]").unwrap();
-    let (_, tail) = rest.split_once("[[loss]]").unwrap();
-    std::fs::write(at.join("data.toml"), format!("{head}[[loss]]{tail}")).unwrap();
+    without_truth(at, &scene);
     for (run, memory) in [("read", "4GiB"), ("read_little", "256MiB")] {
         let words = ["--memory", memory, "fit", "data.toml", "-o", run];
         succeed(at, &[&words[..], &set, &data].concat());
@@ -179,8 +187,8 @@ fn exact_a_movie_in_a_file_gives_the_same_bytes() {
 fn exact_the_least_limit_that_is_said_is_enough() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let images = crate::support::root().join("scenes/fits/flare_images.toml");
-    let images = ["fit", images.to_str().unwrap()];
+    let images = scene_path("fits/flare_images.toml");
+    let images = ["fit", &images];
     let few = ["training.steps=3", "output.nodes=16", "training.start=drawn"];
     let linear =
         ["representation=linear-grid", "representation.linear-grid.nodes=20", "output.nodes=16"];
@@ -194,8 +202,7 @@ fn exact_the_least_limit_that_is_said_is_enough() {
     ];
     for (k, (words, set, most)) in cases.into_iter().enumerate() {
         let run = format!("run_{k}");
-        let set = set.iter().flat_map(|change| ["--set", *change]);
-        let words: Vec<&str> = words.iter().copied().chain(["-o", &run]).chain(set).collect();
+        let words = [words, &["-o", &run], &sets(&set)].concat();
         let message = fail(at, &[&["--memory", "20MiB"][..], &words].concat());
         assert!(message.contains(" = ") && message.contains("the limit is 20.0 MiB"), "{message}");
         let (_, needed) = message.split_once(" would take ").unwrap();
@@ -211,22 +218,11 @@ fn exact_the_least_limit_that_is_said_is_enough() {
 fn exact_a_sequence_of_images_is_a_movie() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let scene = crate::support::root().join("scenes/fits/flare_images.toml");
-    let text = std::fs::read_to_string(&scene).unwrap();
-    let (head, rest) = text.split_once("[[simulation.truth.spot]]").unwrap();
-    let (_, tail) = rest.split_once("[[loss]]").unwrap();
-    std::fs::write(at.join("data.toml"), format!("{head}[[loss]]{tail}")).unwrap();
-    let set = [
-        "screen.pixels=16",
-        "training.steps=4",
-        "output.nodes=12",
-        "representation=grid",
-        "representation.grid.nodes=12",
-        "training.start={linear={nodes=12,stride=2,steps=4}}",
-    ];
-    let set: Vec<&str> = set.iter().flat_map(|change| ["--set", *change]).collect();
+    let scene = scene_path("fits/flare_images.toml");
+    without_truth(at, &scene);
+    let set = small("training.start={linear={nodes=12,stride=2,steps=4}}");
     let frames = ["--set", "simulation.movie.frames=12"];
-    let words = ["fit", scene.to_str().unwrap(), "-o", "simulated"];
+    let words = ["fit", &scene, "-o", "simulated"];
     succeed(at, &[&words[..], &set, &frames].concat());
     let size = ["--set", "screen.width=16", "--set", "screen.height=16"];
     let times = ["--frames", "12", "--from", "0", "--to", "120", "-o", "frames"];

@@ -1,7 +1,7 @@
 //! Fits of emission that changes while matter carries it.
 
 use crate::fit::results;
-use crate::support::{fail, json, root, succeed};
+use crate::support::{fail, json, root, sets, succeed};
 use serde_json::Value;
 use std::path::Path;
 
@@ -19,9 +19,7 @@ fn settings() -> String {
 
 fn fit(folder: &Path, changes: &[&str]) -> Value {
     std::fs::write(folder.join("fit.toml"), settings()).unwrap();
-    let mut arguments = vec!["fit", "fit.toml", "-o", "run"];
-    arguments.extend(changes.iter().flat_map(|change| ["--set", change]));
-    succeed(folder, &arguments);
+    succeed(folder, &[&["fit", "fit.toml", "-o", "run"], &sets(changes)[..]].concat());
     results(&folder.join("run"))
 }
 

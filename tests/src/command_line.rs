@@ -1,6 +1,6 @@
 //! The binary as a user runs it.
 
-use crate::support::{done, message, root, succeed};
+use crate::support::{done, message, scene_path, succeed};
 use kerrlight_render::image::exr;
 
 const SIZE: [&str; 4] = ["--set", "screen.width=48", "--set", "screen.height=40"];
@@ -41,10 +41,9 @@ fn render_without_a_scene_says_so_and_writes_both_files() {
 #[test]
 fn exact_rendering_again_from_the_picture() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = root().join("scenes/hot_spots.toml");
-    let scene = scene.to_str().unwrap();
+    let scene = scene_path("hot_spots.toml");
     let more = ["--set", "hole.spin=-0.25", "-o", "a.exr"];
-    succeed(folder.path(), &[&["render", scene][..], &SIZE[..], &more[..]].concat());
+    succeed(folder.path(), &[&["render", &scene][..], &SIZE[..], &more[..]].concat());
     succeed(folder.path(), &["render", "a.exr", "-o", "b.exr", "--threads", "1"]);
     let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
     assert!(read("a.exr") == read("b.exr"));

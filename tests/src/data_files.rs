@@ -2,7 +2,7 @@
 //! pictures of the sky, empty files; and where paths of settings start.
 
 use crate::fit::results;
-use crate::support::{fail, kerrlight, message, root, succeed, told};
+use crate::support::{fail, kerrlight, message, root, scene_path, sets, succeed, told};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::array::built_in;
 use kerrlight_vlbi::earth::{Frame, SourcePosition, Ut1};
@@ -22,11 +22,10 @@ const SMALL: [&str; 5] = [
 
 /// Fits a file for two steps; what went wrong, if something did.
 fn fit(folder: &Path, scene: &str, data: &Path, out: &str) -> Result<(), String> {
-    let scene = root().join("scenes/fits").join(scene).display().to_string();
+    let scene = scene_path(&format!("fits/{scene}"));
     let path = format!("data.visibilities.path={}", data.display());
-    let set = SMALL.into_iter().chain([path.as_str()]).flat_map(|set| ["--set", set]);
-    let words: Vec<&str> = ["fit", &scene, "-o", out].into_iter().chain(set).collect();
-    let output = kerrlight(folder, &words);
+    let words = ["fit", &scene, "-o", out, "--set", &path];
+    let output = kerrlight(folder, &[&words[..], &sets(&SMALL)].concat());
     if !output.status.success() {
         return Err(message(&output));
     }
@@ -227,7 +226,7 @@ fn empty_files_are_said_to_be_empty() {
         [&["observe", input, "--array", "ngEHT", "-o", "o.uvfits"][..], &when].concat()
     };
     let through = |array: &'static str| [&["uv", array, "-o", "o.csv"][..], &when].concat();
-    let sky = root().join("scenes/sky_image.toml").display().to_string();
+    let sky = scene_path("sky_image.toml");
     let scene = |set: &'static str| vec!["render", &sky, "--set", set, "-o", "o.exr"];
     for (words, name) in [
         (vec!["render", "empty.toml"], "empty.toml"),
@@ -311,7 +310,7 @@ fn exact_inspect_knows_arrays_and_runs() {
 fn messages_tell_values() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    let scene = root().join("scenes/hot_spots.toml").display().to_string();
+    let scene = scene_path("hot_spots.toml");
     let film = |rest: &[&'static str]| {
         let words = [&["movie", &scene, "-o", "frames"][..], rest].concat();
         fail(path, &words)

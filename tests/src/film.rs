@@ -1,6 +1,6 @@
 //! Films: frames that are those of `render`, that are kept, and that do not flicker.
 
-use crate::support::{fail, object, succeed, told};
+use crate::support::{fail, object, sets, succeed, told};
 use kerrlight_render::Error;
 use kerrlight_render::image::exr;
 use kerrlight_render::scene::Scene;
@@ -96,8 +96,7 @@ outer_radius = 20.0
 fn frames_are_renderings(text: &str, overrides: &[&str]) {
     let folder = folder();
     std::fs::write(folder.path().join("spot.toml"), text).unwrap();
-    let set = overrides.iter().flat_map(|o| ["--set", o]);
-    succeed(folder.path(), &MOVIE.into_iter().chain(set).collect::<Vec<_>>());
+    succeed(folder.path(), &[&MOVIE[..], &sets(overrides)].concat());
     let mut lights = Vec::new();
     for k in 0..3 {
         let (picture, mut attributes) = exr::decode(&frame(folder.path(), k)).unwrap();

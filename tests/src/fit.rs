@@ -1,13 +1,12 @@
 //! `kerrlight fit`, from settings to a report.
 
-use crate::support::{fail, json, kill, root, start, succeed};
+use crate::support::{fail, json, kill, root, sets, start, succeed};
 use std::path::Path;
 use std::time::Instant;
 
 /// A fit of a file with fewer pixels, frames and nodes than BH-NeRF's scene 1 has, so that it takes a moment.
 fn small_of(file: &Path) -> Vec<String> {
-    let mut words = vec!["fit".to_owned(), file.to_str().expect("a name").to_owned()];
-    for change in [
+    let settings = sets(&[
         "screen.pixels=20",
         "region.nodes={equal-mino-time={per_ray=40}}",
         "simulation.movie.frames=16",
@@ -17,10 +16,9 @@ fn small_of(file: &Path) -> Vec<String> {
         "training.batch={pixels=200}",
         "training.start={linear={nodes=16,stride=2,steps=300}}",
         "output.nodes=24",
-    ] {
-        words.extend(["--set".to_owned(), change.to_owned()]);
-    }
-    words
+    ]);
+    let words = ["fit", file.to_str().expect("a name")];
+    words.into_iter().chain(settings).map(str::to_owned).collect()
 }
 
 pub fn small() -> Vec<String> {
@@ -121,8 +119,7 @@ fn killed(set: &[&str], moments: u32) {
 /// Kills a run with these settings at that many moments at least; what goes on ends like what was never killed.
 pub fn killed_fit(words: &[String], set: &[&str], moments: u32) {
     let folder = tempfile::tempdir().unwrap();
-    let mut often = vec!["--set", "training.checkpoint_seconds=0.02"];
-    set.iter().for_each(|change| often.extend(["--set", change]));
+    let often = sets(&[&["training.checkpoint_seconds=0.02"], set].concat());
     let clock = Instant::now();
     succeed(folder.path(), &with(words, &[&often[..], &["-o", "whole"]].concat()));
     let taken = clock.elapsed();
@@ -195,7 +192,7 @@ fn exact_visibilities_and_closures_together() {
     let curve = "[[loss]]\ndata = \"light-curve\"\nweight = 0.1\nsigma = 0.01\n\n";
     let text = text.replace("[representation]", &format!("{more}{curve}[representation]"));
     std::fs::write(folder.path().join("all.toml"), text).unwrap();
-    let set = [
+    let small = sets(&[
         "screen.pixels=24",
         "simulation.observation.scans=8",
         "representation.network.width=24",
@@ -203,10 +200,8 @@ fn exact_visibilities_and_closures_together() {
         "training.log_every=20",
         "training.start=drawn",
         "output.nodes=20",
-    ];
-    let mut words = vec!["fit", "all.toml", "-o", "run"];
-    set.iter().for_each(|change| words.extend(["--set", change]));
-    succeed(folder.path(), &words);
+    ]);
+    succeed(folder.path(), &[&["fit", "all.toml", "-o", "run"], &small[..]].concat());
     let found = results(&folder.path().join("run"));
     let chi2 = found["chi2_per_datum"].as_object().unwrap();
     assert_eq!(chi2.len(), 5, "{chi2:?}");

@@ -1,7 +1,7 @@
 //! `kerrlight fit` with bad input and bad luck: one clear message, and nothing lost or half-written.
 
 use crate::fit::{changed, results, small, with};
-use crate::support::{cramped, fail, message, root, start, succeed, told};
+use crate::support::{cramped, fail, message, scene_path, sets, start, succeed, told};
 use std::path::Path;
 
 /// Files of a folder and below, sorted; temporary ones would show.
@@ -175,39 +175,33 @@ fn exact_a_truth_that_nobody_sees_is_refused() {
 #[test]
 fn exact_frames_without_visibilities_are_left_out() {
     let folder = tempfile::tempdir().unwrap();
-    let of = |elevation: &'static str, gmst: &'static str| {
-        vec![
-            "fit",
-            "--set",
+    let of = |run: &'static str, elevation: &'static str, gmst: &'static str| {
+        let settings = sets(&[
             "screen.pixels=24",
-            "--set",
             "simulation.observation.scans=8",
-            "--set",
             "representation.network.width=24",
-            "--set",
             "training.steps=20",
-            "--set",
             "training.start=drawn",
-            "--set",
             "output.nodes=20",
-            "--set",
             elevation,
-            "--set",
             gmst,
-        ]
+        ]);
+        [&["fit", "-o", run], &settings[..]].concat()
     };
     let day = of(
+        "some",
         "simulation.observation.elevation_deg=[60.0,85.0]",
         "simulation.observation.gmst=[0.0,23.9]",
     );
-    let said = told(folder.path(), &[&day[..], &["-o", "some"]].concat());
+    let said = told(folder.path(), &day);
     assert!(said.contains("of them with data)"), "{said}");
     assert!(results(&folder.path().join("some"))["loss"].as_f64().unwrap().is_finite());
     let never = of(
+        "none",
         "simulation.observation.elevation_deg=[84.0,85.0]",
         "simulation.observation.gmst=[2.0,2.667]",
     );
-    let said = fail(folder.path(), &[&never[..], &["-o", "none"]].concat());
+    let said = fail(folder.path(), &never);
     assert!(said.contains("no frame has any visibilities"), "{said}");
 }
 
@@ -230,21 +224,18 @@ fn exact_visibilities_without_errors_are_named() {
             .collect();
         std::fs::write(at.join("data.txt"), format!("{head}{rows}")).unwrap();
     };
-    let fit = root().join("scenes/fits/sgra_visibilities.toml");
-    let fit = fit.to_str().unwrap().to_owned();
+    let fit = scene_path("fits/sgra_visibilities.toml");
     let path = format!("data.visibilities.path={}", at.join("data.txt").display());
     let words = |average: &'static str, out: &'static str| {
-        let set =
-            ["--set", &path, "--set", "loss=[{data=\"amplitudes\",weight=1.0}]", "--set", average];
-        let small = [
-            "--set",
+        let settings = sets(&[
+            "loss=[{data=\"amplitudes\",weight=1.0}]",
             "screen.pixels=12",
-            "--set",
             "training.steps=2",
-            "--set",
             "training.start=drawn",
-        ];
-        [&["fit", &fit, "-o", out][..], &set, &small].concat()
+            average,
+            &path,
+        ]);
+        [&["fit", &fit, "-o", out], &settings[..]].concat()
     };
     write(0.0);
     let said = fail(at, &words("data.visibilities.average_s=0.0", "out"));

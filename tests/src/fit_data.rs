@@ -1,7 +1,7 @@
 //! `kerrlight fit --data FILE`: settings that are guessed from a file, with every guess told.
 
 use crate::eht_data::folder;
-use crate::support::{fail, succeed, told};
+use crate::support::{fail, sets, succeed, told};
 use std::path::Path;
 
 const SEEN: &str = "observe image.csv --fov-uas 100 --array EHT2017 --mjd 57850 --utc 5-7 --frames 6 --tint 60 --noise thermal --seed 1";
@@ -46,8 +46,7 @@ fn exact_visibilities_are_fitted_at_once() {
     }
     assert!(missing.contains("--model image"), "{missing}");
     let given = ["hole.mass_msun=1e9", "hole.distance_kpc=1e4", "observer.inclination_deg=40"];
-    let given: Vec<&str> = given.iter().flat_map(|set| ["--set", set]).collect();
-    said(path, &[&["--data", "b.uvfits"], &given[..]].concat(), "b");
+    said(path, &[&["--data", "b.uvfits"], &sets(&given)[..]].concat(), "b");
 }
 
 /// Light curves: Q and U with errors, and a total flux without any.
@@ -69,7 +68,7 @@ fn exact_light_curves_are_fitted_at_once() {
     let missing = fail(path, &["fit", "--data", "qu.csv", "-o", "none"]);
     assert!(missing.contains("--set 'hole.mass_msun=4.154e6'"), "{missing}");
     assert!(!missing.contains("--model image"), "a light curve has no image: {missing}");
-    let quick = [
+    let quick = sets(&[
         "hole.mass_msun=4.154e6",
         "band.radii={from=9.0,to=11.0,step=1.0}",
         "band.inclinations_deg={from=20.0,to=40.0,step=20.0}",
@@ -77,8 +76,7 @@ fn exact_light_curves_are_fitted_at_once() {
         "representation.linear-grid.nodes=12",
         "linear.rounds=1",
         "linear.iterations=5",
-    ];
-    let quick: Vec<&str> = quick.iter().flat_map(|set| ["--set", set]).collect();
+    ]);
     let (told, kept) = said(path, &[&["--data", "qu.csv"], &quick[..]].concat(), "qu");
     assert!(
         told.contains("read: qu.csv: 40 samples from 9.000 h to 10.170 h UTC; Q and U are fitted"),

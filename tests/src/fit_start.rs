@@ -1,18 +1,16 @@
 //! Starts of a fit (`--init`), and its results for other verbs: a scene, and a movie that telescopes see.
 
 use crate::fit::results;
-use crate::support::{fail, root, succeed};
+use crate::support::{fail, scene_path, sets, succeed};
 use kerrlight_render::image::exr;
 use std::path::Path;
 
 /// A fit of few rays with many nodes on each, so that its own sums are as good as a scene's; the axis is tilted, light
 /// takes its time, matter moves at a drawn velocity and shines from some time on.
 fn fit(folder: &Path) {
-    let file = root().join("scenes/fits/flare_images.toml");
     let law = "{perturbed={of={keplerian={drag=0.3}},deviation=0.01,correlation_length=2.0,radii=[2.0,10.0]}}";
     let law = format!("motion.velocity={law}");
-    let mut words = vec!["fit", file.to_str().unwrap(), "-o", "run"];
-    for change in [
+    let settings = sets(&[
         "screen.pixels=16",
         "region.nodes={gauss={order=8,split=24}}",
         "region.z_width=2.5",
@@ -27,10 +25,9 @@ fn fit(folder: &Path) {
         // What a scene has between its nodes.
         "linear={upper=3.0,rounds=1,iterations=8,degree=\"linear\"}",
         "output.nodes=24",
-    ] {
-        words.extend(["--set", change]);
-    }
-    succeed(folder, &words);
+    ]);
+    let file = scene_path("fits/flare_images.toml");
+    succeed(folder, &[&["fit", &file, "-o", "run"], &settings[..]].concat());
 }
 
 pub fn array(path: &Path, name: &str) -> Vec<f64> {
@@ -59,14 +56,7 @@ fn exact_scene_of_a_run_is_its_movie() {
     };
     // Without the line that scales it to Jy/uas^2 the picture is in Jy a pixel of the fit.
     // One ray in the middle of each pixel, as the fit has it.
-    let small = [
-        "--set",
-        "screen.width=16",
-        "--set",
-        "screen.total_flux_jy=",
-        "--set",
-        "screen.rings=regular-grid",
-    ];
+    let small = sets(&["screen.width=16", "screen.total_flux_jy=", "screen.rings=regular-grid"]);
     let span = ["--frames", "5", "--from=-5", "--to=60", "-o", "film"];
     succeed(path, &[&["movie", "run/scene.toml"][..], &small, &span].concat());
     let mean = frames.iter().sum::<f64>() / 5.0;

@@ -1,7 +1,7 @@
 //! `kerrlight fit` with data that are not convex in the emission: amplitudes and closure quantities.
 
-use crate::fit::{results, with};
-use crate::support::{fail, kerrlight, message, succeed};
+use crate::fit::results;
+use crate::support::{fail, kerrlight, message, sets, succeed};
 use std::path::Path;
 
 const AMPLITUDES: &str = r#"loss=[{data="amplitudes",weight=1.0}]"#;
@@ -9,8 +9,8 @@ const CLOSURES: &str =
     r#"loss=[{data="closure-phases",weight=1.0},{data="log-closure-amplitudes",weight=1.0}]"#;
 const SCAN: &str = "axis={scan={directions=20,frames=6,pixels=10,rate=0.0,last_rate=0.0}}";
 
-/// The built-in experiment with fewer pixels, frames and nodes.
-fn small(sets: &[&str]) -> Vec<String> {
+/// A fit of the built-in experiment with fewer pixels, frames and nodes, more settings, and where it goes.
+fn small<'a>(more: &[&'a str], run: &'a str) -> Vec<&'a str> {
     let usual = [
         "screen.pixels=20",
         "screen.jy_per_pixel=0.32",
@@ -23,8 +23,7 @@ fn small(sets: &[&str]) -> Vec<String> {
         "training.steps=60",
         "training.start={linear={nodes=20,stride=1,steps=200}}",
     ];
-    let sets = usual.iter().chain(sets).flat_map(|set| ["--set", set]);
-    ["fit"].into_iter().chain(sets).map(str::to_owned).collect()
+    [&["fit", "-o", run], &sets(&usual)[..], &sets(more)].concat()
 }
 
 fn text(folder: &Path, name: &str) -> String {
@@ -37,12 +36,9 @@ fn text(folder: &Path, name: &str) -> String {
 fn exact_amplitudes_light_every_representation_and_claim_no_certificate() {
     let folder = tempfile::tempdir().unwrap();
     for kind in ["linear-grid", "grid", "bhnerf"] {
-        let words = small(&[
-            AMPLITUDES,
-            &format!("representation.kind={kind}"),
-            "representation.network.width=32",
-        ]);
-        succeed(folder.path(), &with(&words, &["-o", kind]));
+        let representation = format!("representation.kind={kind}");
+        let more = [AMPLITUDES, &representation, "representation.network.width=32"];
+        succeed(folder.path(), &small(&more, kind));
         let run = folder.path().join(kind);
         let found = results(&run);
         let number = |key: &str| found[key].as_f64().unwrap();
@@ -69,17 +65,17 @@ fn exact_amplitudes_light_every_representation_and_claim_no_certificate() {
 #[ignore = "long"]
 fn exact_closures_alone_take_the_flux_that_is_given() {
     let folder = tempfile::tempdir().unwrap();
-    let sets = [CLOSURES, "representation=linear-grid"];
-    let error = fail(folder.path(), &with(&small(&sets), &["-o", "none"]));
+    let closures = [CLOSURES, "representation=linear-grid"];
+    let error = fail(folder.path(), &small(&closures, "none"));
     assert!(error.contains("linear.flux_jy is missing"), "{error}");
-    let pulled = [&sets[..], &["linear.flux_jy=1.0", "linear.smoothness=1e-3"]].concat();
-    let error = fail(folder.path(), &with(&small(&pulled), &["-o", "none"]));
+    let pulled = [&closures[..], &["linear.flux_jy=1.0", "linear.smoothness=1e-3"]].concat();
+    let error = fail(folder.path(), &small(&pulled, "none"));
     assert!(error.contains("linear.smoothness"), "{error}");
     let known = [AMPLITUDES, "representation=linear-grid", "linear.flux_jy=1.0"];
-    let error = fail(folder.path(), &with(&small(&known), &["-o", "none"]));
+    let error = fail(folder.path(), &small(&known, "none"));
     assert!(error.contains("linear.flux_jy = 1 is not allowed"), "{error}");
-    let given = [&sets[..], &["linear.flux_jy=1.0"]].concat();
-    succeed(folder.path(), &with(&small(&given), &["-o", "run"]));
+    let given = [&closures[..], &["linear.flux_jy=1.0"]].concat();
+    succeed(folder.path(), &small(&given, "run"));
     let found = results(&folder.path().join("run"));
     assert!(found["correlation"].as_f64().unwrap() > 0.8, "{found}");
     assert!(found["unknown"][0].as_str().unwrap().contains("do not determine the flux"), "{found}");
@@ -89,13 +85,13 @@ fn exact_closures_alone_take_the_flux_that_is_given() {
 #[test]
 fn exact_a_dark_start_without_slope_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let sets = [
+    let dark = [
         AMPLITUDES,
         "representation=grid",
         "representation.activation=linear",
         "training.start=drawn",
     ];
-    let error = fail(folder.path(), &with(&small(&sets), &["-o", "none"]));
+    let error = fail(folder.path(), &small(&dark, "none"));
     assert!(error.contains("starts at zero emission"), "{error}");
 }
 
@@ -104,8 +100,8 @@ fn exact_a_dark_start_without_slope_is_refused() {
 fn exact_data_without_light_and_axes_that_are_all_alike_fail() {
     let folder = tempfile::tempdir().unwrap();
     let dark = r#"simulation.truth={spot=[{center=[5.5,0.0,0.0],sigma=0.7,amplitude=0.0}]}"#;
-    let failed = |sets: &[&str], name: &str| {
-        let output = kerrlight(folder.path(), &with(&small(sets), &["-o", name]));
+    let failed = |more: &[&str], name: &str| {
+        let output = kerrlight(folder.path(), &small(more, name));
         let said = message(&output);
         assert_eq!(output.status.code(), Some(1), "{said}");
         assert!(!folder.path().join(name).join("results.json").exists());
@@ -118,10 +114,8 @@ fn exact_data_without_light_and_axes_that_are_all_alike_fail() {
     let images = r#"loss=[{data="image",weight=1.0,sigma=0.01}]"#;
     let said = failed(&[images, dark, SCAN, "training.batch={pixels=50}"], "alike");
     assert!(said.contains("axis.scan") && said.contains("do not constrain the axis"), "{said}");
-    let error = fail(
-        folder.path(),
-        &with(&small(&[images, SCAN, "simulation.observation.scans=1"]), &["-o", "single"]),
-    );
+    let single = [images, SCAN, "simulation.observation.scans=1"];
+    let error = fail(folder.path(), &small(&single, "single"));
     assert!(error.contains("axis.scan needs at least 2 frame times"), "{error}");
 }
 
@@ -131,8 +125,7 @@ fn exact_data_without_light_and_axes_that_are_all_alike_fail() {
 fn exact_amplitudes_find_an_axis() {
     let folder = tempfile::tempdir().unwrap();
     let both = r#"loss=[{data="amplitudes",weight=1.0},{data="closure-phases",weight=1.0}]"#;
-    let words = small(&[both, SCAN, "representation=linear-grid"]);
-    succeed(folder.path(), &with(&words, &["-o", "run"]));
+    succeed(folder.path(), &small(&[both, SCAN, "representation=linear-grid"], "run"));
     let table = text(&folder.path().join("run"), "axis_scan.csv");
     let losses: Vec<f64> = table
         .lines()

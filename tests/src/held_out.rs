@@ -1,28 +1,25 @@
 //! Weights that are chosen by frames that are held out.
 
 use crate::fit::results;
-use crate::support::{fail, succeed};
+use crate::support::{fail, sets, succeed};
 
-const SMALL: [&str; 17] = [
-    "fit",
-    "--set",
-    "representation=linear-grid",
-    "--set",
-    "representation.linear-grid.nodes=40",
-    "--set",
-    "linear.degree=linear",
-    "--set",
-    "linear.rounds=2",
-    "--set",
-    "simulation.observation.scans=24",
-    "--set",
-    "output.nodes=24",
-    "--set",
-    "screen.pixels=32",
-    "--set",
-    "screen.jy_per_pixel=0.125",
-];
 const HELD_OUT: &str = "held_out={setting=\"linear.smoothness\",values=[0.0,0.1,30.0],folds=2}";
+
+/// A small fit of the built-in experiment with one more setting, and where it goes.
+fn small<'a>(setting: &'a str, run: &'a str) -> Vec<&'a str> {
+    let settings = sets(&[
+        "representation=linear-grid",
+        "representation.linear-grid.nodes=40",
+        "linear.degree=linear",
+        "linear.rounds=2",
+        "simulation.observation.scans=24",
+        "output.nodes=24",
+        "screen.pixels=32",
+        "screen.jy_per_pixel=0.125",
+        setting,
+    ]);
+    [&["fit", "-o", run], &settings[..]].concat()
+}
 
 /// Without smoothness voxels follow the noise, with too much of it they cannot be a flare: frames that were left out
 /// tell, and the volume is that of a fit with the chosen weight to the bit.
@@ -30,7 +27,7 @@ const HELD_OUT: &str = "held_out={setting=\"linear.smoothness\",values=[0.0,0.1,
 fn exact_held_out_frames_choose_the_weight() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    succeed(at, &[&SMALL[..], &["--set", HELD_OUT, "-o", "chosen"]].concat());
+    succeed(at, &small(HELD_OUT, "chosen"));
     let found = results(&at.join("chosen"));
     let held_out = &found["held_out"];
     assert_eq!(
@@ -44,7 +41,7 @@ fn exact_held_out_frames_choose_the_weight() {
         .map(|v| v["loss"].as_f64().unwrap())
         .collect();
     assert!(losses[0] > losses[1] && losses[2] > losses[1], "{losses:?}");
-    succeed(at, &[&SMALL[..], &["--set", "linear.smoothness=0.1", "-o", "given"]].concat());
+    succeed(at, &small("linear.smoothness=0.1", "given"));
     let volume = |run: &str| std::fs::read(at.join(run).join("volume.npz")).unwrap();
     assert_eq!(volume("chosen"), volume("given"));
     let page = std::fs::read_to_string(at.join("chosen/report.html")).unwrap();
@@ -65,7 +62,7 @@ fn bad_ways_to_hold_out_are_refused_before_anything_is_written() {
         ),
         ("held_out={setting=\"linear.upper\",values=[0.1,1.0],folds=2}", "expected one of"),
     ] {
-        let told = fail(folder.path(), &[&SMALL[..], &["--set", change, "-o", "run"]].concat());
+        let told = fail(folder.path(), &small(change, "run"));
         assert!(told.contains(expected), "{change}: {told}");
     }
 }

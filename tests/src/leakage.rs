@@ -1,7 +1,7 @@
 //! `kerrlight fit` of all four products of circular feeds that leak.
 
 use crate::fit::results;
-use crate::support::{root, succeed};
+use crate::support::{scene_path, sets, succeed};
 
 /// The scene of docs/method/polarized-visibilities.md, an ngEHT night of one flare: leakage of 5 % is recovered to 0.5 %, χ² is that of
 /// the noise, and the files say so.
@@ -9,7 +9,7 @@ use crate::support::{root, succeed};
 #[ignore = "long"]
 fn exact_leakage_is_found_with_the_flare() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = root().join("scenes/fits/polarized_flare.toml").display().to_string();
+    let scene = scene_path("fits/polarized_flare.toml");
     succeed(folder.path(), &["fit", &scene, "-o", "flare"]);
     let found = results(&folder.path().join("flare"));
     let beside = &found["leakage"]["beside_the_truth"];
@@ -29,9 +29,8 @@ fn exact_leakage_is_found_with_the_flare() {
 #[test]
 fn exact_leakage_is_found_beside_emission_that_changes() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = root().join("scenes/fits/polarized_flare.toml").display().to_string();
-    let mut words = vec!["fit", &scene, "-o", "run"];
-    let changes = [
+    let scene = scene_path("fits/polarized_flare.toml");
+    let changes = sets(&[
         "screen.pixels=24",
         "simulation.observation.scans=12",
         "instrument.leakage.rounds=4",
@@ -41,9 +40,8 @@ fn exact_leakage_is_found_beside_emission_that_changes() {
         "training.start={linear={nodes=20,stride=1,steps=400,iterations=40}}",
         "training.steps=60",
         "linear.rounds=1",
-    ];
-    changes.iter().for_each(|change| words.extend(["--set", change]));
-    succeed(folder.path(), &words);
+    ]);
+    succeed(folder.path(), &[&["fit", &scene, "-o", "run"], &changes[..]].concat());
     let found = results(&folder.path().join("run"));
     let beside = &found["leakage"]["beside_the_truth"];
     let [rms, size] = ["rms", "size"].map(|key| beside[key].as_f64().unwrap());

@@ -2,7 +2,7 @@
 //! motion in closed form.
 
 use crate::fit_start::array;
-use crate::support::{even, json, root, succeed, within};
+use crate::support::{even, json, root, sets, succeed, within};
 use kerrlight_render::dynamics::Velocity;
 use kerrlight_tomo::fit::settings::{FitFile, PriorSettings};
 use kerrlight_tomo::fit::setup::{Drawn, FitData, Instrument};
@@ -17,6 +17,14 @@ use std::path::Path;
 const FRAMES: usize = 20;
 const LAST: f64 = 80.0;
 const SCREEN: Screen = Screen { width: 26.0, pixels: 32, rays: 4 };
+/// The screen, where matter is and how it moves.
+const MATTER: [&str; 5] = [
+    "screen.width=26.0",
+    "region.r_min=2.0",
+    "region.r_max=13.0",
+    "motion.velocity={keplerian={}}",
+    "motion.axis=[0.0,0.0,1.0]",
+];
 
 /// Six filaments of a spiral, as thin as half a voxel of the search.
 fn filaments() -> (Sky, Vec<Arc>) {
@@ -64,12 +72,8 @@ fn film(path: &Path, screen: Screen, (sky, arcs): &(Sky, Vec<Arc>), noise: f64) 
 fn found(folder: &Path, sky: &(Sky, Vec<Arc>), noise: f64, search: [usize; 2]) -> Value {
     let sigma = film(&folder.join("film.npz"), SCREEN, sky, noise);
     succeed(folder, &["fit", "--init", "film.npz", "-o", "fit.toml"]);
-    let of_data = [
-        "data.movie.from=0.0".to_owned(),
-        format!("data.movie.to={LAST}"),
-        format!("loss.0.sigma={sigma}"),
-    ];
-    searched(folder, &sky.0, search, &of_data)
+    let [to, sigma] = [format!("data.movie.to={LAST}"), format!("loss.0.sigma={sigma}")];
+    searched(folder, &sky.0, search, &["data.movie.from=0.0", &to, &sigma])
 }
 
 /// Returns the geometry that a search finds in visibilities of the sky: of an array, with thermal noise.
@@ -101,16 +105,11 @@ fn found_by_array(folder: &Path, sky: &(Sky, Vec<Arc>), search: [usize; 2]) -> V
         "region.z_width=13.0",
         "linear.upper=10.0",
     ];
-    searched(folder, &sky.0, search, &of_data.map(str::to_owned))
+    searched(folder, &sky.0, search, &of_data)
 }
 
 /// Returns the geometry that a search finds in data whose settings are in a folder.
-fn searched(
-    folder: &Path,
-    sky: &Sky,
-    [starts, geometries]: [usize; 2],
-    of_data: &[String],
-) -> Value {
+fn searched(folder: &Path, sky: &Sky, [starts, geometries]: [usize; 2], of_data: &[&str]) -> Value {
     let view = |geometries: usize, nodes: usize, iterations: usize, pixels: usize| {
         format!(
             "{{trials={geometries},nodes={nodes},iterations={iterations},pixels={pixels},frames=20}}"
@@ -118,25 +117,22 @@ fn searched(
     };
     let (coarse, fine) = (view(geometries, 16, 30, 16), view(48, 24, 60, 32));
     let angle = sky.position_angle_deg;
-    let sets = [
-        "hole.spin={uniform=[-0.95,0.95]}".to_owned(),
-        "observer.inclination_deg={isotropic=[0.0,90.0]}".to_owned(),
-        format!("observer.position_angle_deg={{uniform=[{},{}]}}", angle - 60.0, angle + 60.0),
-        format!("screen.width={}", SCREEN.width),
-        "region.r_min=2.0".to_owned(),
-        "region.r_max=13.0".to_owned(),
-        "motion.velocity={keplerian={}}".to_owned(),
-        "motion.axis=[0.0,0.0,1.0]".to_owned(),
-        "representation=linear-grid".to_owned(),
-        "representation.linear-grid.nodes=24".to_owned(),
-        "linear.iterations=10".to_owned(),
-        "linear.rounds=1".to_owned(),
-        "output.nodes=24".to_owned(),
-        format!("search={{starts={starts},coarse={coarse},fine={fine}}}"),
+    let angle =
+        format!("observer.position_angle_deg={{uniform=[{},{}]}}", angle - 60.0, angle + 60.0);
+    let search = format!("search={{starts={starts},coarse={coarse},fine={fine}}}");
+    let of_search = [
+        "hole.spin={uniform=[-0.95,0.95]}",
+        "observer.inclination_deg={isotropic=[0.0,90.0]}",
+        &angle,
+        "representation=linear-grid",
+        "representation.linear-grid.nodes=24",
+        "linear.iterations=10",
+        "linear.rounds=1",
+        "output.nodes=24",
+        &search,
     ];
-    let mut words = vec!["fit", "fit.toml", "-o", "run"];
-    sets.iter().chain(of_data).for_each(|set| words.extend(["--set", set]));
-    succeed(folder, &words);
+    let settings = sets(&[&MATTER[..], &of_search, of_data].concat());
+    succeed(folder, &[&["fit", "fit.toml", "-o", "run"], &settings[..]].concat());
     json(&folder.join("run/geometry.json"))
 }
 
@@ -242,24 +238,16 @@ fn code_drawn_geometries_look_alike_through_both_forward_models() {
 /// Results of a fit to a film in a folder, as `fit --init` sets it up, in the true geometry.
 fn fitted(folder: &Path, sky: &Sky, sigma: f64, also: &[&str]) -> Value {
     succeed(folder, &["fit", "--init", "film.npz", "-o", "fit.toml"]);
-    let sets = [
+    let own = [
         format!("hole.spin={}", sky.spin),
         format!("observer.inclination_deg={}", sky.inclination_deg),
         format!("observer.position_angle_deg={}", sky.position_angle_deg),
-        format!("screen.width={}", SCREEN.width),
-        "region.r_min=2.0".to_owned(),
-        "region.r_max=13.0".to_owned(),
-        "motion.velocity={keplerian={}}".to_owned(),
-        "motion.axis=[0.0,0.0,1.0]".to_owned(),
         "data.movie.from=0.0".to_owned(),
         format!("data.movie.to={LAST}"),
         format!("loss.0.sigma={sigma}"),
     ];
-    let mut words = vec!["fit", "fit.toml", "-o", "run"];
-    sets.iter().map(String::as_str).chain(also.iter().copied()).for_each(|set| {
-        words.extend(["--set", set]);
-    });
-    succeed(folder, &words);
+    let settings = sets(&[&MATTER[..], &own.each_ref().map(String::as_str), also].concat());
+    succeed(folder, &[&["fit", "fit.toml", "-o", "run"], &settings[..]].concat());
     crate::fit::results(&folder.join("run"))
 }
 

@@ -1,6 +1,6 @@
 //! Draws around a finished fit.
 
-use crate::support::{fail, json, kill, root, start, succeed, told, until};
+use crate::support::{fail, json, kill, root, sets, start, succeed, told, until};
 use crate::unknown_geometry::{NEAR, of_unknown_view};
 
 /// The built-in flare, few pixels, scans and voxels.
@@ -16,13 +16,14 @@ pub fn settings() -> String {
         .replace("nodes = 64", "nodes = 20")
 }
 
+const VOXELS: [&str; 4] =
+    ["--set", "representation=linear-grid", "--set", "representation.linear-grid.nodes=20"];
+
 #[test]
 fn exact_draws_of_voxels_resume_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
-    let kind =
-        ["--set", "representation=linear-grid", "--set", "representation.linear-grid.nodes=20"];
-    succeed(folder.path(), &[&["fit", "fit.toml", "-o", "run"][..], &kind[..]].concat());
+    succeed(folder.path(), &[&["fit", "fit.toml", "-o", "run"][..], &VOXELS].concat());
     succeed(folder.path(), &["posterior", "run", "--samples", "4"]);
     let of = |name: &str| std::fs::read(folder.path().join("run/posterior").join(name)).unwrap();
     let numbers = json(&folder.path().join("run/posterior/posterior.json"));
@@ -64,23 +65,24 @@ fn exact_draws_of_voxels_resume_to_the_same_bytes() {
 fn exact_draws_of_a_right_model_predict_the_data() {
     let folder = tempfile::tempdir().unwrap();
     let field = "kind=\"gaussian\",mean=0.5,amplitude=0.5,correlation_length=4.0,matern=\"1/2\"";
-    let sets = [
-        "screen.pixels=12".to_owned(),
-        "screen.jy_per_pixel=0.007".to_owned(),
-        format!(
-            "simulation.truth={{spot=[],field={{{field},negative=\"lifted\",nodes=12,degree=\"linear\"}}}}"
-        ),
-        "simulation.observation.scans=5".to_owned(),
-        "representation=linear-grid".to_owned(),
-        "representation.linear-grid.nodes=12".to_owned(),
-        format!(
-            "linear={{upper=10.0,degree=\"linear\",rounds=3,iterations=300,prior={{{field}}}}}"
-        ),
-        "output.nodes=16".to_owned(),
-    ];
-    let mut arguments = vec!["fit", "-o", "run", "--samples", "12"];
-    sets.iter().for_each(|set| arguments.extend(["--set", set]));
-    succeed(folder.path(), &arguments);
+    let truth = format!(
+        "simulation.truth={{spot=[],field={{{field},negative=\"lifted\",nodes=12,degree=\"linear\"}}}}"
+    );
+    let linear = format!(
+        "linear={{upper=10.0,degree=\"linear\",rounds=3,iterations=300,prior={{{field}}}}}"
+    );
+    let settings = sets(&[
+        "screen.pixels=12",
+        "screen.jy_per_pixel=0.007",
+        &truth,
+        "simulation.observation.scans=5",
+        "representation=linear-grid",
+        "representation.linear-grid.nodes=12",
+        &linear,
+        "output.nodes=16",
+    ]);
+    let words = [&["fit", "-o", "run", "--samples", "12"], &settings[..]].concat();
+    succeed(folder.path(), &words);
     let numbers = json(&folder.path().join("run/posterior/posterior.json"));
     let check = &numbers["predicted"][0];
     let chi2 = check["chi2_per_datum"].as_f64().unwrap();
@@ -101,10 +103,8 @@ fn exact_draws_of_a_right_model_predict_the_data() {
 fn exact_draws_survive_a_kill() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
-    let kind =
-        ["--set", "representation=linear-grid", "--set", "representation.linear-grid.nodes=20"];
     for name in ["run", "killed"] {
-        succeed(folder.path(), &[&["fit", "fit.toml", "-o", name][..], &kind[..]].concat());
+        succeed(folder.path(), &[&["fit", "fit.toml", "-o", name][..], &VOXELS].concat());
     }
     succeed(folder.path(), &["posterior", "run", "--samples", "4"]);
     for after in ["sample_0001.npz", "sample_0003.json"] {
@@ -137,13 +137,9 @@ fn exact_draws_with_a_prior_resume_to_the_same_bytes() {
 fn same_again(prior: &str) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
-    let kind =
-        ["--set", "representation=linear-grid", "--set", "representation.linear-grid.nodes=14"];
-    let kind = [&kind[..], &["--set", prior]].concat();
-    succeed(
-        folder.path(),
-        &[&["fit", "fit.toml", "-o", "run", "--samples", "3"][..], &kind].concat(),
-    );
+    let kind = sets(&["representation=linear-grid", "representation.linear-grid.nodes=14", prior]);
+    let words = [&["fit", "fit.toml", "-o", "run", "--samples", "3"], &kind[..]].concat();
+    succeed(folder.path(), &words);
     let of = |name: &str| std::fs::read(folder.path().join("run/posterior").join(name)).unwrap();
     assert_ne!(of("sample_0001.npz"), of("sample_0002.npz"));
     let numbers = json(&folder.path().join("run/posterior/posterior.json"));
@@ -220,12 +216,9 @@ fn exact_priors_that_mean_nothing_are_refused() {
 fn exact_draws_of_an_unknown_geometry_have_geometries() {
     let folder = tempfile::tempdir().unwrap();
     let view = "{ trials = 60, nodes = 16, iterations = 40, pixels = 20, frames = 12 }";
-    let search = format!("starts = 1\ncoarse = {view}\nfine = {view}\n");
-    let text = of_unknown_view(&settings(), NEAR, &search);
+    let text = of_unknown_view(&settings(), NEAR, 1, view);
     std::fs::write(folder.path().join("fit.toml"), text).unwrap();
-    let kind =
-        ["--set", "representation=linear-grid", "--set", "representation.linear-grid.nodes=20"];
-    let words = [&["fit", "fit.toml", "-o", "run", "--samples", "3"][..], &kind[..]].concat();
+    let words = [&["fit", "fit.toml", "-o", "run", "--samples", "3"][..], &VOXELS].concat();
     let said = told(folder.path(), &words);
     assert!(said.contains("inclination_deg = "), "{said}");
     let geometry = json(&folder.path().join("run/geometry.json"));

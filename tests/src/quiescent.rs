@@ -1,7 +1,7 @@
 //! `kerrlight fit` of a flare beside what does not move, and of a rotation of position angles that is not known.
 
 use crate::fit::results;
-use crate::support::{fail, root, succeed};
+use crate::support::{fail, root, sets, succeed};
 use std::path::Path;
 
 /// The scene of docs/method/quiescent-emission.md with a few exact images in place of visibilities.
@@ -15,16 +15,11 @@ fn scene(folder: &Path) -> String {
     path.display().to_string()
 }
 
-const SMALL: [&str; 10] = [
-    "--set",
+const SMALL: [&str; 5] = [
     "quiescent.smoothness=0.03",
-    "--set",
     "screen.pixels=20",
-    "--set",
     "simulation.truth.spot.0.sigma=1.2",
-    "--set",
     "representation.linear-grid.nodes=16",
-    "--set",
     "output.nodes=24",
 ];
 
@@ -34,7 +29,7 @@ fn exact_a_ring_is_told_from_the_flare() {
     let folder = tempfile::tempdir().unwrap();
     let scene = scene(folder.path());
     let run = |more: &[&str]| {
-        succeed(folder.path(), &[&["fit", &scene], &SMALL[..], more].concat());
+        succeed(folder.path(), &[&["fit", &scene], &sets(&SMALL)[..], more].concat());
         results(&folder.path().join(more[more.len() - 1]))
     };
     let found = run(&["-o", "both"]);
@@ -79,8 +74,7 @@ fn exact_what_excludes_a_quiescent_image_is_refused() {
             "quiescent.smoothness and quiescent.sparsity are not allowed",
         ),
     ] {
-        let sets: Vec<&str> = set.iter().flat_map(|set| ["--set", *set]).collect();
-        let words = [&["fit", &scene], &sets[..], &["-o", "refused"]].concat();
+        let words = [&["fit", &scene], &sets(set)[..], &["-o", "refused"]].concat();
         let said = fail(folder.path(), &words);
         assert!(said.contains(says), "{set:?}: {said}");
     }

@@ -1,7 +1,7 @@
 //! Output of verbs at their end: two lines for a person, one JSON object for a script, or a file with `-o -`; and the
 //! command line's own help.
 
-use crate::support::{done, fail, message, object, root, succeed};
+use crate::support::{done, fail, message, object, root, scene_path, sets, succeed};
 use kerrlight_render::image::exr;
 use serde_json::json;
 
@@ -112,8 +112,8 @@ fn exact_render_tells_what_the_picture_holds() {
 #[test]
 fn regress_movie_ends_with_its_figures() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = root().join("scenes/hot_spots.toml");
-    let movie = ["movie", scene.to_str().unwrap(), "--frames", "2", "--duration", "100M"];
+    let scene = scene_path("hot_spots.toml");
+    let movie = ["movie", &scene, "--frames", "2", "--duration", "100M"];
     let movie = [&movie[..], &["-o", "film", "--gif", "a.gif"], &SIZE].concat();
     let printed = succeed(folder.path(), &movie);
     let lines: Vec<&str> = printed.lines().collect();
@@ -132,9 +132,7 @@ fn regress_movie_ends_with_its_figures() {
 #[test]
 fn exact_fit_ends_with_its_verdict_and_results() {
     let folder = tempfile::tempdir().unwrap();
-    let fit = root().join("scenes/fits/scene_1.toml");
-    let mut words = vec!["fit", fit.to_str().unwrap(), "-o", "run"];
-    for change in [
+    let small = sets(&[
         "screen.pixels=16",
         "simulation.movie.frames=8",
         "output.nodes=16",
@@ -143,9 +141,9 @@ fn exact_fit_ends_with_its_verdict_and_results() {
         "training.steps=5",
         "training.log_every=5",
         "training.start=drawn",
-    ] {
-        words.extend(["--set", change]);
-    }
+    ]);
+    let fit = scene_path("fits/scene_1.toml");
+    let words = [&["fit", &fit, "-o", "run"], &small[..]].concat();
     let mut told = object(folder.path(), &words);
     assert_eq!(told["files"][0], "run/report.html");
     assert_eq!(told["folder"], "run");

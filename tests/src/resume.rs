@@ -1,6 +1,8 @@
 //! Pictures that are interrupted end in the same bytes.
 
-use crate::support::{binary, cramped, fail, kill, message, root, start, succeed, told, until};
+use crate::support::{
+    binary, cramped, fail, kill, message, scene_path, start, succeed, told, until,
+};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -8,13 +10,12 @@ use std::time::{Duration, Instant};
 /// Ten bands of a scene whose rays are slow enough to be interrupted.
 const SIZE: [&str; 4] = ["--set", "screen.width=40", "--set", "screen.height=160"];
 
-fn arguments(scene: &Path) -> Vec<&str> {
-    let scene = scene.to_str().expect("a name");
+fn arguments(scene: &str) -> Vec<&str> {
     [&["render", scene, "-o", "a.exr", "--preview", "a.png"][..], &SIZE[..]].concat()
 }
 
 /// The whole picture, and how long it takes.
-fn undisturbed(scene: &Path) -> (Vec<u8>, Duration) {
+fn undisturbed(scene: &str) -> (Vec<u8>, Duration) {
     let folder = tempfile::tempdir().unwrap();
     binary();
     let clock = Instant::now();
@@ -26,7 +27,7 @@ fn undisturbed(scene: &Path) -> (Vec<u8>, Duration) {
 
 #[test]
 fn exact_same_bytes_after_kills_at_twenty_moments() {
-    let scene = root().join("scenes/hot_spots.toml");
+    let scene = scene_path("hot_spots.toml");
     let (whole, taken) = undisturbed(&scene);
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("a.exr");
@@ -52,7 +53,7 @@ fn exact_same_bytes_after_kills_at_twenty_moments() {
 #[cfg(unix)]
 #[test]
 fn exact_same_bytes_after_an_interrupt() {
-    let scene = root().join("scenes/hot_spots.toml");
+    let scene = scene_path("hot_spots.toml");
     let (whole, taken) = undisturbed(&scene);
     let folder = tempfile::tempdir().unwrap();
     let partial = folder.path().join("a.exr.partial");
@@ -85,7 +86,7 @@ fn exact_same_bytes_after_an_interrupt() {
 #[cfg(unix)]
 #[test]
 fn exact_same_bytes_after_a_full_disk() {
-    let scene = root().join("scenes/hot_spots.toml");
+    let scene = scene_path("hot_spots.toml");
     let (whole, _) = undisturbed(&scene);
     let folder = tempfile::tempdir().unwrap();
     let output = cramped(folder.path(), 16, &arguments(&scene));
@@ -109,12 +110,11 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 #[test]
 #[ignore = "long"]
 fn exact_same_film_of_a_volume_after_kills() {
-    let scene = root().join("scenes/volume.toml");
+    let scene = scene_path("volume.toml");
     let size = ["--set", "screen.width=24", "--set", "screen.height=16"];
     let refined = ["--set", "screen.image_error=0.1"];
     let film = ["--frames", "9", "--from", "0", "--to", "80", "-o", "film"];
-    let movie = ["movie", scene.to_str().unwrap()];
-    let movie = [&movie[..], &film, &size, &refined].concat();
+    let movie = [&["movie", &scene][..], &film, &size, &refined].concat();
     let undisturbed = tempfile::tempdir().unwrap();
     succeed(undisturbed.path(), &movie);
     let whole = files(&undisturbed.path().join("film"));
@@ -151,10 +151,9 @@ fn a_file_in_the_way_of_the_journal_is_spared() {
 /// Neither the number of threads nor the size of tiles changes a bit.
 #[test]
 fn exact_same_bytes_for_any_tile_and_any_number_of_threads() {
-    let scene = root().join("scenes/disc_edge_on.toml");
+    let scene = scene_path("disc_edge_on.toml");
     let folder = tempfile::tempdir().unwrap();
-    let base = ["render", scene.to_str().unwrap(), "--set", "screen.width=70"];
-    let base = [&base[..], &["--set", "screen.height=39"][..]].concat();
+    let base = ["render", &scene, "--set", "screen.width=70", "--set", "screen.height=39"];
     let mut files = Vec::new();
     for [tile, threads] in [["64", "2"], ["1", "3"], ["13", "1"], ["100", "4"]] {
         let more = ["-o", "a.exr", "--tile", tile, "--threads", threads];

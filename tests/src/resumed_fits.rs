@@ -1,7 +1,9 @@
 //! Fits that are resumed: with the data, settings and state they had, alone, or not at all.
 
 use crate::fit::{results, small, with};
-use crate::support::{fail, holds, kerrlight, kill, killed, root, start, succeed, told, until};
+use crate::support::{
+    fail, holds, kerrlight, kill, killed, root, sets, start, succeed, told, until,
+};
 use std::path::Path;
 
 /// A fit of a movie that a simulation has left, stopped after its first checkpoint: its words and its folder `run`.
@@ -17,15 +19,14 @@ fn of_a_movie(at: &Path) {
 }
 
 /// An array of telescopes as a file, and the words of a fit of what it sees.
-fn of_an_array(at: &Path) -> Vec<String> {
+fn of_an_array(at: &Path) -> Vec<&'static str> {
     let sites = "#Site X Y Z SEFDR SEFDL FR_PAR FR_ELEV FR_OFF DR_RE DR_IM DL_RE DL_IM\n\
                  AA 2225061.164 -5440057.37 -2481681.15 90 90 1 0 0 0 0 0 0\n\
                  LM -768713.9637 -5988541.7982 2063275.9472 600 600 1 0 0 0 0 0 0\n\
                  AZ -1828796.2 -5054406.8 3427865.2 11000 11000 1 0 0 0 0 0 0\n\
                  SP 0.01 0.01 -6359609.7 5000 5000 1 0 0 0 0 0 0\n";
     std::fs::write(at.join("array.txt"), sites).unwrap();
-    let mut words: Vec<String> = vec!["fit".to_owned()];
-    for change in [
+    let settings = sets(&[
         "simulation.observation.array=array.txt",
         "representation=grid",
         "representation.grid.nodes=12",
@@ -36,10 +37,8 @@ fn of_an_array(at: &Path) -> Vec<String> {
         "training.checkpoint_seconds=0.02",
         "training.start=drawn",
         "output.nodes=16",
-    ] {
-        words.extend(["--set".to_owned(), change.to_owned()]);
-    }
-    words
+    ]);
+    [&["fit"], &settings[..]].concat()
 }
 
 /// Returns the message of a `fit --resume run` that must be refused and must change nothing. What the kill has cut short
@@ -65,7 +64,6 @@ fn exact_changed_inputs_and_damaged_state_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let words = of_an_array(at);
-    let words: Vec<&str> = words.iter().map(String::as_str).collect();
     succeed(at, &[&words[..], &["-o", "whole"]].concat());
     assert!(results(&at.join("whole"))["inputs"].to_string().contains("array.txt"));
     let logged = || holds(&at.join("run/log.jsonl"), "psnr_db");
@@ -141,8 +139,7 @@ fn exact_a_changed_movie_is_refused() {
 fn exact_a_folder_belongs_to_one_process() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let words = of_an_array(at);
-    let mut words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let mut words = of_an_array(at);
     words.extend(["--set", "training.steps=1000000", "-o", "run"]);
     let child = start(at, &words);
     until("a checkpoint", || at.join("run/checkpoint.safetensors").exists());

@@ -1,6 +1,6 @@
 //! Searches for what a fit does not know: killed, they resume where they were, to the same bytes.
 
-use crate::support::{killed, root, succeed, told};
+use crate::support::{killed, scene_path, sets, succeed, told};
 use crate::unknown_geometry::{NEAR, of_unknown_view};
 use std::path::Path;
 
@@ -42,8 +42,7 @@ fn exact_a_killed_search_for_a_geometry_resumes_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let view = "{ trials = 30, nodes = 12, iterations = 20, pixels = 12, frames = 8 }";
-    let search = format!("starts = 2\ncoarse = {view}\nfine = {view}\n");
-    let text = of_unknown_view(&crate::posterior::settings(), NEAR, &search);
+    let text = of_unknown_view(&crate::posterior::settings(), NEAR, 2, view);
     std::fs::write(at.join("fit.toml"), text).unwrap();
     resumes_to_the_same_bytes(at, &VOXELS, 45, &["geometry.json", "volume.npz"]);
 }
@@ -52,9 +51,8 @@ fn exact_a_killed_search_for_a_geometry_resumes_to_the_same_bytes() {
 fn exact_a_killed_weighing_of_bands_resumes_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let scene = root().join("scenes/fits/orbital_polarimetry.toml");
-    let scene = scene.to_str().unwrap();
-    let sets = [
+    let scene = scene_path("fits/orbital_polarimetry.toml");
+    let settings = sets(&[
         "band.radii={from=8.0,to=12.0,step=2.0}",
         "band.inclinations_deg={from=8.0,to=32.0,step=2.0}",
         "band.nodes=20",
@@ -65,9 +63,8 @@ fn exact_a_killed_weighing_of_bands_resumes_to_the_same_bytes() {
         "linear.rounds=1",
         "linear.iterations=10",
         "output.nodes=16",
-    ];
-    let sets: Vec<&str> = sets.into_iter().flat_map(|set| ["--set", set]).collect();
-    let words = [&["fit", scene][..], &sets].concat();
+    ]);
+    let words = [&["fit", &scene], &settings[..]].concat();
     resumes_to_the_same_bytes(at, &words, 2, &["band.json"]);
 }
 

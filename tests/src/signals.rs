@@ -2,7 +2,7 @@
 //! parent.
 
 use crate::fit::{small, with};
-use crate::support::{binary, holds, kerrlight, message, root, start, succeed, until};
+use crate::support::{binary, holds, kerrlight, message, scene_path, sets, start, succeed, until};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -31,8 +31,7 @@ fn exact_fits_that_are_stopped_end_in_the_same_bytes() {
     // Signalled early, so that a fit on a busy machine is not over before the signal comes.
     let long =
         ["training.steps=600", "training.log_every=10", "training.checkpoint_seconds=1000.0"];
-    let set: Vec<&str> = long.iter().flat_map(|change| ["--set", *change]).collect();
-    let words = with(&small, &set);
+    let words = with(&small, &sets(&long));
     succeed(folder.path(), &[&words[..], &["-o", "whole"]].concat());
     for (name, code) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
         let run = folder.path().join(name);
@@ -57,8 +56,7 @@ fn exact_fits_that_are_stopped_end_in_the_same_bytes() {
 /// Work that keeps nothing ends at once: a fit whose rays are traced, a scan, a linear grid, the sweep of accuracies.
 #[test]
 fn exact_what_keeps_nothing_ends_at_once() {
-    let fit = root().join("scenes/fits/scene_1.toml");
-    let fit = fit.to_str().unwrap();
+    let fit = &scene_path("fits/scene_1.toml");
     let linear = ["--set", "representation=linear-grid", "--set", "linear.iterations=100000"];
     for words in [
         &["fit", fit, "-o", "run", "--set", "screen.pixels=512"][..],

@@ -4,7 +4,7 @@ use crate::fit::results;
 use crate::fit_start::array;
 use crate::known_skies::bell;
 use crate::static_sky;
-use crate::support::{binary, done, fail, message, root, succeed, told};
+use crate::support::{binary, done, fail, message, scene_path, sets, succeed, told};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::noise::add_thermal_noise;
@@ -47,8 +47,7 @@ fn observed(folder: &Path) {
 }
 
 fn quick<'a>(words: &[&'a str]) -> Vec<&'a str> {
-    let sets = QUICK.iter().flat_map(|set| ["--set", *set]);
-    [&["fit"], words].concat().into_iter().chain(sets).collect()
+    [&["fit"], words, &sets(&QUICK)].concat()
 }
 
 fn number(found: &serde_json::Value, key: &str) -> f64 {
@@ -244,9 +243,9 @@ fn paper_m87_is_a_ring_of_42_microarcseconds() {
     let name = "SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits";
     let Some(data) = static_sky::data(name) else { return };
     let folder = tempfile::tempdir().unwrap();
-    let file = root().join("scenes/fits/m87_image.toml");
+    let file = scene_path("fits/m87_image.toml");
     let path = format!("data.visibilities.path={}", data.display());
-    succeed(folder.path(), &["fit", file.to_str().unwrap(), "--set", &path, "-o", "run"]);
+    succeed(folder.path(), &["fit", &file, "--set", &path, "-o", "run"]);
     let found = results(&folder.path().join("run"));
     for kind in ["amplitudes", "log closure amplitudes", "closure phases"] {
         let chi2 = number(&found["chi2_per_datum"], kind);
@@ -343,9 +342,9 @@ fn paper_sgr_a_is_polarised_by_a_quarter() {
     let name = "ER6_SGRA_2017_097_hi_hops_netcal_LMTcal_10s_ALMArot_dtermcal.uvfits";
     let Some(data) = static_sky::data(name) else { return };
     let folder = tempfile::tempdir().unwrap();
-    let scene = root().join("scenes/fits/sgra_polarized_image.toml");
+    let scene = scene_path("fits/sgra_polarized_image.toml");
     let set = format!("data.visibilities.path={}", data.display());
-    succeed(folder.path(), &["fit", scene.to_str().unwrap(), "--set", &set, "-o", "run"]);
+    succeed(folder.path(), &["fit", &scene, "--set", &set, "-o", "run"]);
     let found = results(&folder.path().join("run"));
     let mean = number(&found, "polarization_mean_fraction");
     let error = number(&found, "polarization_mean_fraction_error");

@@ -3,7 +3,7 @@
 
 use crate::fit::results;
 use crate::fit_start::array;
-use crate::support::{root, succeed};
+use crate::support::{root, scene_path, succeed};
 use std::path::{Path, PathBuf};
 
 /// A public file; says so where it is not there.
@@ -19,9 +19,9 @@ pub fn data(name: &str) -> Option<PathBuf> {
 
 /// χ² per datum of amplitudes, closure phases and log closure amplitudes.
 fn fitted(folder: &Path, scene: &str, data: &Path) -> [f64; 3] {
-    let scene = root().join("scenes/fits").join(scene);
+    let scene = scene_path(&format!("fits/{scene}"));
     let path = format!("data.visibilities.path={}", data.display());
-    succeed(folder, &["fit", scene.to_str().unwrap(), "--set", &path, "-o", "run"]);
+    succeed(folder, &["fit", &scene, "--set", &path, "-o", "run"]);
     let found = results(&folder.join("run"));
     assert_eq!(found["verdict"]["outcome"], "explained", "{found}");
     ["amplitudes", "closure phases", "log closure amplitudes"]

@@ -1,15 +1,15 @@
 //! `kerrlight fit` with station gains that are not known.
 
-use crate::fit::{results, with};
-use crate::support::{fail, succeed};
+use crate::fit::results;
+use crate::support::{fail, sets, succeed};
 use kerrlight_render::volume::VolumeArrays;
 
 /// Gains of 15 %, of 60 % at the LMT, and random phases, all of them new in every scan.
 const ERRORS: &str = "simulation.observation.gains={constant_amplitude=0.0,scan_amplitude=0.15,random_phases=true,stations={LMT=0.6}}";
 const FREE: &str = "instrument.gains={phases=\"free\",amplitude=0.15,stations={LMT=0.6}}";
 
-/// The built-in experiment with fewer pixels, frames and nodes.
-fn small(sets: &[&str]) -> Vec<String> {
+/// A fit of the built-in experiment with fewer pixels, frames and nodes, more settings, and where it goes.
+fn small<'a>(more: &[&'a str], run: &'a str) -> Vec<&'a str> {
     let usual = [
         "screen.pixels=20",
         "screen.jy_per_pixel=0.32",
@@ -19,8 +19,7 @@ fn small(sets: &[&str]) -> Vec<String> {
         "linear.smoothness=0.03",
         "output.nodes=24",
     ];
-    let sets = usual.iter().chain(sets).flat_map(|set| ["--set", set]);
-    ["fit"].into_iter().chain(sets).map(str::to_owned).collect()
+    [&["fit", "-o", run], &sets(&usual)[..], &sets(more)].concat()
 }
 
 fn number(found: &serde_json::Value, path: &[&str]) -> f64 {
@@ -56,8 +55,8 @@ fn exact_closures_and_free_gains_agree() {
     let folder = tempfile::tempdir().unwrap();
     let closures = r#"loss=[{data="closure-phases",weight=1.0},{data="log-closure-amplitudes",weight=1.0},{data="light-curve",weight=1.0,sigma=0.01}]"#;
     let wide = "instrument.gains={phases=\"free\",amplitude=1.0}";
-    succeed(folder.path(), &with(&small(&[ERRORS, closures]), &["-o", "closures"]));
-    succeed(folder.path(), &with(&small(&[ERRORS, wide]), &["-o", "free"]));
+    succeed(folder.path(), &small(&[ERRORS, closures], "closures"));
+    succeed(folder.path(), &small(&[ERRORS, wide], "free"));
     let found = |name: &str| {
         let (name, folder) = (format!("{name}/volume.npz"), folder.path());
         let bytes = std::fs::read(folder.join(name)).unwrap();
@@ -98,7 +97,7 @@ fn bad_input_of_gains_is_named_and_nothing_is_begun() {
     let folder = tempfile::tempdir().unwrap();
     let images = r#"loss=[{data="image",weight=1.0,sigma=0.01}]"#;
     let both = r#"loss=[{data="visibilities",weight=1.0},{data="amplitudes",weight=1.0}]"#;
-    for (sets, says) in [
+    for (more, says) in [
         (
             vec!["instrument.gains={phases=\"free\",stations={LMT=0.6}}"],
             "instrument.gains.stations.",
@@ -121,7 +120,7 @@ fn bad_input_of_gains_is_named_and_nothing_is_begun() {
             "simulation.observation.gains.stations.XX",
         ),
     ] {
-        let error = fail(folder.path(), &with(&small(&sets), &["-o", "none"]));
-        assert!(error.contains(says), "{sets:?}: {error}");
+        let error = fail(folder.path(), &small(&more, "none"));
+        assert!(error.contains(says), "{more:?}: {error}");
     }
 }

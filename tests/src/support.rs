@@ -96,6 +96,16 @@ pub fn json(path: &Path) -> Value {
     serde_json::from_slice(&text).expect("JSON")
 }
 
+/// The path of a file in the folder of scenes.
+pub fn scene_path(name: &str) -> String {
+    root().join("scenes").join(name).display().to_string()
+}
+
+/// Settings, each behind `--set`.
+pub fn sets<'a>(settings: &[&'a str]) -> Vec<&'a str> {
+    settings.iter().flat_map(|setting| ["--set", *setting]).collect()
+}
+
 /// All scene files of the repository with their texts.
 pub fn scenes() -> Vec<(PathBuf, String)> {
     let mut files: Vec<PathBuf> = std::fs::read_dir(root().join("scenes"))

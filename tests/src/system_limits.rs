@@ -1,6 +1,6 @@
 //! Limits of the system: threads, a closed standard output; and what is left behind by kills.
 
-use crate::support::{after, message, root, succeed};
+use crate::support::{after, message, scene_path, succeed};
 use std::fs;
 
 const CURVE: [&str; 7] =
@@ -59,8 +59,7 @@ fn exact_what_cannot_be_printed_is_an_error() {
 fn exact_leftovers_of_a_killed_film_are_removed_by_the_next() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    let scene = root().join("scenes/disc_face_on.toml");
-    let scene = scene.to_str().unwrap();
+    let scene = &scene_path("disc_face_on.toml");
     let words =
         ["movie", scene, "--frames", "2", "--duration", "60", "-o", "m", "--gif", "m.gif", "--png"];
     let words = [&words[..], &["--set", "screen.width=8", "--set", "screen.height=8"]].concat();

@@ -1,7 +1,7 @@
 //! Fits that do not know the geometry.
 
 use crate::fit::killed_fit;
-use crate::support::{fail, json, root, succeed, told};
+use crate::support::{fail, json, root, sets, succeed, told};
 
 /// The built-in flare seen by the ngEHT, few pixels and scans, from another inclination and orientation than its
 /// settings say.
@@ -17,20 +17,26 @@ fn settings(geometries: usize) -> String {
     let view = format!(
         "{{ trials = {geometries}, nodes = 16, iterations = 25, pixels = 20, frames = 12 }}"
     );
-    let search = format!("starts = 2\ncoarse = {view}\nfine = {view}\n");
     let all = ["{ isotropic = [0.0, 180.0] }", "{ uniform = [-180.0, 180.0] }"];
-    of_unknown_view(&small, all, &search)
+    of_unknown_view(&small, all, 2, &view)
 }
 
 /// Priors of inclination and position angle about those of the built-in flare.
 pub const NEAR: [&str; 2] = ["{ uniform = [50.0, 70.0] }", "{ uniform = [-10.0, 10.0] }"];
 
-/// The settings of the built-in flare with priors of inclination and position angle.
-pub fn of_unknown_view(text: &str, [inclination, angle]: [&str; 2], search: &str) -> String {
+/// The settings of the built-in flare with priors of inclination and position angle, and a search of so many starts whose
+/// views are both this one.
+pub fn of_unknown_view(
+    text: &str,
+    [inclination, angle]: [&str; 2],
+    starts: usize,
+    view: &str,
+) -> String {
     let known = "inclination_deg = 60.0\n";
     let priors = format!("inclination_deg = {inclination}\nposition_angle_deg = {angle}\n");
     assert!(text.contains(known));
     let text = text.replace(known, &priors);
+    let search = format!("starts = {starts}\ncoarse = {view}\nfine = {view}\n");
     format!("{text}\n[simulation.observer]\n{known}position_angle_deg = 0.0\n\n[search]\n{search}")
 }
 
@@ -63,7 +69,7 @@ fn exact_inclination_and_position_angle_are_found_from_visibilities() {
 fn exact_a_search_without_phases_claims_no_more_than_it_has_found() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fit.toml"), settings(60)).unwrap();
-    let sets = [
+    let settings = sets(&[
         "loss=[{data=\"amplitudes\",weight=1.0},{data=\"closure-phases\",weight=1.0}]",
         "simulation.observation.gains={constant_amplitude=0.0,scan_amplitude=0.0,random_phases=true}",
         "observer.inclination_deg={isotropic=[40.0,80.0]}",
@@ -72,9 +78,8 @@ fn exact_a_search_without_phases_claims_no_more_than_it_has_found() {
         "representation=linear-grid",
         "linear.iterations=20",
         "linear.rounds=1",
-    ];
-    let mut words = vec!["fit", "fit.toml", "-o", "run"];
-    words.extend(sets.iter().flat_map(|set| ["--set", set]));
+    ]);
+    let words = [&["fit", "fit.toml", "-o", "run"], &settings[..]].concat();
     succeed(folder.path(), &words);
     let geometry = json(&folder.path().join("run/geometry.json"));
     let left = geometry["chi2_per_datum"].as_f64().unwrap();
@@ -127,41 +132,40 @@ reference_time = 0.0
 fn exact_geometry_of_a_movie_with_one_ray_a_pixel_is_found() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    let volume = [
+    let volume = sets(&[
         "simulation.truth.spot=[{center=[-5.0,3.0,0.0],sigma=1.0,amplitude=1.0}]",
         "output.nodes=96",
-    ];
-    let few =
-        ["training.steps=1", "training.start=drawn", "training.occupancy=", "screen.pixels=16"];
-    let mut words = vec!["fit", "-o", "made"];
-    volume.iter().chain(&few).for_each(|set| words.extend(["--set", set]));
-    succeed(path, &words);
+        "training.steps=1",
+        "training.start=drawn",
+        "training.occupancy=",
+        "screen.pixels=16",
+    ]);
+    succeed(path, &[&["fit", "-o", "made"], &volume[..]].concat());
     std::fs::write(path.join("scene.toml"), SCENE).unwrap();
     let times = ["--frames", "12", "--from", "0", "--to", "60", "-o", "film"];
     succeed(path, &[&["movie", "scene.toml"][..], &times].concat());
     succeed(path, &["fit", "--init", "film", "-o", "fit.toml"]);
     let coarse = "{trials=120,nodes=14,iterations=30,pixels=24,frames=12}";
     let fine = "{trials=40,nodes=22,iterations=50,pixels=24,frames=12}";
-    let sets = [
-        "hole.spin={uniform=[0.2,0.9]}".to_owned(),
-        "observer.inclination_deg={isotropic=[130.0,170.0]}".to_owned(),
-        "observer.position_angle_deg={uniform=[-20.0,20.0]}".to_owned(),
-        "screen.width=20.0".to_owned(),
-        "region.r_min=3.0".to_owned(),
-        "region.r_max=9.0".to_owned(),
-        "motion.velocity={keplerian={}}".to_owned(),
-        "motion.axis=[0.0,0.0,1.0]".to_owned(),
-        "data.movie.from=0.0".to_owned(),
-        "data.movie.to=60.0".to_owned(),
-        "loss.0.sigma=1e-4".to_owned(),
-        "representation=linear-grid".to_owned(),
-        "linear.iterations=40".to_owned(),
-        "output.nodes=24".to_owned(),
-        format!("search={{starts=1,coarse={coarse},fine={fine}}}"),
-    ];
-    let mut words = vec!["fit", "fit.toml", "-o", "run"];
-    sets.iter().for_each(|set| words.extend(["--set", set]));
-    succeed(path, &words);
+    let search = format!("search={{starts=1,coarse={coarse},fine={fine}}}");
+    let settings = sets(&[
+        "hole.spin={uniform=[0.2,0.9]}",
+        "observer.inclination_deg={isotropic=[130.0,170.0]}",
+        "observer.position_angle_deg={uniform=[-20.0,20.0]}",
+        "screen.width=20.0",
+        "region.r_min=3.0",
+        "region.r_max=9.0",
+        "motion.velocity={keplerian={}}",
+        "motion.axis=[0.0,0.0,1.0]",
+        "data.movie.from=0.0",
+        "data.movie.to=60.0",
+        "loss.0.sigma=1e-4",
+        "representation=linear-grid",
+        "linear.iterations=40",
+        "output.nodes=24",
+        &search,
+    ]);
+    succeed(path, &[&["fit", "fit.toml", "-o", "run"], &settings[..]].concat());
     let geometry = json(&path.join("run/geometry.json"));
     for (name, truth, most) in
         [("spin", 0.6, 0.01), ("inclination_deg", 150.0, 0.3), ("position_angle_deg", 0.0, 0.3)]
@@ -208,9 +212,9 @@ fn exact_impossible_priors_are_refused_before_anything_is_written() {
         ("observer.inclination_deg=60.0 observer.position_angle_deg=0.0", "there is none"),
         ("linear= representation.kind=grid training.start=drawn", "search: linear is missing"),
     ] {
-        let mut words = vec!["fit", "fit.toml", "-o", "run"];
-        change.split(' ').for_each(|change| words.extend(["--set", change]));
-        let told = fail(folder.path(), &words);
-        assert!(told.contains(expected), "{change}: {told}");
+        let settings = sets(&change.split(' ').collect::<Vec<_>>());
+        let words = [&["fit", "fit.toml", "-o", "run"], &settings[..]].concat();
+        let said = fail(folder.path(), &words);
+        assert!(said.contains(expected), "{change}: {said}");
     }
 }

@@ -2,26 +2,19 @@
 
 use crate::eht_data;
 use crate::fit::results;
-use crate::support::{root, succeed};
+use crate::support::{scene_path, sets, succeed};
 use serde_json::Value;
 use std::path::Path;
 
 /// The built-in experiment with fewer pixels, scans and nodes, as the convex problem: some seconds.
-const SMALL: [&str; 14] = [
-    "--set",
+const SMALL: [&str; 7] = [
     "representation=linear-grid",
-    "--set",
     "representation.linear-grid.nodes=24",
     // So few cubic splines are wider than the flare.
-    "--set",
     "linear.degree=linear",
-    "--set",
     "screen.pixels=20",
-    "--set",
     "simulation.observation.scans=20",
-    "--set",
     "output.nodes=16",
-    "--set",
     "linear.rounds=2",
 ];
 
@@ -50,7 +43,7 @@ fn chi2(verdict: &Value, term: usize) -> f64 {
 #[test]
 fn regress_a_fit_with_right_settings_explains_its_data() {
     let folder = tempfile::tempdir().unwrap();
-    let found = verdict(folder.path(), &[&["fit"], &SMALL[..]].concat());
+    let found = verdict(folder.path(), &[&["fit"], &sets(&SMALL)[..]].concat());
     assert_eq!(found["outcome"], "explained", "{found}");
     assert!((0.8..1.1).contains(&chi2(&found, 0)), "{found}");
     assert!((found["data"][0]["expected"]["mean"].as_f64().unwrap() - 1.0).abs() < 1e-12);
@@ -62,7 +55,8 @@ fn regress_a_fit_with_wrong_settings_says_so() {
     let folder = tempfile::tempdir().unwrap();
     for wrong in ["observer.inclination_deg=30.0", "hole.spin=0.9", "motion.axis=[0.0,0.0,-1.0]"] {
         let wrong = format!("simulation.{wrong}");
-        let found = verdict(folder.path(), &[&["fit"], &SMALL[..], &["--set", &wrong]].concat());
+        let words = [&["fit"], &sets(&SMALL)[..], &["--set", &wrong]].concat();
+        let found = verdict(folder.path(), &words);
         assert_eq!(found["outcome"], "unexplained", "{wrong}: {found}");
         assert!(chi2(&found, 0) > 2.0, "{wrong}: {found}");
         assert!(!found["reasons"].as_array().unwrap().is_empty());
@@ -79,12 +73,16 @@ fn regress_measured_data_that_are_not_explained() {
         return;
     };
     let folder = tempfile::tempdir().unwrap();
-    let fit = root().join("scenes/fits/sgra_visibilities.toml");
+    let fit = scene_path("fits/sgra_visibilities.toml");
     let path = format!("data.visibilities.path={}", std::path::absolute(data).unwrap().display());
-    let words = ["fit", fit.to_str().unwrap(), "--set", &path, "--set", "training.steps=10"];
-    let more =
-        ["--set", "representation=bhnerf", "--set", "screen.pixels=20", "--set", "output.nodes=12"];
-    let found = verdict(folder.path(), &[&words[..], &more].concat());
+    let settings = sets(&[
+        "training.steps=10",
+        "representation=bhnerf",
+        "screen.pixels=20",
+        "output.nodes=12",
+        &path,
+    ]);
+    let found = verdict(folder.path(), &[&["fit", &fit], &settings[..]].concat());
     assert_eq!(found["outcome"], "unexplained", "{found}");
     assert!(chi2(&found, 0) > 10.0 && chi2(&found, 1) > 3.0, "{found}");
     let flux = &found["zero_spacing"];

@@ -1,7 +1,7 @@
 //! The page of `kerrlight view`: its files, and what a browser makes of it beside what `render` makes of its scene.
 
 use crate::browser::{Browser, address};
-use crate::support::{after, fail, kill, message, root, start, succeed};
+use crate::support::{after, fail, kill, message, scene_path, sets, start, succeed};
 use kerrlight_geodesic::wgsl;
 use kerrlight_geodesic::{
     Camera, Inclination, Kerr, Motion, Observer, Outcome, Quantities, Tracer,
@@ -107,10 +107,6 @@ fn compare(words: &[&str], fragment: &str, channel: (usize, &str), allowed: [f64
 
 const INTENSITY: (usize, &str) = (3, "intensity");
 
-fn scene(name: &str) -> String {
-    root().join("scenes").join(name).to_str().unwrap().to_owned()
-}
-
 /// The browser shows the picture that `render` makes, in the colours of its map: without a word on the console.
 #[test]
 fn code_the_page_draws_what_render_draws() {
@@ -160,11 +156,11 @@ fn code_the_page_draws_what_render_draws() {
 fn code_light_of_the_page_is_that_of_render() {
     compare(&["--set", "spot="], "", INTENSITY, [2e-4, 0.002]);
     compare(&[], "time=12", INTENSITY, [2e-3, 0.002]);
-    compare(&[&scene("hot_spots.toml")], "", INTENSITY, [5e-3, 0.003]);
-    compare(&[&scene("volume.toml")], "", INTENSITY, [2e-2, 0.01]);
-    compare(&[&scene("volume.toml")], "lensing=0", INTENSITY, [2e-2, 0.01]);
+    compare(&[&scene_path("hot_spots.toml")], "", INTENSITY, [5e-3, 0.003]);
+    compare(&[&scene_path("volume.toml")], "", INTENSITY, [2e-2, 0.01]);
+    compare(&[&scene_path("volume.toml")], "lensing=0", INTENSITY, [2e-2, 0.01]);
     compare(
-        &[&scene("volume.toml")],
+        &[&scene_path("volume.toml")],
         "kind=camera&radius=25&inclination=70&azimuth=30",
         INTENSITY,
         [2e-2, 0.01],
@@ -175,14 +171,14 @@ fn code_light_of_the_page_is_that_of_render() {
         INTENSITY,
         [5e-4, 0.003],
     );
-    compare(&[&scene("sky_checker.toml")], "", (1, "G"), [3e-2, 0.06]);
+    compare(&[&scene_path("sky_checker.toml")], "", (1, "G"), [3e-2, 0.06]);
 }
 
 /// Matter that plunges, by its light and by its colours as a black body, from afar and from a camera that moves.
 #[test]
 #[ignore = "long"]
 fn code_discs_plunge_and_glow_as_those_of_render() {
-    let plunging = scene("disc_plunging.toml");
+    let plunging = scene_path("disc_plunging.toml");
     compare(&[&plunging], "", INTENSITY, [5e-4, 0.002]);
     compare(&[&plunging], "spin=0.9&inclination=80", INTENSITY, [5e-4, 0.002]);
     let hot = [&plunging, "--set", "disc.peak_temperature_k=6000"];
@@ -196,7 +192,7 @@ fn code_discs_plunge_and_glow_as_those_of_render() {
 #[test]
 #[ignore = "long"]
 fn code_gas_of_the_page_is_that_of_render() {
-    let [thin, thick] = ["test3", "test5"].map(|name| scene(&format!("gold2020/{name}.toml")));
+    let [thin, thick] = ["test3", "test5"].map(|name| scene_path(&format!("gold2020/{name}.toml")));
     // Scene units are not those of the picture's intensity, which has a unit.
     let red = (0, "R");
     compare(&[&thin], "", red, [2e-5, 0.0]);
@@ -206,14 +202,13 @@ fn code_gas_of_the_page_is_that_of_render() {
     }
     compare(&[&thick], "", red, [1e-4, 0.0]);
     // Its light grows like 1/g towards the horizon.
-    compare(&[&scene("gold2020/test1.toml")], "", red, [3e-3, 0.002]);
+    compare(&[&scene_path("gold2020/test1.toml")], "", red, [3e-3, 0.002]);
     let more = [
         "gas.emissivity=1e-19",
         "disc={outer_edge=12.0,peak_intensity=2e-5,opaque=true}",
         "spot=[{radius=8.0,phase_deg=90.0,sigma=0.7,peak_emissivity=1e-5}]",
     ];
-    let words: Vec<&str> = more.iter().flat_map(|change| ["--set", change]).collect();
-    compare(&[&[thick.as_str()], &words[..]].concat(), "", red, [2e-4, 0.002]);
+    compare(&[&[thick.as_str()], &sets(&more)[..]].concat(), "", red, [2e-4, 0.002]);
 }
 
 /// The ray of a picked place has the constants, the fate and the crossings of the tracer in doubles, and turns where its
@@ -302,7 +297,7 @@ fn exact_the_critical_curve_parts_rays() {
 #[ignore = "long"]
 fn code_the_page_of_a_fit_has_volume_truth_and_data() {
     let folder = tempfile::tempdir().unwrap();
-    let settings = [
+    let settings = sets(&[
         "screen.pixels=12",
         "simulation.movie.frames=6",
         "representation=bhnerf",
@@ -310,11 +305,9 @@ fn code_the_page_of_a_fit_has_volume_truth_and_data() {
         "training.steps=20",
         "training.start={linear={nodes=10,stride=1,steps=60}}",
         "output.nodes=20",
-    ];
-    let fit = root().join("scenes/fits/flare_images.toml");
-    let mut words = vec!["fit", fit.to_str().unwrap(), "-o", "run"];
-    words.extend(settings.iter().flat_map(|setting| ["--set", setting]));
-    succeed(folder.path(), &words);
+    ]);
+    let fit = scene_path("fits/flare_images.toml");
+    succeed(folder.path(), &[&["fit", &fit, "-o", "run"], &settings[..]].concat());
     let Some(mut browser) = opened(folder.path(), &["run"], "") else { return };
     let files = ["index.html", "volumes.js"].map(|name| folder.path().join("page").join(name));
     assert!(std::fs::metadata(&files[0]).unwrap().len() < 5_000_000 && files[1].is_file());
