@@ -1,6 +1,7 @@
 //! Files of data as others write them: visibilities of every kind that the EHT has published, arrays,
 //! pictures of the sky, empty files; and where paths of settings start.
 
+use crate::eht_data;
 use crate::fit::results;
 use crate::support::{fail, kerrlight, message, root, scene_path, sets, succeed, told};
 use kerrlight_vlbi::Complex64;
@@ -38,18 +39,8 @@ fn fit(folder: &Path, scene: &str, data: &Path, out: &str) -> Result<(), String>
 /// Every public file that is at hand, UVFITS and tables, as it is.
 #[test]
 fn exact_public_files_are_fitted_as_they_are() {
-    let data = std::env::var_os("KERRLIGHT_EHT_DATA")
-        .map_or_else(|| root().join("../shared/data/eht"), std::path::PathBuf::from);
-    let Ok(entries) = std::fs::read_dir(&data) else {
-        eprintln!("SKIPPED: no public EHT data in {}", data.display());
-        return;
-    };
     let folder = tempfile::tempdir().unwrap();
-    let is_data = |path: &std::path::PathBuf| {
-        path.extension().is_some_and(|e| ["uvfits", "txt", "csv"].iter().any(|known| e == *known))
-    };
-    let paths = entries.map(|entry| entry.unwrap().path()).filter(is_data);
-    for (k, path) in paths.enumerate() {
+    for (k, path) in eht_data::all(&["uvfits", "txt", "csv"]).into_iter().enumerate() {
         let is_m87 = path.to_string_lossy().contains("M87");
         let scene = if is_m87 { "m87_visibilities.toml" } else { "sgra_visibilities.toml" };
         let result = fit(folder.path(), scene, &path, &format!("run{k}"));

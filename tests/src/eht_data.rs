@@ -10,24 +10,41 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// Where public files are looked for.
-pub fn folder() -> PathBuf {
+fn folder() -> PathBuf {
     std::env::var_os("KERRLIGHT_EHT_DATA")
         .map_or_else(|| root().join("../shared/data/eht"), PathBuf::from)
 }
 
-/// Pairs of UVFITS and text, of files that have both; says so where there are none.
-pub fn pairs() -> Vec<(PathBuf, PathBuf)> {
+/// A public file; says so where it is not there.
+pub fn data(name: &str) -> Option<PathBuf> {
+    let path = folder().join(name);
+    if !path.is_file() {
+        eprintln!("SKIPPED: there is no {}", path.display());
+    }
+    path.is_file().then_some(path)
+}
+
+/// All public files of these kinds; says so where there are no files at all.
+pub fn all(kinds: &[&str]) -> Vec<PathBuf> {
     let folder = folder();
     let Ok(entries) = std::fs::read_dir(&folder) else {
         eprintln!("SKIPPED: no public EHT data in {}", folder.display());
         return Vec::new();
     };
-    let uvfits = entries
-        .map(|entry| entry.expect("an entry").path())
-        .filter(|path| path.extension().is_some_and(|e| e == "uvfits"));
-    let pairs = uvfits.map(|path| (path.clone(), path.with_extension("txt")));
+    let is_one =
+        |path: &PathBuf| path.extension().is_some_and(|own| kinds.iter().any(|kind| own == *kind));
+    let paths = entries.map(|entry| entry.expect("an entry").path());
+    let paths: Vec<_> = paths.filter(is_one).collect();
+    assert!(!paths.is_empty(), "no {kinds:?} in {}", folder.display());
+    paths
+}
+
+/// Pairs of UVFITS and text, of files that have both.
+pub fn pairs() -> Vec<(PathBuf, PathBuf)> {
+    let uvfits = all(&["uvfits"]);
+    let pairs = uvfits.iter().map(|path| (path.clone(), path.with_extension("txt")));
     let pairs: Vec<_> = pairs.filter(|(_, text)| text.exists()).collect();
-    assert!(!pairs.is_empty(), "no .uvfits with .txt in {}", folder.display());
+    assert!(uvfits.is_empty() || !pairs.is_empty(), "no .uvfits with .txt of {uvfits:?}");
     pairs
 }
 
@@ -136,11 +153,7 @@ fn exact_eht_files_survive_a_round_trip() {
 /// within a site.
 #[test]
 fn code_ehtim_averages_keep_closures() {
-    let path = folder().join("SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits");
-    if !path.exists() {
-        eprintln!("SKIPPED: there is no {}", path.display());
-        return;
-    }
+    let Some(path) = data("SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits") else { return };
     let data = decode(&path).1;
     let clock = Averaging::over(300.0);
     let scans = Averaging { seconds: f64::INFINITY, in_scans: true, weighted: true };

@@ -1,7 +1,7 @@
 //! The two public nights of Sgr A* with all four products (2017 April 6 and 7), which lie where those of
 //! [`crate::eht_data`] do: light curves beside numbers that another program reads, and data that survive being written.
 
-use crate::eht_data::folder;
+use crate::eht_data::data;
 use crate::support::{succeed, told};
 use kerrlight_vlbi::files;
 
@@ -112,12 +112,7 @@ const READ: [(usize, [f64; 7]); 8] = [
 fn nights() -> Option<Vec<std::path::PathBuf>> {
     let name =
         |night| format!("ER6_SGRA_2017_{night}_hi_hops_netcal_LMTcal_10s_ALMArot_dtermcal.uvfits");
-    let paths: Vec<_> = NIGHTS.iter().map(|night| folder().join(name(night))).collect();
-    if !paths.iter().all(|path| path.exists()) {
-        eprintln!("SKIPPED: the polarised nights of Sgr A* are not in {}", folder().display());
-        return None;
-    }
-    Some(paths)
+    NIGHTS.iter().map(|night| data(&name(night))).collect()
 }
 
 /// Sums and differences of products to rounding, of every row of the baseline within a site.

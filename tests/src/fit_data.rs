@@ -1,6 +1,6 @@
 //! `kerrlight fit --data FILE`: settings that are guessed from a file, with every guess told.
 
-use crate::eht_data::folder;
+use crate::eht_data;
 use crate::support::{fail, sets, succeed, told};
 use std::path::Path;
 
@@ -111,15 +111,8 @@ fn bad_input_of_data_is_named() {
 /// The public files of the EHT: settings for each are complete.
 #[test]
 fn code_eht_data_need_nothing_more() {
-    let folder = folder();
-    let Ok(entries) = std::fs::read_dir(&folder) else {
-        return eprintln!("SKIPPED: no public EHT data in {}", folder.display());
-    };
-    let uvfits = entries.map(|entry| entry.unwrap().path());
-    let uvfits: Vec<_> = uvfits.filter(|p| p.extension().is_some_and(|e| e == "uvfits")).collect();
-    assert!(!uvfits.is_empty());
     let here = tempfile::tempdir().unwrap();
-    for file in uvfits {
+    for file in eht_data::all(&["uvfits"]) {
         let text = succeed(here.path(), &["fit", "--data", file.to_str().unwrap(), "--print"]);
         assert!(!text.contains("FILL IN") && text.contains("table = \"EHT2017\""), "{text}");
         // What Sgr A* varied in these nights is what it usually varies: no motion is needed.

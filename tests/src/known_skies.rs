@@ -1,9 +1,9 @@
 //! Static images of known skies, through the coverage and the errors of a real night, with the settings that `kerrlight fit --data`
 //! assumes.
 
+use crate::eht_data::data;
 use crate::fit::results;
 use crate::fit_start::array;
-use crate::static_sky::data;
 use crate::support::{even, succeed, within};
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::files;

@@ -1,8 +1,8 @@
 //! `kerrlight compare --quick` of every experiment that the program carries.
 
 use crate::compare::cases;
+use crate::eht_data::data;
 use crate::fit::results;
-use crate::static_sky;
 use crate::support::succeed;
 
 /// Q and U of a night.
@@ -18,7 +18,7 @@ fn on_public_data(name: &str) -> Option<Vec<String>> {
         }
         "sgra-2017-polarization" => POLARIZED,
         "sgra-2017-polarimetry" => {
-            let path = static_sky::data(POLARIZED)?;
+            let path = data(POLARIZED)?;
             return Some(vec![
                 "--set".to_owned(),
                 format!("data.light-curve.path={}", path.display()),
@@ -26,7 +26,7 @@ fn on_public_data(name: &str) -> Option<Vec<String>> {
         }
         _ => return Some(Vec::new()),
     };
-    let path = static_sky::data(file)?;
+    let path = data(file)?;
     Some(vec!["--set".to_owned(), format!("data.visibilities.path={}", path.display())])
 }
 

@@ -1,9 +1,9 @@
 //! `kerrlight fit` of a static image, from a file to a ring; and the experiment that does so with public data.
 
+use crate::eht_data;
 use crate::fit::results;
 use crate::fit_start::array;
 use crate::known_skies::bell;
-use crate::static_sky;
 use crate::support::{binary, done, fail, message, scene_path, sets, succeed, told};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::files;
@@ -241,7 +241,7 @@ fn exact_the_experiment_of_m87_has_its_tables() {
 #[ignore = "long"]
 fn paper_m87_is_a_ring_of_42_microarcseconds() {
     let name = "SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits";
-    let Some(data) = static_sky::data(name) else { return };
+    let Some(data) = eht_data::data(name) else { return };
     let folder = tempfile::tempdir().unwrap();
     let file = scene_path("fits/m87_image.toml");
     let path = format!("data.visibilities.path={}", data.display());
@@ -340,7 +340,7 @@ fn exact_polarisation_of_a_ring_is_found() {
 #[ignore = "long"]
 fn paper_sgr_a_is_polarised_by_a_quarter() {
     let name = "ER6_SGRA_2017_097_hi_hops_netcal_LMTcal_10s_ALMArot_dtermcal.uvfits";
-    let Some(data) = static_sky::data(name) else { return };
+    let Some(data) = eht_data::data(name) else { return };
     let folder = tempfile::tempdir().unwrap();
     let scene = scene_path("fits/sgra_polarized_image.toml");
     let set = format!("data.visibilities.path={}", data.display());

@@ -1,21 +1,10 @@
-//! Static fits of public EHT data. The files lie outside the repository: in `../shared/data/eht` beside it, or where
-//! KERRLIGHT_EHT_DATA says.
+//! Static fits of public EHT data.
 
+use crate::eht_data::data;
 use crate::fit::results;
 use crate::fit_start::array;
-use crate::support::{root, scene_path, succeed};
-use std::path::{Path, PathBuf};
-
-/// A public file; says so where it is not there.
-pub fn data(name: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("KERRLIGHT_EHT_DATA")
-        .map_or_else(|| root().join("../shared/data/eht"), PathBuf::from);
-    let path = folder.join(name);
-    if !path.is_file() {
-        eprintln!("SKIPPED: there is no {}", path.display());
-    }
-    path.is_file().then_some(path)
-}
+use crate::support::{scene_path, succeed};
+use std::path::Path;
 
 /// χ² per datum of amplitudes, closure phases and log closure amplitudes.
 fn fitted(folder: &Path, scene: &str, data: &Path) -> [f64; 3] {
