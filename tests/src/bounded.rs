@@ -1,7 +1,7 @@
 //! Memory is estimated before it is taken: numbers of users and of headers that cannot be meant end in a message that says
 //! what would be needed and what there is, never in a signal.
 
-use crate::support::{fail, scene_path, sets, succeed};
+use crate::support::{are_the_same, fail, scene_path, sets, succeed};
 use std::io::Write;
 use std::path::Path;
 
@@ -162,10 +162,7 @@ fn exact_a_movie_in_a_file_gives_the_same_bytes() {
         succeed(at, &[&["--memory", memory][..], &words, &[run], &set, &frames].concat());
     }
     let names = ["checkpoint.safetensors", "volume.npz", "movie.npz", "movie.png", "truth.npz"];
-    for name in names {
-        let [a, b] = ["all", "little"].map(|run| std::fs::read(at.join(run).join(name)).unwrap());
-        assert!(a == b, "{name}");
-    }
+    are_the_same(at, ["all", "little"], &names);
     // The same of its results as data.
     let data = ["--set", "data.movie={path=\"all/movie.npz\",from=0.0,to=120.0}"];
     without_truth(at, &scene);
@@ -173,11 +170,7 @@ fn exact_a_movie_in_a_file_gives_the_same_bytes() {
         let words = ["--memory", memory, "fit", "data.toml", "-o", run];
         succeed(at, &[&words[..], &set, &data].concat());
     }
-    for name in &names[..4] {
-        let [a, b] =
-            ["read", "read_little"].map(|run| std::fs::read(at.join(run).join(name)).unwrap());
-        assert!(a == b, "{name}");
-    }
+    are_the_same(at, ["read", "read_little"], &names[..4]);
 }
 
 /// A limit that is too small is refused before anything is written, with one that is enough; that is no more than what

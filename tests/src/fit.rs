@@ -1,6 +1,6 @@
 //! `kerrlight fit`, from settings to a report.
 
-use crate::support::{fail, json, kill, root, sets, start, succeed};
+use crate::support::{are_the_same, fail, json, kill, root, sets, start, succeed};
 use std::path::Path;
 use std::time::Instant;
 
@@ -140,10 +140,8 @@ pub fn killed_fit(words: &[String], set: &[&str], moments: u32) {
     }
     assert!(gone_on >= moments / 2, "{gone_on} runs went on with another's work");
     succeed(folder.path(), &["fit", "--resume", "killed"]);
-    for file in ["volume.npz", "volume.vti", "movie.npz", "checkpoint.safetensors"] {
-        let read = |run: &str| std::fs::read(folder.path().join(run).join(file)).unwrap();
-        assert!(read("whole") == read("killed"), "{file}");
-    }
+    let same = ["volume.npz", "volume.vti", "movie.npz", "checkpoint.safetensors"];
+    are_the_same(folder.path(), ["whole", "killed"], &same);
 }
 
 #[test]

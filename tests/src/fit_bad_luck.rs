@@ -1,18 +1,10 @@
 //! `kerrlight fit` with bad input and bad luck: one clear message, and nothing lost or half-written.
 
 use crate::fit::{changed, results, small, with};
-use crate::support::{cramped, fail, message, scene_path, sets, start, succeed, told};
+use crate::support::{
+    are_the_same, cramped, fail, files, message, scene_path, sets, start, succeed, told,
+};
 use std::path::Path;
-
-/// Files of a folder and below, sorted; temporary ones would show.
-fn files(folder: &Path) -> Vec<String> {
-    let mut all: Vec<String> = std::fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
-    all.sort();
-    all
-}
 
 /// At whatever file it strikes; what was there is still there, and the run goes on to the same bytes.
 #[cfg(unix)]
@@ -37,10 +29,8 @@ fn exact_a_full_disk_loses_nothing() {
     assert!(!run.join("report.html").exists() && run.join("checkpoint.safetensors").exists());
     assert!(!files(&run).iter().any(|name| name.starts_with(".kerrlight")));
     succeed(folder.path(), &["fit", "--resume", "run"]);
-    for file in ["volume.npz", "movie.npz", "checkpoint.safetensors"] {
-        let read = |run: &Path| std::fs::read(run.join(file)).unwrap();
-        assert!(read(&whole) == read(&run), "{file}");
-    }
+    let same = ["volume.npz", "movie.npz", "checkpoint.safetensors"];
+    are_the_same(folder.path(), ["whole", "run"], &same);
 }
 
 #[cfg(unix)]

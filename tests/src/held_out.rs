@@ -1,7 +1,7 @@
 //! Weights that are chosen by frames that are held out.
 
 use crate::fit::results;
-use crate::support::{fail, sets, succeed};
+use crate::support::{are_the_same, fail, sets, succeed};
 
 const HELD_OUT: &str = "held_out={setting=\"linear.smoothness\",values=[0.0,0.1,30.0],folds=2}";
 
@@ -42,8 +42,7 @@ fn exact_held_out_frames_choose_the_weight() {
         .collect();
     assert!(losses[0] > losses[1] && losses[2] > losses[1], "{losses:?}");
     succeed(at, &small("linear.smoothness=0.1", "given"));
-    let volume = |run: &str| std::fs::read(at.join(run).join("volume.npz")).unwrap();
-    assert_eq!(volume("chosen"), volume("given"));
+    are_the_same(at, ["chosen", "given"], &["volume.npz"]);
     let page = std::fs::read_to_string(at.join("chosen/report.html")).unwrap();
     assert!(page.contains("linear.smoothness = 0.1 was chosen from 3 values"));
 }

@@ -1,6 +1,6 @@
 //! Draws around a finished fit.
 
-use crate::support::{fail, json, kill, root, sets, start, succeed, told, until};
+use crate::support::{are_the_same, fail, json, kill, root, sets, start, succeed, told, until};
 use crate::unknown_geometry::{NEAR, of_unknown_view};
 
 /// The built-in flare, few pixels, scans and voxels.
@@ -114,11 +114,8 @@ fn exact_draws_survive_a_kill() {
         kill(child);
     }
     succeed(folder.path(), &["posterior", "killed", "--samples", "4"]);
-    for name in ["sample_0001.npz", "sample_0004.json", "mean.npz", "posterior.json"] {
-        let [whole, killed] = ["run", "killed"]
-            .map(|of| std::fs::read(folder.path().join(of).join("posterior").join(name)).unwrap());
-        assert!(whole == killed, "{name}");
-    }
+    let same = ["sample_0001.npz", "sample_0004.json", "mean.npz", "posterior.json"];
+    are_the_same(folder.path(), ["run/posterior", "killed/posterior"], &same);
 }
 
 const PRIOR: &str =

@@ -1,6 +1,6 @@
 //! Searches for what a fit does not know: killed, they resume where they were, to the same bytes.
 
-use crate::support::{killed, scene_path, sets, succeed, told};
+use crate::support::{are_the_same, killed, scene_path, sets, succeed, told};
 use crate::unknown_geometry::{NEAR, of_unknown_view};
 use std::path::Path;
 
@@ -30,11 +30,7 @@ fn resumes_to_the_same_bytes(at: &Path, words: &[&str], results: usize, names: &
     succeed(at, &[words, &["-o", "whole"]].concat());
     let said = killed_and_resumed(at, words, results);
     assert!(said.contains("an interrupted search is resumed"), "{said}");
-    for name in names {
-        let [whole, killed] =
-            ["whole", "killed"].map(|run| std::fs::read(at.join(run).join(name)).unwrap());
-        assert!(whole == killed, "{name}");
-    }
+    are_the_same(at, ["whole", "killed"], names);
 }
 
 #[test]

@@ -2,7 +2,9 @@
 //! parent.
 
 use crate::fit::{small, with};
-use crate::support::{binary, holds, kerrlight, message, scene_path, sets, start, succeed, until};
+use crate::support::{
+    are_the_same, binary, holds, kerrlight, message, scene_path, sets, start, succeed, until,
+};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -46,10 +48,8 @@ fn exact_fits_that_are_stopped_end_in_the_same_bytes() {
         assert!(run.join("checkpoint.safetensors").is_file());
         let resumed = format!("./{name}");
         succeed(folder.path(), &["fit", "--resume", &resumed]);
-        for file in ["volume.npz", "movie.npz", "checkpoint.safetensors"] {
-            let read = |run: &Path| std::fs::read(run.join(file)).unwrap();
-            assert!(read(&run) == read(&folder.path().join("whole")), "{name}: {file}");
-        }
+        let same = ["volume.npz", "movie.npz", "checkpoint.safetensors"];
+        are_the_same(folder.path(), ["whole", name], &same);
     }
 }
 

@@ -174,6 +174,24 @@ pub fn until(what: &str, mut is_so: impl FnMut() -> bool) {
     }
 }
 
+/// Names in a folder, sorted; temporary files would show.
+pub fn files(folder: &Path) -> Vec<String> {
+    let entries =
+        std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry"));
+    let names = entries.map(|entry| entry.file_name().into_string().expect("text"));
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    names
+}
+
+/// Asserts that two folders have the same bytes in files of these names.
+pub fn are_the_same(at: &Path, [one, other]: [&str; 2], names: &[&str]) {
+    for name in names {
+        let [a, b] = [one, other].map(|of| std::fs::read(at.join(of).join(name)).expect(name));
+        assert!(a == b, "{name} of {one} and {other}");
+    }
+}
+
 /// Returns whether a file is there and has a text.
 pub fn holds(path: &Path, text: &str) -> bool {
     std::fs::read_to_string(path).is_ok_and(|all| all.contains(text))
@@ -195,17 +213,11 @@ pub fn killed(folder: &Path, arguments: &[&str], what: &str, is_so: impl FnMut()
 
 /// The message of a run that must fail, leaving `folder` as it was.
 pub fn fail(folder: &Path, arguments: &[&str]) -> String {
-    let list = || {
-        let mut files: Vec<_> =
-            std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name()).collect();
-        files.sort();
-        files
-    };
-    let before = list();
+    let before = files(folder);
     let output = kerrlight(folder, arguments);
     let message = message(&output);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-    assert_eq!(list(), before, "{arguments:?} left files");
+    assert_eq!(files(folder), before, "{arguments:?} left files");
     assert!(output.stdout.is_empty(), "{arguments:?}");
     assert!(!message.contains("panicked"), "{message}");
     message
