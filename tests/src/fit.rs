@@ -1,6 +1,6 @@
 //! `kerrlight fit`, from settings to a report.
 
-use crate::support::{are_the_same, fail, json, kill, root, sets, start, succeed};
+use crate::support::{are_the_same, fail, json, kill, render, root, scene, sets, start, succeed};
 use std::path::Path;
 use std::time::Instant;
 
@@ -221,7 +221,7 @@ fn sheared_spot() -> kerrlight_render::scene::Scene {
         "screen.rings=\"regular-grid\"",
         "observer.time=45.0",
     ];
-    crate::support::scene(&text, &changes)
+    scene(&text, &changes)
 }
 
 /// A fit's pixels of a sheared spot on a tilted orbit, with slow light and redshift, are those of the renderer, which
@@ -236,7 +236,7 @@ fn code_pixels_are_those_of_the_renderer() {
         Batch, ForwardModel, Motion, Redshift, Region, Sampling, SightlineRequest, Sightlines,
     };
     let scene = sheared_spot();
-    let seen = kerrlight_render::picture::render(&scene, None, &|_| true).unwrap().picture;
+    let seen = render(&scene);
     let hole = Kerr::new(0.5).unwrap();
     let observer = Observer::at_infinity(Inclination::from_degrees(60.0).unwrap());
     let at = |k: usize| k as f64 - 11.5;

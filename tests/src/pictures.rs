@@ -1,7 +1,8 @@
 //! Pictures: symmetries, signs, and no special rays.
 
-use crate::support::{render, root, scene, scenes};
+use crate::support::{render, rendered, root, scene, scenes};
 use kerrlight_render::image::Picture;
+use kerrlight_render::picture::Rendered;
 
 pub const SMALL: [&str; 3] = ["screen.width=65", "screen.height=65", "screen.samples_per_pixel=1"];
 
@@ -192,9 +193,7 @@ fn exact_image_error_is_met() {
         let reference = render(&sized(&["screen.samples_per_pixel=256", plain]));
         let asked = format!("screen.image_error={error}");
         let scene = sized(&["screen.samples_per_pixel=1", &asked]);
-        let rendered =
-            kerrlight_render::picture::render(&scene, None, &|_| true).expect("a picture");
-        let (picture, summary) = (rendered.picture, rendered.summary);
+        let Rendered { picture, summary } = rendered(&scene);
         assert!(summary.image_error < error, "{name}: {}", summary.image_error);
         let refined = distance(&picture, &reference);
         assert!(refined < summary.image_error, "{name}: {refined} {}", summary.image_error);
@@ -222,9 +221,8 @@ fn exact_stated_error_of_thin_images() {
     let plain = "screen.rings=\"regular-grid\"";
     let reference = render(&sized(&["screen.samples_per_pixel=1024", plain]));
     let refined = sized(&["screen.samples_per_pixel=1", "screen.image_error=0.003"]);
-    let rendered = kerrlight_render::picture::render(&refined, None, &|_| true).expect("a picture");
-    let stated = rendered.summary.image_error;
-    let found = distance(&rendered.picture, &reference);
+    let Rendered { picture, summary } = rendered(&refined);
+    let (stated, found) = (summary.image_error, distance(&picture, &reference));
     assert!(stated < 0.003 && found < 0.6 * stated && found > 0.05 * stated, "{found} {stated}");
 }
 

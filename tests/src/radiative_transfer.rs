@@ -1,8 +1,7 @@
 //! Light that gas sends and absorbs along rays.
 
-use crate::support::{root, scene};
+use crate::support::{render, rendered, root, scene};
 use kerrlight_render::image::Picture;
-use kerrlight_render::picture::{Rendered, render};
 use kerrlight_render::scene::Scene;
 use kerrlight_render::transport::{PreparedScene, RayResult, Scratch};
 
@@ -11,10 +10,6 @@ fn gold(test: u32, overrides: &[&str]) -> Scene {
     // Published fluxes are sums over pixel centres.
     let all = [&["screen.rings=\"regular-grid\""], overrides].concat();
     scene(&std::fs::read_to_string(path).expect("a scene"), &all)
-}
-
-fn rendered(scene: &Scene) -> Rendered {
-    render(scene, None, &|_| true).expect("a picture")
 }
 
 fn sum(picture: &Picture) -> f64 {
@@ -52,7 +47,7 @@ fn paper_fluxes_of_gold_2020() {
 #[test]
 fn code_left_and_right_of_gold_2020() {
     for (test, ratio) in [(3, 1.78), (4, 1.46), (5, 1.46)] {
-        let picture = rendered(&gold(test, &["screen.channels=[\"intensity\"]"])).picture;
+        let picture = render(&gold(test, &["screen.channels=[\"intensity\"]"]));
         let rows = picture.channel("intensity").expect("intensity").chunks(128);
         let halves = rows.fold([0.0, 0.0], |[left, right], row| {
             let sum = |half: &[f32]| half.iter().map(|x| f64::from(*x)).sum::<f64>();
@@ -69,7 +64,7 @@ fn code_integrators_agree_on_gas() {
         let small = ["screen.width=24", "screen.height=24", "tracer.tolerance=1e-7"];
         let picture = |integrator: &str| {
             let name = format!("tracer.integrator=\"{integrator}\"");
-            rendered(&gold(test, &[&small[..], &[&name]].concat())).picture
+            render(&gold(test, &[&small[..], &[&name]].concat()))
         };
         let (fast, slow) = (picture("elliptic"), picture("taylor-mino"));
         // Mean redshifts count by the light that has them; nodes lie elsewhere, so that the
@@ -187,8 +182,8 @@ fn exact_demagnification_of_further_images() {
 fn exact_disc_without_lensing() {
     let changes = ["effects.lensing=false", "screen.width=33", "screen.height=33"];
     let picture =
-        rendered(&scene(FACE_ON, &[&changes[..], &["screen.samples_per_pixel=1"]].concat()));
-    let radius = picture.picture.channel("radius").unwrap();
+        render(&scene(FACE_ON, &[&changes[..], &["screen.samples_per_pixel=1"]].concat()));
+    let radius = picture.channel("radius").unwrap();
     let size = 26.0 / 33.0;
     for (k, r) in radius.iter().enumerate() {
         let (x, y) = ((k % 33) as f64 - 16.0, (k / 33) as f64 - 16.0);
@@ -196,7 +191,7 @@ fn exact_disc_without_lensing() {
         let expected = if b > 6.0 { b } else { 0.0 };
         assert!((f64::from(*r) - expected).abs() < 1e-5, "b = {b}: {r}");
     }
-    assert!(sum(&picture.picture) > 0.0);
+    assert!(sum(&picture) > 0.0);
 }
 
 /// Tiles of any size and any number of rays requested at once give the same, bit for bit.
@@ -245,7 +240,7 @@ fn exact_degree_of_polarisation() {
             // Means over photon rings mix directions.
             let single = ["screen.samples_per_pixel=1", "screen.rings=\"regular-grid\""];
             let size = ["screen.width=24", "screen.height=24", &name];
-            let picture = rendered(&scene(&text, &[FIELD, &size, &single].concat())).picture;
+            let picture = render(&scene(&text, &[FIELD, &size, &single].concat()));
             let [i, q, u] = ["intensity", "Q", "U"].map(|name| picture.channel(name).unwrap());
             let mut lit = 0;
             for k in (0..i.len()).filter(|k| i[*k] > 0.0) {
@@ -296,7 +291,7 @@ fn code_polarised_gas() {
     let picture = |integrator: &str, inclination: &str| {
         let name = format!("tracer.integrator=\"{integrator}\"");
         let small = ["screen.width=16", "screen.height=16", &name, inclination];
-        rendered(&gold(3, &[FIELD, &small].concat())).picture
+        render(&gold(3, &[FIELD, &small].concat()))
     };
     let inclined = "observer.inclination_deg=60";
     let (fast, slow) = (picture("elliptic", inclined), picture("taylor-mino", inclined));

@@ -1,7 +1,7 @@
 //! Photon rings of pictures: resolved, at the cost that the requested error asks for.
 
 use crate::pictures::{SMALL, distance, file, small};
-use crate::support::{render, scene};
+use crate::support::{render, rendered, scene};
 use kerrlight_geodesic::analytic::CriticalCurve;
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use kerrlight_render::image::Picture;
@@ -90,8 +90,7 @@ fn exact_rings_do_not_depend_on_tiles_or_batches() {
     let frames = film.frames(&times, &|_| true).unwrap();
     for (frame, time) in frames.into_iter().zip(times) {
         scene.observer.time = time;
-        let single = kerrlight_render::picture::render(&scene, None, &|_| true).unwrap().picture;
-        assert_eq!(film.rendered(frame, 1.0).unwrap().picture, single, "{time}");
+        assert_eq!(film.rendered(frame, 1.0).unwrap().picture, render(&scene), "{time}");
     }
     assert!(whole.channel("intensity").unwrap().iter().any(|light| *light > 0.0));
 }
@@ -108,8 +107,7 @@ fn exact_rings_of_small_pictures() {
                 format!("screen.samples_per_pixel={samples}"),
                 format!("screen.rings=\"{rings}\""),
             ];
-            let scene = scene(&text, &more.each_ref().map(String::as_str));
-            kerrlight_render::picture::render(&scene, None, &|_| true).unwrap()
+            rendered(&scene(&text, &more.each_ref().map(String::as_str)))
         };
         let (few, many) = (sized(samples, "resolved"), sized(1024, "regular-grid"));
         let grid = width * height * samples;
@@ -130,10 +128,7 @@ fn exact_error_of_an_annulus_between_rays() {
         tracer = { integrator = \"elliptic\", tolerance = 1e-8 }
         disc = { inner_edge = 10.0, outer_edge = 10.02, peak_intensity = 1.0, opaque = false }";
     for inclination in ["observer.inclination_deg=80.0", "observer.inclination_deg=17.0"] {
-        let of = |more: &[&str]| {
-            let scene = scene(text, &[&[inclination], more].concat());
-            kerrlight_render::picture::render(&scene, None, &|_| true).unwrap().summary
-        };
+        let of = |more: &[&str]| rendered(&scene(text, &[&[inclination], more].concat())).summary;
         let grid = "screen.rings=\"regular-grid\"";
         let truth = of(&[grid, "screen.samples_per_pixel=1024"]).flux;
         for more in [&[grid][..], &[], &["screen.image_error=0.1"]] {
@@ -164,8 +159,7 @@ fn exact_rings_follow_the_requested_error() {
             "screen.image_error=0.1",
             &rings,
         ];
-        let scene = scene(&file("disc_face_on.toml"), &more);
-        kerrlight_render::picture::render(&scene, None, &|_| true).unwrap().summary.rays
+        rendered(&scene(&file("disc_face_on.toml"), &more)).summary.rays
     };
     let (resolved, grid) = (rays("resolved"), rays("regular-grid"));
     assert!(resolved < 2 * grid, "{resolved} {grid}");

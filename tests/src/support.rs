@@ -1,6 +1,7 @@
 //! Helpers that several tests need.
 
 use kerrlight_render::image::Picture;
+use kerrlight_render::picture::Rendered;
 use kerrlight_render::scene::{Scene, apply_override};
 use kerrlight_render::volume::VolumeArrays;
 use serde_json::Value;
@@ -132,8 +133,13 @@ pub fn scene(text: &str, overrides: &[&str]) -> Scene {
     Scene::parse(&text).unwrap_or_else(|e| panic!("{overrides:?}: {e}"))
 }
 
-/// Renders a scene whose files, if any, lie in the folder of scenes.
+/// The picture of a scene whose files, if any, lie in the folder of scenes.
 pub fn render(scene: &Scene) -> Picture {
+    rendered(scene).picture
+}
+
+/// The same with what is known of it.
+pub fn rendered(scene: &Scene) -> Rendered {
     use kerrlight_render::emission::mesh::MeshFile;
     use kerrlight_render::emission::sky::{Catalogue, Panorama};
     use kerrlight_render::scene::Sky;
@@ -155,7 +161,6 @@ pub fn render(scene: &Scene) -> Picture {
         scene.volume.iter().map(|one| volume(&read(&one.path)).expect("a volume")).collect();
     kerrlight_render::picture::render(scene, Assets { sky, stars, meshes, volumes }, &|_| true)
         .expect("a picture")
-        .picture
 }
 
 /// Starts the binary in `folder`.
