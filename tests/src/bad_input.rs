@@ -1,6 +1,6 @@
 //! Bad input gets one clear message, exit code 2, and nothing written.
 
-use crate::support::{fail, kerrlight, message, root, sets, succeed, told};
+use crate::support::{fail, folder_with, kerrlight, message, root, sets, succeed, told};
 
 #[test]
 fn files_that_cannot_be_read() {
@@ -86,10 +86,9 @@ fn pictures_that_mean_nothing() {
 
 #[test]
 fn skies_that_are_no_pictures() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
     let good = std::fs::read_to_string(root().join("scenes/sky_image.toml")).unwrap();
-    std::fs::write(path.join("scene.toml"), good).unwrap();
+    let folder = folder_with("scene.toml", good);
+    let path = folder.path();
     let message = fail(path, &["render", "scene.toml"]);
     assert!(message.contains("sky.image.path") && message.contains("graticule.png"), "{message}");
     std::fs::write(path.join("graticule.png"), b"\x89PNG\r\n\x1a\n garbage").unwrap();
@@ -190,9 +189,8 @@ fn tables_of_rays_that_are_none() {
 /// Nothing that is read is written over.
 #[test]
 fn outputs_spare_inputs() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder_with("rays.csv", "spin,inclination_deg,alpha,beta\n0.5,60,1,2\n");
     let path = folder.path();
-    std::fs::write(path.join("rays.csv"), "spin,inclination_deg,alpha,beta\n0.5,60,1,2\n").unwrap();
     let message = fail(path, &["trace", "--rays", "rays.csv", "-o", "rays.csv"]);
     assert!(message.contains("rays.csv is an input"), "{message}");
     for name in ["sky_image.toml", "graticule.png"] {
@@ -231,9 +229,8 @@ fn pictures_that_cannot_be() {
 /// Volumes that are none: the key, the file, the array and what is wrong with it.
 #[test]
 fn volumes_that_are_none() {
-    let folder = tempfile::tempdir().unwrap();
     let text = std::fs::read_to_string(root().join("scenes/volume.toml")).unwrap();
-    std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+    let folder = folder_with("scene.toml", text);
     let text = fail(folder.path(), &["render", "scene.toml"]);
     assert!(text.contains("`volume.0.path`") && text.contains("volume.npz"), "{text}");
     std::fs::write(folder.path().join("volume.npz"), b"no archive").unwrap();
@@ -269,9 +266,8 @@ fn files_that_have_changed_are_told() {
 /// Spheres so large that rounding of the radius makes the density rough: it used to halve parts without end.
 #[test]
 fn samples_within_huge_spheres_end() {
-    let folder = tempfile::tempdir().unwrap();
     let rays = "spin,inclination_deg,alpha,beta\n0.5,60,3,2\n0.9,30,-4,1\n";
-    std::fs::write(folder.path().join("rays.csv"), rays).unwrap();
+    let folder = folder_with("rays.csv", rays);
     for radius in ["1e6", "1e9"] {
         let words = ["trace", "--rays", "rays.csv", "--samples", "3", "--within", radius];
         let table = succeed(folder.path(), &words);

@@ -1,7 +1,7 @@
 //! Fits of emission that changes while matter carries it.
 
 use crate::fit::results;
-use crate::support::{fail, json, root, sets, succeed};
+use crate::support::{fail, folder_with, json, root, sets, succeed};
 use serde_json::Value;
 use std::path::Path;
 
@@ -168,8 +168,7 @@ fn exact_hard_motion_is_recognised_as_wrong() {
 
 #[test]
 fn exact_what_cannot_change_is_refused_before_anything_is_written() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
+    let folder = folder_with("fit.toml", settings());
     for (change, expected) in [
         ("change.weight=-1.0", "change.weight = -1"),
         ("change.spacing=0.0", "change.spacing = 0"),

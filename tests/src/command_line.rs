@@ -1,6 +1,6 @@
 //! The binary as a user runs it.
 
-use crate::support::{done, message, scene_path, succeed};
+use crate::support::{done, folder_with, message, scene_path, succeed};
 use kerrlight_render::image::exr;
 
 const SIZE: [&str; 4] = ["--set", "screen.width=48", "--set", "screen.height=40"];
@@ -61,10 +61,9 @@ fn inspect_shows_channels_and_settings() {
 
 #[test]
 fn trace_reads_columns_in_any_order() {
-    let folder = tempfile::tempdir().unwrap();
     let table =
         "# rays\nbeta,note,inclination_deg,alpha,spin\n1.0,x,60,-6,0.9\n# more\n0.5,y,90,0,0\n";
-    std::fs::write(folder.path().join("rays.csv"), table).unwrap();
+    let folder = folder_with("rays.csv", table);
     let text = succeed(folder.path(), &["trace", "--rays", "rays.csv", "--crossings", "1"]);
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(
@@ -83,9 +82,8 @@ fn trace_reads_columns_in_any_order() {
 
 #[test]
 fn npz_holds_an_array_a_column() {
-    let folder = tempfile::tempdir().unwrap();
     let table = "spin,inclination_deg,alpha,beta\n0.9,60,-6,1\n-0.5,30,2,8\n";
-    std::fs::write(folder.path().join("rays.csv"), table).unwrap();
+    let folder = folder_with("rays.csv", table);
     let arguments = ["trace", "--rays", "rays.csv", "--samples", "5", "-o", "out.npz"];
     succeed(folder.path(), &arguments);
     let bytes = std::fs::read(folder.path().join("out.npz")).unwrap();

@@ -3,7 +3,9 @@
 
 use crate::eht_data;
 use crate::fit::results;
-use crate::support::{fail, kerrlight, message, root, scene_path, sets, succeed, told};
+use crate::support::{
+    fail, folder_with, kerrlight, message, root, scene_path, sets, succeed, told,
+};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::array::built_in;
 use kerrlight_vlbi::earth::{Frame, SourcePosition, Ut1};
@@ -326,9 +328,8 @@ fn messages_tell_values() {
 /// Nights go over midnight.
 #[test]
 fn exact_flags_over_midnight() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder_with("data.uvfits", files::write_uvfits(&measured()).unwrap());
     let path = folder.path();
-    std::fs::write(path.join("data.uvfits"), files::write_uvfits(&measured()).unwrap()).unwrap();
     let convert =
         |interval: &'static str| ["convert", "data.uvfits", "a.csv", "--flag-utc", interval];
     let all = measured().rows.len();

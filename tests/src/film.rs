@@ -1,6 +1,6 @@
 //! Films: frames that are those of `render`, that are kept, and that do not flicker.
 
-use crate::support::{fail, object, sets, succeed, told};
+use crate::support::{fail, folder_with, object, sets, succeed, told};
 use kerrlight_render::Error;
 use kerrlight_render::image::exr;
 use kerrlight_render::scene::Scene;
@@ -72,9 +72,7 @@ const MOVIE: [&str; 8] =
     ["movie", "spot.toml", "--frames", "3", "--duration", "60min", "-o", "film"];
 
 fn folder() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("spot.toml"), SPOT).unwrap();
-    folder
+    folder_with("spot.toml", SPOT)
 }
 
 fn frame(folder: &Path, k: usize) -> Vec<u8> {
@@ -94,8 +92,7 @@ outer_radius = 20.0
 /// Rendered one by one from what the frames' files say, they are the same, bit for bit, and so is
 /// what is said about them, but for what only frames have.
 fn frames_are_renderings(text: &str, overrides: &[&str]) {
-    let folder = folder();
-    std::fs::write(folder.path().join("spot.toml"), text).unwrap();
+    let folder = folder_with("spot.toml", text);
     succeed(folder.path(), &[&MOVIE[..], &sets(overrides)].concat());
     let mut lights = Vec::new();
     for k in 0..3 {

@@ -1,7 +1,7 @@
 //! `kerrlight fit --data FILE`: settings that are guessed from a file, with every guess told.
 
 use crate::eht_data;
-use crate::support::{fail, sets, succeed, told};
+use crate::support::{fail, folder_with, sets, succeed, told};
 use std::path::Path;
 
 const SEEN: &str = "observe image.csv --fov-uas 100 --array EHT2017 --mjd 57850 --utc 5-7 --frames 6 --tint 60 --noise thermal --seed 1";
@@ -17,9 +17,8 @@ fn said(folder: &Path, words: &[&str], run: &str) -> (String, String) {
 /// Of a known source everything is guessed and told; of another one what cannot be guessed is asked for, all at once.
 #[test]
 fn exact_visibilities_are_fitted_at_once() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder_with("image.csv", "0.1,0.2,0.1\n".repeat(3));
     let path = folder.path();
-    std::fs::write(path.join("image.csv"), "0.1,0.2,0.1\n".repeat(3)).unwrap();
     for (source, data) in [("m87", "a.uvfits"), ("12.5,12.4", "b.uvfits")] {
         let words: Vec<&str> = SEEN.split(' ').chain(["--source", source, "-o", data]).collect();
         succeed(path, &words);

@@ -1,7 +1,7 @@
 //! Starts of a fit (`--init`), and its results for other verbs: a scene, and a movie that telescopes see.
 
 use crate::fit::results;
-use crate::support::{fail, scene_path, sets, succeed};
+use crate::support::{fail, folder_with, scene_path, sets, succeed};
 use kerrlight_render::image::exr;
 use std::path::Path;
 
@@ -128,10 +128,8 @@ const SEEN: &str = "observe image.csv --fov-uas 100 --array EHT2017 --mjd 57850 
 /// Data of a source that is known here are fitted at once; of another one when the user has filled in what is missing.
 #[test]
 fn exact_starters_of_visibilities_run() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder_with("image.csv", "0.1,0.2,0.1\n".repeat(3));
     let path = folder.path();
-    let row = "0.1,0.2,0.1\n".repeat(3);
-    std::fs::write(path.join("image.csv"), row).unwrap();
     let few = ["--set", "training.steps=2", "--set", "screen.pixels=8", "--set", "output.nodes=8"];
     for (source, name) in [("sgra", "a"), ("12.5,12.4", "b")] {
         let (data, toml) = (format!("{name}.uvfits"), format!("{name}.toml"));

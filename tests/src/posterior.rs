@@ -1,6 +1,8 @@
 //! Draws around a finished fit.
 
-use crate::support::{are_the_same, fail, json, kill, root, sets, start, succeed, told, until};
+use crate::support::{
+    are_the_same, fail, folder_with, json, kill, root, sets, start, succeed, told, until,
+};
 use crate::unknown_geometry::{NEAR, of_unknown_view};
 
 /// The built-in flare, few pixels, scans and voxels.
@@ -21,8 +23,7 @@ const VOXELS: [&str; 4] =
 
 #[test]
 fn exact_draws_of_voxels_resume_to_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
+    let folder = folder_with("fit.toml", settings());
     succeed(folder.path(), &[&["fit", "fit.toml", "-o", "run"][..], &VOXELS].concat());
     succeed(folder.path(), &["posterior", "run", "--samples", "4"]);
     let of = |name: &str| std::fs::read(folder.path().join("run/posterior").join(name)).unwrap();
@@ -101,8 +102,7 @@ fn exact_draws_of_a_right_model_predict_the_data() {
 /// A killed call leaves whole draws, and the next one the bytes of a call that was not.
 #[test]
 fn exact_draws_survive_a_kill() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
+    let folder = folder_with("fit.toml", settings());
     for name in ["run", "killed"] {
         succeed(folder.path(), &[&["fit", "fit.toml", "-o", name][..], &VOXELS].concat());
     }
@@ -132,8 +132,7 @@ fn exact_draws_with_a_prior_resume_to_the_same_bytes() {
 }
 
 fn same_again(prior: &str) {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
+    let folder = folder_with("fit.toml", settings());
     let kind = sets(&["representation=linear-grid", "representation.linear-grid.nodes=14", prior]);
     let words = [&["fit", "fit.toml", "-o", "run", "--samples", "3"], &kind[..]].concat();
     succeed(folder.path(), &words);
@@ -158,8 +157,7 @@ fn same_again(prior: &str) {
 
 #[test]
 fn exact_priors_that_mean_nothing_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
+    let folder = folder_with("fit.toml", settings());
     for (change, expected) in [
         ("linear.prior={kind=\"gaussian\",mean=0.1}", "missing field `amplitude`"),
         ("linear.prior={mean=0.1,amplitude=0.2,correlation_length=2.0}", "missing field `kind`"),
@@ -211,10 +209,8 @@ fn exact_priors_that_mean_nothing_are_refused() {
 #[test]
 #[ignore = "long"]
 fn exact_draws_of_an_unknown_geometry_have_geometries() {
-    let folder = tempfile::tempdir().unwrap();
     let view = "{ trials = 60, nodes = 16, iterations = 40, pixels = 20, frames = 12 }";
-    let text = of_unknown_view(&settings(), NEAR, 1, view);
-    std::fs::write(folder.path().join("fit.toml"), text).unwrap();
+    let folder = folder_with("fit.toml", of_unknown_view(&settings(), NEAR, 1, view));
     let words = [&["fit", "fit.toml", "-o", "run", "--samples", "3"][..], &VOXELS].concat();
     let said = told(folder.path(), &words);
     assert!(said.contains("inclination_deg = "), "{said}");
@@ -240,14 +236,13 @@ fn exact_draws_of_an_unknown_geometry_have_geometries() {
 
 #[test]
 fn exact_draws_without_a_finished_fit_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder_with("fit.toml", settings());
     let refused = |arguments: &[&str], expected: &str| {
         let said = fail(folder.path(), arguments);
         assert!(said.contains(expected), "{arguments:?}: {said}");
     };
     refused(&["posterior", "nowhere", "--samples", "4"], "nowhere");
     refused(&["posterior", "nowhere", "--samples", "1"], "2..=100000");
-    std::fs::write(folder.path().join("fit.toml"), settings()).unwrap();
     for (change, expected) in [
         ("screen.ring_rays=0", "screen.ring_rays = 0 is not allowed: 1 to 1024"),
         ("linear.degree=quartic", "unknown variant `quartic`, expected"),

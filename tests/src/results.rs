@@ -1,7 +1,7 @@
 //! Output of verbs at their end: two lines for a person, one JSON object for a script, or a file with `-o -`; and the
 //! command line's own help.
 
-use crate::support::{done, fail, message, object, root, scene_path, sets, succeed};
+use crate::support::{done, fail, folder_with, message, object, root, scene_path, sets, succeed};
 use kerrlight_render::image::exr;
 use serde_json::json;
 
@@ -9,9 +9,7 @@ const SIZE: [&str; 4] = ["--set", "screen.width=48", "--set", "screen.height=40"
 const RAYS: &str = "spin,inclination_deg,alpha,beta\n0.9,60,-6,1\n0,90,0.5,0\n";
 
 fn rays() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("rays.csv"), RAYS).unwrap();
-    folder
+    folder_with("rays.csv", RAYS)
 }
 
 #[test]

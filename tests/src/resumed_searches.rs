@@ -1,6 +1,7 @@
 //! Searches for what a fit does not know: killed, they resume where they were, to the same bytes.
 
-use crate::support::{are_the_same, killed, scene_path, sets, succeed, told};
+use crate::posterior::settings;
+use crate::support::{are_the_same, folder_with, killed, scene_path, sets, succeed, told};
 use crate::unknown_geometry::{NEAR, of_unknown_view};
 use std::path::Path;
 
@@ -35,18 +36,14 @@ fn resumes_to_the_same_bytes(at: &Path, words: &[&str], results: usize, names: &
 
 #[test]
 fn exact_a_killed_search_for_a_geometry_resumes_to_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
     let view = "{ trials = 30, nodes = 12, iterations = 20, pixels = 12, frames = 8 }";
-    let text = of_unknown_view(&crate::posterior::settings(), NEAR, 2, view);
-    std::fs::write(at.join("fit.toml"), text).unwrap();
-    resumes_to_the_same_bytes(at, &VOXELS, 45, &["geometry.json", "volume.npz"]);
+    let folder = folder_with("fit.toml", of_unknown_view(&settings(), NEAR, 2, view));
+    resumes_to_the_same_bytes(folder.path(), &VOXELS, 45, &["geometry.json", "volume.npz"]);
 }
 
 #[test]
 fn exact_a_killed_weighing_of_bands_resumes_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
     let scene = scene_path("fits/orbital_polarimetry.toml");
     let settings = sets(&[
         "band.radii={from=8.0,to=12.0,step=2.0}",
@@ -61,15 +58,13 @@ fn exact_a_killed_weighing_of_bands_resumes_to_the_same_bytes() {
         "output.nodes=16",
     ]);
     let words = [&["fit", &scene], &settings[..]].concat();
-    resumes_to_the_same_bytes(at, &words, 2, &["band.json"]);
+    resumes_to_the_same_bytes(folder.path(), &words, 2, &["band.json"]);
 }
 
 #[test]
 fn exact_killed_comparisons_of_weights_resume_to_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    std::fs::write(at.join("fit.toml"), crate::posterior::settings()).unwrap();
+    let folder = folder_with("fit.toml", settings());
     let held_out = "held_out={setting=\"linear.smoothness\",values=[1e-4,1e-2,1.0],folds=3}";
     let words = [&VOXELS[..], &["--set", held_out]].concat();
-    resumes_to_the_same_bytes(at, &words, 4, &["held_out.json", "volume.npz"]);
+    resumes_to_the_same_bytes(folder.path(), &words, 4, &["held_out.json", "volume.npz"]);
 }

@@ -1,7 +1,7 @@
 //! `kerrlight fit` with station gains that are not known.
 
 use crate::fit::results;
-use crate::support::{fail, sets, succeed};
+use crate::support::{fail, folder_with, sets, succeed};
 use kerrlight_render::volume::VolumeArrays;
 
 /// Gains of 15 %, of 60 % at the LMT, and random phases, all of them new in every scan.
@@ -70,15 +70,13 @@ fn exact_closures_and_free_gains_agree() {
 /// Gains that are taken out leave data that a fit without gains explains.
 #[test]
 fn exact_gains_of_a_table_calibrate_data() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     let seen = "time_utc_h,t1,t2,u,v,re,im,sigma\n1.0,AA,LM,1e9,2e9,0.4,0.2,0.01\n1.0,AA,PV,3e9,2e9,0.4,0.2,0.01\n";
-    std::fs::write(folder.path().join("in.csv"), seen).unwrap();
+    let folder = folder_with("in.csv", seen);
     let gains =
         "time_utc_h,span_s,station,amplitude,phase_deg\n1.0,10,AA,2.0,90.0\n1.0,10,LM,1.0,0.0\n";
     std::fs::write(folder.path().join("gains.csv"), gains).unwrap();
     succeed(folder.path(), &["convert", "in.csv", "out.csv", "--gains", "gains.csv"]);
-    let rows = out("out.csv");
+    let rows = std::fs::read_to_string(folder.path().join("out.csv")).unwrap();
     let row: Vec<f64> =
         rows.lines().nth(1).unwrap().split(',').skip(3).map(|x| x.parse().unwrap()).collect();
     // (0.4 + 0.2i)/2i, with half the error.

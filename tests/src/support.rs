@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
+use tempfile::TempDir;
 
 /// The root of the workspace.
 pub fn root() -> PathBuf {
@@ -177,6 +178,13 @@ pub fn until(what: &str, mut is_so: impl FnMut() -> bool) {
         assert!(clock.elapsed() < Duration::from_secs(240), "{what}");
         std::thread::sleep(Duration::from_millis(3));
     }
+}
+
+/// A new folder with one file.
+pub fn folder_with(name: &str, contents: impl AsRef<[u8]>) -> TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join(name), contents).expect("a file");
+    folder
 }
 
 /// Names in a folder, sorted; temporary files would show.

@@ -1,6 +1,6 @@
 //! Limits of the system: threads, a closed standard output; and what is left behind by kills.
 
-use crate::support::{after, message, scene_path, succeed};
+use crate::support::{after, folder_with, message, scene_path, succeed};
 use std::fs;
 
 const CURVE: [&str; 7] =
@@ -31,9 +31,7 @@ fn regress_no_more_threads_is_an_error_that_says_what_to_do() {
 #[cfg(unix)]
 #[test]
 fn exact_what_cannot_be_printed_is_an_error() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("r.csv"), "spin,inclination_deg,alpha,beta\n0.5,60,1,2\n")
-        .unwrap();
+    let folder = folder_with("r.csv", "spin,inclination_deg,alpha,beta\n0.5,60,1,2\n");
     let uv = ["uv", "ngEHT", "--source", "m87", "--mjd", "57850", "--frames", "2"];
     let uv = [&uv[..], &["--tint", "60", "--utc", "2-4"]].concat();
     let to_pipe = [&CURVE[..], &["-o", "-"]].concat();

@@ -1,7 +1,7 @@
 //! Fits that do not know the geometry.
 
 use crate::fit::killed_fit;
-use crate::support::{fail, json, root, sets, succeed, told};
+use crate::support::{fail, folder_with, json, root, sets, succeed, told};
 
 /// The built-in flare seen by the ngEHT, few pixels and scans, from another inclination and orientation than its
 /// settings say.
@@ -43,8 +43,7 @@ pub fn of_unknown_view(
 #[test]
 #[ignore = "long"]
 fn exact_inclination_and_position_angle_are_found_from_visibilities() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("fit.toml"), settings(300)).unwrap();
+    let folder = folder_with("fit.toml", settings(300));
     let said = told(folder.path(), &["fit", "fit.toml", "-o", "run"]);
     assert!(said.contains("inclination_deg = "), "{said}");
     let geometry = json(&folder.path().join("run/geometry.json"));
@@ -67,8 +66,7 @@ fn exact_inclination_and_position_angle_are_found_from_visibilities() {
 #[test]
 #[ignore = "long"]
 fn exact_a_search_without_phases_claims_no_more_than_it_has_found() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("fit.toml"), settings(60)).unwrap();
+    let folder = folder_with("fit.toml", settings(60));
     let settings = sets(&[
         "loss=[{data=\"amplitudes\",weight=1.0},{data=\"closure-phases\",weight=1.0}]",
         "simulation.observation.gains={constant_amplitude=0.0,scan_amplitude=0.0,random_phases=true}",
@@ -182,17 +180,14 @@ fn exact_geometry_of_a_movie_with_one_ray_a_pixel_is_found() {
 #[test]
 #[ignore = "long"]
 fn exact_same_bytes_after_kills_of_an_unknown_geometry() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("fit.toml");
-    std::fs::write(&file, settings(12)).unwrap();
-    let words = vec!["fit".to_owned(), file.to_str().unwrap().to_owned()];
-    killed_fit(&words, &["training.steps=400"], 8);
+    let folder = folder_with("fit.toml", settings(12));
+    let file = folder.path().join("fit.toml").display().to_string();
+    killed_fit(&["fit".to_owned(), file], &["training.steps=400"], 8);
 }
 
 #[test]
 fn exact_impossible_priors_are_refused_before_anything_is_written() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("fit.toml"), settings(50)).unwrap();
+    let folder = folder_with("fit.toml", settings(50));
     for (change, expected) in [
         ("observer.inclination_deg={uniform=[50.0,20.0]}", "high = 20 is not allowed: above low"),
         ("hole.spin={uniform=[0.0,1.5]}", "hole.spin.uniform.1 = 1.5 is not allowed: -1 to 1"),

@@ -1,7 +1,7 @@
 //! The page of `kerrlight view`: its files, and what a browser makes of it beside what `render` makes of its scene.
 
 use crate::browser::{Browser, address};
-use crate::support::{after, fail, kill, message, scene_path, sets, start, succeed};
+use crate::support::{after, fail, folder_with, kill, message, scene_path, sets, start, succeed};
 use kerrlight_geodesic::wgsl;
 use kerrlight_geodesic::{
     Camera, Inclination, Kerr, Motion, Observer, Outcome, Quantities, Tracer,
@@ -27,8 +27,7 @@ fn exact_the_page_has_the_tracer_and_loads_nothing() {
 
 #[test]
 fn a_folder_that_is_a_file() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("page"), "no folder").unwrap();
+    let folder = folder_with("page", "no folder");
     let told = fail(folder.path(), &["view", "--web", "page"]);
     assert!(told.contains("cannot make the folder page"), "{told}");
 }
