@@ -1,6 +1,7 @@
 //! Memory is estimated before it is taken: numbers of users and of headers that cannot be meant end in a message that says
 //! what would be needed and what there is, never in a signal.
 
+use crate::file_fields::npy;
 use crate::support::{are_the_same, fail, scene_path, sets, succeed};
 use std::io::Write;
 use std::path::Path;
@@ -11,10 +12,7 @@ fn bomb(path: &Path, name: &str, shape: [usize; 3]) {
     let options = zip::write::SimpleFileOptions::default();
     archive.start_file(name, options).unwrap();
     let [a, b, c] = shape;
-    let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({a}, {b}, {c}), }}");
-    let header = format!("{header:<117}\n");
-    archive.write_all(b"\x93NUMPY\x01\x00\x76\x00").unwrap();
-    archive.write_all(header.as_bytes()).unwrap();
+    archive.write_all(&npy("'<f4'", "False", &format!("({a}, {b}, {c})"), &[])).unwrap();
     let zeros = vec![0; 4 << 20];
     let mut left = 4 * a * b * c;
     while left > 0 {

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 
 /// An array of numpy's format 1.0.
-fn npy(kind: &str, order: &str, shape: &str, bytes: &[u8]) -> Vec<u8> {
+pub fn npy(kind: &str, order: &str, shape: &str, bytes: &[u8]) -> Vec<u8> {
     let header = format!("{{'descr': {kind}, 'fortran_order': {order}, 'shape': {shape}, }}");
     let header = format!("{header:<117}\n");
     [b"\x93NUMPY\x01\x00\x76\x00", header.as_bytes(), bytes].concat()

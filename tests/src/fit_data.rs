@@ -1,12 +1,20 @@
 //! `kerrlight fit --data FILE`: settings that are guessed from a file, with every guess told.
 
 use crate::eht_data;
-use crate::support::{fail, folder_with, sets, succeed, told};
+use crate::support::{fail, sets, succeed, told};
 use std::path::Path;
 
 const SEEN: &str = "observe image.csv --fov-uas 100 --array EHT2017 --mjd 57850 --utc 5-7 --frames 6 --tint 60 --noise thermal --seed 1";
-const FEW: [&str; 6] =
+/// Settings of a fit that takes a moment.
+pub const FEW: [&str; 6] =
     ["--set", "training.steps=2", "--set", "screen.pixels=8", "--set", "output.nodes=8"];
+
+/// Writes what an array sees of an image of nine pixels that lies there in the sky.
+pub fn observed(at: &Path, source: &str, data: &str) {
+    std::fs::write(at.join("image.csv"), "0.1,0.2,0.1\n".repeat(3)).unwrap();
+    let words: Vec<&str> = SEEN.split(' ').chain(["--source", source, "-o", data]).collect();
+    succeed(at, &words);
+}
 
 /// Returns the messages of a fit of data, with the settings in the run's folder.
 fn said(folder: &Path, words: &[&str], run: &str) -> (String, String) {
@@ -17,12 +25,10 @@ fn said(folder: &Path, words: &[&str], run: &str) -> (String, String) {
 /// Of a known source everything is guessed and told; of another one what cannot be guessed is asked for, all at once.
 #[test]
 fn exact_visibilities_are_fitted_at_once() {
-    let folder = folder_with("image.csv", "0.1,0.2,0.1\n".repeat(3));
+    let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    for (source, data) in [("m87", "a.uvfits"), ("12.5,12.4", "b.uvfits")] {
-        let words: Vec<&str> = SEEN.split(' ').chain(["--source", source, "-o", data]).collect();
-        succeed(path, &words);
-    }
+    observed(path, "m87", "a.uvfits");
+    observed(path, "12.5,12.4", "b.uvfits");
     let (told, kept) = said(path, &["--data", "a.uvfits", "--model", "volume"], "a");
     for sentence in [
         "read: a.uvfits: M87*, recognised by position or name, MJD 57850",

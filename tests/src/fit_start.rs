@@ -1,7 +1,8 @@
 //! Starts of a fit (`--init`), and its results for other verbs: a scene, and a movie that telescopes see.
 
 use crate::fit::results;
-use crate::support::{fail, folder_with, scene_path, sets, succeed};
+use crate::fit_data::{FEW, observed};
+use crate::support::{fail, scene_path, sets, succeed};
 use kerrlight_render::image::exr;
 use std::path::Path;
 
@@ -123,20 +124,16 @@ fn exact_starter_of_the_built_in_experiment() {
     );
 }
 
-const SEEN: &str = "observe image.csv --fov-uas 100 --array EHT2017 --mjd 57850 --utc 5-7 --frames 6 --tint 60 --noise thermal --seed 1";
-
 /// Data of a source that is known here are fitted at once; of another one when the user has filled in what is missing.
 #[test]
 fn exact_starters_of_visibilities_run() {
-    let folder = folder_with("image.csv", "0.1,0.2,0.1\n".repeat(3));
+    let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    let few = ["--set", "training.steps=2", "--set", "screen.pixels=8", "--set", "output.nodes=8"];
     for (source, name) in [("sgra", "a"), ("12.5,12.4", "b")] {
         let (data, toml) = (format!("{name}.uvfits"), format!("{name}.toml"));
-        let words: Vec<&str> = SEEN.split(' ').chain(["--source", source, "-o", &data]).collect();
-        succeed(path, &words);
+        observed(path, source, &data);
         succeed(path, &["fit", "--init", &data, "--model", "volume", "-o", &toml]);
-        let fit = [&["fit", &toml, "-o", name][..], &few].concat();
+        let fit = [&["fit", &toml, "-o", name][..], &FEW].concat();
         if source == "sgra" {
             succeed(path, &fit);
             continue;
