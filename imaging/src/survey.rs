@@ -2,7 +2,7 @@
 //! allow, and how noise scatters it.
 
 use crate::Error;
-use crate::data;
+use crate::data::{self, cadence, instants};
 use crate::envelope::{Envelope, Profile};
 use crate::found::{Calibration, Candidate, Survey};
 use crate::problem::{FluxPrior, ImageProblem};
@@ -20,7 +20,6 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 
 /// Stage of a survey.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -178,26 +177,14 @@ const GAP: f64 = 1.5;
 /// the fit what it is to predict: scans are held out whole, where there are two of them for each part. So are frames of several files at
 /// one hour of UTC.
 fn parts(times: &[f64], files: &[usize], folds: usize) -> Vec<usize> {
-    let file = |frame: usize| files.get(frame).copied().unwrap_or(0);
-    let mut last: BTreeMap<usize, f64> = BTreeMap::new();
-    // Bands of a night may be seconds apart: the cadence is that within a file.
-    let own = times
-        .iter()
-        .enumerate()
-        .filter_map(|(frame, time)| last.insert(file(frame), *time).map(|before| time - before));
-    let least = own.fold(f64::INFINITY, f64::min);
+    let least = cadence(times, files);
     let mut scans = vec![0; times.len()];
     for (frame, pair) in times.windows(2).enumerate() {
         scans[frame + 1] = scans[frame] + usize::from(pair[1] - pair[0] > GAP * least);
     }
-    let count = scans.last().map_or(0, |last| last + 1);
-    // Without enough scans, frames of several files go by the cadence: bands stay together.
-    let of = |frame: usize| match last.len() {
-        _ if count >= 2 * folds => scans[frame],
-        2.. => ((times[frame] - times[0]) / least) as usize,
-        _ => frame,
-    };
-    (0..times.len()).map(|frame| of(frame) % folds).collect()
+    let is_enough = scans.last().is_some_and(|last| last + 1 >= 2 * folds);
+    let each = if is_enough { scans } else { instants(times, files) };
+    each.into_iter().map(|of| of % folds).collect()
 }
 
 struct Search<'a> {
@@ -427,5 +414,7 @@ mod tests {
         assert_eq!(parts(&both, &bands, 2), [0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 1, 1]);
         let steady = [0.0, 1.0, 10.0, 11.0, 20.0, 21.0];
         assert_eq!(parts(&steady, &bands[..6], 2), [0, 0, 1, 1, 0, 0]);
+        // Files with a frame each have no cadence: every hour is an instant.
+        assert_eq!(parts(&[1.0, 2.0, 2.0, 3.0, 4.0], &[0, 1, 2, 3, 4], 2), [0, 1, 1, 0, 1]);
     }
 }

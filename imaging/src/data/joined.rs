@@ -6,7 +6,8 @@ use kerrlight_tomo::fit::settings::{FitError, refuse};
 use kerrlight_tomo::fit::setup::{FitData, LeakageUnknown};
 use kerrlight_vlbi::gains::GainPriors;
 use kerrlight_vlbi::observation::{Observation, Row};
-use kerrlight_vlbi::polarimetry::SharedLeakage;
+use kerrlight_vlbi::polarimetry::{SharedLeakage, feed_rotation};
+use std::collections::BTreeMap;
 
 /// Degrees within which two positions are one.
 const SAME_DEG: f64 = 0.01;
@@ -33,8 +34,9 @@ pub fn joined(
     for (file, (name, part)) in parts.enumerate() {
         join(&mut all, (&first, &name), part, file + 1)?;
     }
-    check_folds(table, strength, all.times.len())?;
     in_order(&mut all);
+    let instants = instants(&all.times, &all.files).last().map_or(0, |last| last + 1);
+    check_folds(table, strength, instants)?;
     Ok(all)
 }
 
@@ -47,8 +49,17 @@ fn join(all: &mut FitData, names: (&str, &str), part: FitData, file: usize) -> R
     if let Some(why) = contradiction(seen, &other) {
         refuse!("{} and {} cannot be one image: {why}", names.0, names.1);
     }
+    if all.leakage.is_some() && seen.mjd != other.mjd {
+        refuse!(
+            "{} and {} are of two days: leakage is solved for within one, by which the sky turns",
+            names.0,
+            names.1
+        );
+    }
     let (stations, frames) = (seen.stations.len() as u16, all.times.len());
     seen.stations.extend(other.stations.into_iter().map(|mut station| {
+        // Published rotations are looked up by the name that goes.
+        station.feed_rotation = Some(feed_rotation(&station));
         station.name = format!("{} ({})", station.name, file + 1);
         station
     }));
@@ -82,16 +93,40 @@ fn in_order(all: &mut FitData) {
     (*of_rows, seen.rows) = rows.into_iter().unzip();
 }
 
-/// Refuses more parts than half of the frames.
+/// Least distance of two frames of one file, hours; infinite where each has one.
+pub fn cadence(times: &[f64], files: &[usize]) -> f64 {
+    let mut last: BTreeMap<usize, f64> = BTreeMap::new();
+    let apart = times.iter().enumerate().filter_map(|(frame, time)| {
+        let file = files.get(frame).copied().unwrap_or(0);
+        last.insert(file, *time).map(|before| time - before)
+    });
+    apart.fold(f64::INFINITY, f64::min)
+}
+
+/// The number of the instant of each frame, in order of time: bands of a night may be seconds apart, and are of one as long as
+/// half of the cadence within a file is more. Files with a frame each have none: every hour is an instant.
+pub fn instants(times: &[f64], files: &[usize]) -> Vec<usize> {
+    let apart = Some(0.5 * cadence(times, files)).filter(|apart| apart.is_finite()).unwrap_or(0.0);
+    let mut all = vec![0; times.len()];
+    let mut began = times.first().copied().unwrap_or_default();
+    for frame in 1..times.len() {
+        let is_next = times[frame] - began > apart;
+        all[frame] = all[frame - 1] + usize::from(is_next);
+        began = if is_next { times[frame] } else { began };
+    }
+    all
+}
+
+/// Refuses more parts than half of the instants.
 fn check_folds(
     table: &str,
     strength: Option<&StrengthSettings>,
-    frames: usize,
+    instants: usize,
 ) -> Result<(), Error> {
-    let Some(strength) = strength.filter(|strength| frames < 2 * strength.folds) else {
+    let Some(strength) = strength.filter(|strength| instants < 2 * strength.folds) else {
         return Ok(());
     };
-    let allowed = format!("{} at most, half of the frames", frames / 2);
+    let allowed = format!("{} at most, half of the frames at different times", instants / 2);
     let key = format!("{table}strength.folds");
     Err(FitError::range(key, strength.folds, &allowed).into())
 }
@@ -139,6 +174,7 @@ fn contradiction(a: &Observation, b: &Observation) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use kerrlight_tomo::fit::settings::LeakageSettings;
     use kerrlight_vlbi::Complex64;
     use kerrlight_vlbi::array::Station;
     use kerrlight_vlbi::earth::SourcePosition;
@@ -185,7 +221,35 @@ mod tests {
             assert!(of.iter().all(|file| *file == of[0]), "{of:?}");
         }
         assert_eq!(station_of_file(&seen.stations[4].name), ("B", 1));
+        // Four frames at two instants are too few for two parts.
+        let parts = vec![("lo".to_owned(), of(227e9, 0.1)), ("hi".to_owned(), of(229e9, 0.2))];
+        let strength = StrengthSettings { values: vec![1.0, 2.0], folds: 2 };
+        let refused = joined(parts, "", Some(&strength)).err().unwrap().to_string();
+        assert!(refused.starts_with("strength.folds = 2"), "{refused}");
         assert_eq!(station_of_file("LMT (x)"), ("LMT (x)", 0));
+    }
+
+    /// Feeds of the second file turn as published for their stations, whatever these are called beside those of the first;
+    /// leakage is of one day.
+    #[test]
+    fn exact_feeds_of_all_files_turn_as_published() {
+        let part = |name: &str, mjd| {
+            let mut data = file(229e9, SourcePosition::M87, 0.1);
+            let (seen, _) = data.visibilities.as_mut().unwrap();
+            seen.mjd = Some(mjd);
+            seen.stations = ["AA", "SM", "LM"].map(Station::named).to_vec();
+            let shared = SharedLeakage::none(3);
+            let settings = LeakageSettings { amplitude: 0.1, rounds: 1 };
+            data.leakage = Some(LeakageUnknown { settings, shared });
+            (name.to_owned(), data)
+        };
+        let all = joined(vec![part("a", 57849), part("b", 57849)], "", None).unwrap();
+        let seen = all.visibilities.unwrap().0;
+        for (here, there) in seen.stations[..3].iter().zip(&seen.stations[3..]) {
+            assert_eq!(feed_rotation(here), feed_rotation(there), "{}", there.name);
+        }
+        let refused = joined(vec![part("a", 57849), part("b", 57850)], "", None).err().unwrap();
+        assert!(refused.to_string().starts_with("a and b are of two days"), "{refused}");
     }
 
     #[test]

@@ -3,6 +3,7 @@
 mod joined;
 mod redrawn;
 
+pub(crate) use joined::{cadence, instants};
 pub use joined::{joined, station_of_file};
 pub use redrawn::redrawn;
 
@@ -121,7 +122,10 @@ fn polarized_errors(
         let leaked = SQRT_2 * polarization.leakage_left * light;
         let of_polarized =
             share * has_intrinsic_variability(polarization.variability).hypot(leaked);
-        for (k, sigma) in row.noise_sigma.iter_mut().enumerate() {
+        // What was not measured has no error, and must not get one.
+        let is_measured =
+            [0, 1, 2, 3].map(|k| row.product(k).is_some_and(|of| !of.is_unmeasured()));
+        for (k, sigma) in row.noise_sigma.iter_mut().enumerate().filter(|(k, _)| is_measured[*k]) {
             *sigma = sigma.hypot(if crossed.contains(&k) { of_polarized } else { of_light });
         }
     }
