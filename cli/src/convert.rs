@@ -78,9 +78,6 @@ pub struct Convert {
     bandwidth: Option<f64>,
 }
 
-/// Part of the power on baselines within a site that may be imaginary.
-const INCOHERENT: f64 = 0.05;
-
 impl Convert {
     /// Refuses numbers of options before anything is read.
     fn check_numbers(&self) -> anyhow::Result<()> {
@@ -189,9 +186,7 @@ impl Convert {
         if curve.samples.is_empty() {
             bail!("{}: no baseline lies within a site", self.input.display());
         }
-        if let Some(part) =
-            LightCurve::imaginary_part(observation).filter(|part| *part > INCOHERENT)
-        {
+        if let Some(part) = LightCurve::incoherent_part(observation) {
             eprintln!(
                 "warning: {:.0} % of the power on baselines within a site is imaginary: their phases are not calibrated, or the source is not unresolved in the middle of the field; these fluxes are not those of the source",
                 100.0 * part

@@ -27,6 +27,13 @@ pub struct Sample {
     pub by: String,
 }
 
+impl Sample {
+    /// Returns whether any parameter was measured.
+    pub fn has_flux(&self) -> bool {
+        self.stokes.iter().any(Option::is_some)
+    }
+}
+
 /// Fluxes in the order of their times.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightCurve {
@@ -34,6 +41,8 @@ pub struct LightCurve {
     pub samples: Vec<Sample>,
 }
 
+/// Part of the power on baselines within a site that may be imaginary.
+const INCOHERENT: f64 = 0.05;
 /// Baselines shorter than this many metres are within a site.
 const SITE_M: f64 = 10e3;
 /// The same in wavelengths, where no one tells where the stations are: 10 km at 1.3 mm.
@@ -53,18 +62,20 @@ impl LightCurve {
         if samples.iter().all(|sample| sample.stokes[3].is_none_or(|v| v.jy == 0.0)) {
             samples.iter_mut().for_each(|sample| sample.stokes[3] = None);
         }
+        // Stations of one hand measure no Stokes parameter.
+        samples.retain(Sample::has_flux);
         samples.sort_by(|a, b| a.time_h.total_cmp(&b.time_h));
         Self { samples }
     }
 
-    /// Returns the imaginary part of the power of I on the baselines within a site, as a share of all: next to nothing for an
-    /// unresolved source in the middle of the field, a half where phases are not calibrated. None if there is no such baseline.
-    pub fn imaginary_part(observation: &Observation) -> Option<f64> {
+    /// Returns the imaginary part of the power of I on the baselines within a site, as a share of all, where it is above 5 %: next to
+    /// nothing for an unresolved source in the middle of the field, a half where phases are not calibrated.
+    pub fn incoherent_part(observation: &Observation) -> Option<f64> {
         let near = observation.stokes_i().filter(|(row, _)| is_within_site(observation, row));
         let (imaginary, all) = near.fold((0.0, 0.0), |(imaginary, all), (_, i)| {
             (imaginary + i.visibility.im.powi(2), all + i.visibility.norm_sqr())
         });
-        (all > 0.0).then(|| imaginary / all)
+        Some(imaginary / all).filter(|part| *part > INCOHERENT)
     }
 
     /// Samples from the first to the second hour.
@@ -170,12 +181,12 @@ fn mixed(x: Flux, a: f64, y: Flux, b: f64) -> Flux {
 fn mean(samples: &[Sample]) -> Sample {
     let count = samples.len() as f64;
     let of = |k: usize| -> Option<Flux> {
-        let all: Option<Vec<Flux>> = samples.iter().map(|sample| sample.stokes[k]).collect();
-        let all = all?;
+        let all: Vec<Flux> = samples.iter().filter_map(|sample| sample.stokes[k]).collect();
+        let count = all.len() as f64;
         let sigmas: Option<Vec<f64>> = all.iter().map(|flux| flux.sigma_jy).collect();
         let sigma = |sigmas: Vec<f64>| sigmas.iter().map(|s| s * s).sum::<f64>().sqrt() / count;
         let jy = all.iter().map(|flux| flux.jy).sum::<f64>() / count;
-        Some(Flux { jy, sigma_jy: sigmas.map(sigma) })
+        (count > 0.0).then(|| Flux { jy, sigma_jy: sigmas.map(sigma) })
     };
     let same = samples.iter().all(|sample| sample.by == samples[0].by);
     Sample {
@@ -254,12 +265,12 @@ mod tests {
         }
         let sigmas = curve.samples[0].stokes.map(|flux| flux.unwrap().sigma_jy.unwrap());
         assert_eq!(sigmas, [0.25, 0.5, 0.5, 0.25]);
-        assert_eq!(LightCurve::imaginary_part(&observation), Some(0.0));
+        assert_eq!(LightCurve::incoherent_part(&observation), None);
         assert!(observation.is_polarized());
         for turned in &mut observation.rows[1].products {
             *turned *= c(0.6, 0.8);
         }
-        assert!((LightCurve::imaginary_part(&observation).unwrap() - 0.64).abs() < 1e-12);
+        assert!((LightCurve::incoherent_part(&observation).unwrap() - 0.64).abs() < 1e-12);
     }
 
     /// Stokes I as RR and LL has no V.
@@ -284,6 +295,11 @@ mod tests {
         assert!((means.samples[1].stokes[2].unwrap().jy - 5.5).abs() < 1e-14);
         assert!((means.samples[1].time_h - 9.055).abs() < 1e-12);
         assert!((means.samples[0].stokes[1].unwrap().sigma_jy.unwrap() - 0.01).abs() < 1e-15);
+        // Samples without a parameter have no part in its mean.
+        let mut some = [1.0, 2.0, 3.0].map(|u| sample(9.0, 0.3, u));
+        some[1].stokes[2] = None;
+        let mean = LightCurve { samples: some.to_vec() }.averaged(3).samples.remove(0);
+        assert_eq!(mean.stokes[2].unwrap().jy, 2.0);
         let scans = [9.0, 9.003, 9.006, 9.5, 9.503].map(|t| sample(t, 0.3, t));
         let scans = LightCurve { samples: scans.to_vec() }.averaged_over(21.6);
         let times: Vec<f64> = scans.samples.iter().map(|sample| sample.time_h).collect();

@@ -76,9 +76,18 @@ fn light_curve(path: &Path) -> anyhow::Result<LightCurve> {
     if !matches!(extension.to_ascii_lowercase().as_str(), "uvfits" | "fits") {
         return files::parse_light_curve(&output::read_text(path)?).with_context(name);
     }
-    let curve = LightCurve::of_sites(&interferometry::read(path)?.1);
+    let observation = interferometry::read(path)?.1;
+    interferometry::warn_of_repeats(&name(), &observation);
+    let curve = LightCurve::of_sites(&observation.with_repeats_merged());
     if curve.samples.is_empty() {
         bail!("{}: no baseline lies within a site", name());
+    }
+    if let Some(part) = LightCurve::incoherent_part(&observation) {
+        bail!(
+            "{}: {:.0} % of the power on baselines within a site is imaginary: their phases are not calibrated, and their real parts are no fluxes",
+            name(),
+            100.0 * part
+        );
     }
     Ok(curve)
 }
@@ -201,7 +210,9 @@ fn visibilities<R>(
     interferometry::warn_of_repeats(&name, &observation);
     let measured = of(observation, &name)?;
     if without > 0 {
-        eprintln!("{name}: {without} of {all} rows have no parallel hands and are dropped");
+        eprintln!(
+            "{name}: {without} of {all} rows have no parallel hands and tell no total intensity"
+        );
     }
     Ok(measured)
 }

@@ -156,6 +156,10 @@ pub fn is_light_curve(text: &str) -> bool {
             continue;
         }
         let here = names(line).0;
+        // u and v of baselines are no Stokes parameters.
+        if ["t1", "t2"].iter().all(|station| here.iter().any(|name| name == station)) {
+            return false;
+        }
         // Several parameters without a time: the reader of light curves says what is missing.
         let has = |p: &&StokesParameter| here.iter().any(|n| n.eq_ignore_ascii_case(p.name()));
         let stokes = StokesParameter::ALL.iter().filter(has).count();
@@ -209,6 +213,7 @@ pub fn parse(text: &str) -> Result<LightCurve, Error> {
     if samples.is_empty() {
         return Err(FileError::whole("no fluxes").into());
     }
+    samples.retain(Sample::has_flux);
     samples.sort_by(|a: &Sample, b: &Sample| a.time_h.total_cmp(&b.time_h));
     Ok(LightCurve { samples })
 }

@@ -137,9 +137,13 @@ pub(super) fn mean(rows: &[Row], weighted: bool) -> Row {
         if total > 0.0 { row.integration_s / total } else { 1.0 / rows.len() as f64 }
     };
     let over_time = |value: fn(&Row) -> f64| rows.iter().map(|r| weight(r) * value(r)).sum::<f64>();
+    // A mean of instants is about as long as they lie apart.
+    let ends = rows.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[first, last], row| {
+        [first.min(row.time_h), last.max(row.time_h)]
+    });
     let mut result = Row {
         time_h: over_time(|r| r.time_h),
-        integration_s: total,
+        integration_s: if total > 0.0 { total } else { 3600.0 * (ends[1] - ends[0]) },
         uv: [over_time(|r| r.uv[0]), over_time(|r| r.uv[1])],
         ..rows[0]
     };

@@ -74,6 +74,10 @@ fn is_polarized(observation: &Observation) -> bool {
 
 /// Root mean square of the standard deviations of Q and U on the baselines within a site, Jy; none where there are too few.
 fn scatter(observation: &Observation) -> Option<f64> {
+    // Real parts of phases that are not calibrated scatter without any change of the source.
+    if LightCurve::incoherent_part(observation).is_some() {
+        return None;
+    }
     let curve = LightCurve::of_sites(observation);
     let of = |stokes: usize| {
         let values = curve.samples.iter().filter_map(|sample| Some(sample.stokes[stokes]?.jy));
