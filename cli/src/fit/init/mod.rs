@@ -90,6 +90,7 @@ fn of_files(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Resu
     }
     let first = observations.first().context("no file of data")?;
     let source = known(first);
+    let source = source.as_ref();
     let is_image = match model {
         Some(model) => model == Model::Image,
         None => source.is_some_and(|source| !source.varies),
@@ -107,7 +108,7 @@ fn of_files(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Resu
     let others = observations.iter().zip(data).skip(1);
     let said: String = others
         .map(|(seen, path)| {
-            let name = &called(seen, known(seen));
+            let name = &called(seen, known(seen).as_ref());
             format!(
                 "{}{}\n",
                 guess::READ,
@@ -169,6 +170,7 @@ fn of_observation(
     let path = toml::Value::String(seen_from(toml, data)?).to_string();
     let file = data.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let source = known(observation);
+    let source = source.as_ref();
     let name = &called(observation, source);
     let image = || static_image::of_visibilities(observation, source, name, &path, file);
     let volume = || visibilities::of_visibilities(observation, &path, file);

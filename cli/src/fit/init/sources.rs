@@ -5,6 +5,7 @@ use kerrlight_vlbi::earth::SourcePosition;
 use kerrlight_vlbi::observation::Observation;
 
 /// A source whose mass and distance are known.
+#[derive(Clone, Copy)]
 pub struct Source {
     /// Name.
     pub name: &'static str,
@@ -35,6 +36,7 @@ pub struct Source {
 }
 
 /// Assumptions of published images.
+#[derive(Clone, Copy)]
 pub struct PublishedImages {
     /// Their field, µas.
     pub field_uas: f64,
@@ -104,8 +106,27 @@ pub fn named_above(text: &str) -> Option<&'static Source> {
     names.find_map(|(_, name)| named_in(name.trim()))
 }
 
-/// Returns the source that an observation is of, if it is one of these.
-pub fn known(observation: &Observation) -> Option<&'static Source> {
+/// Frequencies at which what is published of images and fluxes holds, Hz.
+const BAND_HZ: core::ops::RangeInclusive<f64> = 200e9..=260e9;
+
+/// Returns the source that an observation is of, if it is one of these: at another frequency without what holds at 1.3 mm alone,
+/// and without scattering where `kerrlight observe` has simulated none.
+pub fn known(observation: &Observation) -> Option<Source> {
+    let source = *found(observation)?;
+    let told = |words: [&str; 2]| {
+        let is_told = |line: &String| words.iter().all(|word| line.contains(word));
+        observation.history.iter().any(is_told)
+    };
+    let is_sharp = told(["kerrlight", " observe"]) && !told(["scattering of", "Sgr A*"]);
+    let source = Source { blur: source.blur.filter(|_| !is_sharp), ..source };
+    let is_far = observation.frequency_hz.is_some_and(|hz| !BAND_HZ.contains(&hz));
+    Some(match is_far {
+        true => Source { uv_min: None, compact_jy: None, image: None, ..source },
+        false => source,
+    })
+}
+
+fn found(observation: &Observation) -> Option<&'static Source> {
     let word: String = observation.source.to_ascii_uppercase().split_whitespace().collect();
     SOURCES.iter().find(|source| {
         let near = observation.position.is_some_and(|at| {
@@ -125,6 +146,26 @@ pub fn called(observation: &Observation, source: Option<&Source>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Numbers of 1.3 mm hold there alone, and what is simulated is scattered if that was asked for.
+    #[test]
+    fn exact_what_is_published_holds_for_the_data() {
+        let mut seen = Observation::empty(kerrlight_vlbi::observation::Basis::Circular);
+        seen.source = "M87".to_owned();
+        let is_compact = |seen: &Observation| known(seen).unwrap().compact_jy.is_some();
+        assert!(is_compact(&seen));
+        for (hz, expected) in [(229.1e9, true), (86.0e9, false), (43.0e9, false)] {
+            seen.frequency_hz = Some(hz);
+            assert_eq!(is_compact(&seen), expected, "{hz}");
+        }
+        seen.source = "SGRA".to_owned();
+        let is_blurred = |seen: &Observation| known(seen).unwrap().blur.is_some();
+        assert!(is_blurred(&seen));
+        seen.history = vec!["kerrlight 0.1.0 observe".to_owned()];
+        assert!(!is_blurred(&seen));
+        seen.history.push("scattering of Sgr A* (Johnson et al. 2018)".to_owned());
+        assert!(is_blurred(&seen));
+    }
 
     #[test]
     fn exact_sources_are_known_by_their_names() {

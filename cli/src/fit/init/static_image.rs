@@ -32,7 +32,7 @@ pub fn of_visibilities(
     let losses = losses(has_closures(observation, average(source), long_only.is_some()));
     let extra = [long_only, source.and_then(|source| source.blur)].into_iter().flatten();
     let mut extra: Vec<String> = extra.map(str::to_owned).collect();
-    if source.is_some_and(|source| source.varies) {
+    if source.is_some_and(|source| source.varies && source.image.is_some()) {
         // (1 + (4e9/2e9)²)^(1.25/2) = 5^0.625: 2 % of the flux at 4e9 wavelengths.
         extra.push(format!(
             "variability = {{ jy = {}, uv = 2e9, power = 1.25 }} #! the source varies by 2 % of its flux on baselines of 4e9 wavelengths, and with their length to the power of -1.25 (EHT Collaboration 2022, ApJL 930, L14)",

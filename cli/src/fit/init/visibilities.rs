@@ -20,7 +20,7 @@ pub fn of_visibilities(
 ) -> anyhow::Result<String> {
     let flux = short_baselines(observation)?;
     let source = known(observation);
-    let name = &called(observation, source);
+    let name = &called(observation, source.as_ref());
     let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
     let (mass, inclination, field) = match source {
         Some(of) => (
@@ -46,6 +46,8 @@ pub fn of_visibilities(
     if has_closures(observation, AVERAGE_S, source.is_some_and(|source| source.uv_min.is_some())) {
         losses += "\n[[loss]]\ndata = \"closure-phases\"\nweight = 1.0\nleast_snr = 3.0 #! weaker ones are not Gaussian";
     }
+    let of_source = source.into_iter().flat_map(|source| [source.uv_min, source.blur]);
+    let of_source: Vec<&str> = of_source.flatten().collect();
     // Pixels of the region, 8 M deep, with emission 0.02.
     let per_pixel = flux / (core::f64::consts::PI * (10.0f64 / 24.0 * 32.0).powi(2) * 8.0 * 0.02);
     let fields = [
@@ -57,7 +59,7 @@ pub fn of_visibilities(
         ("flux", digits(flux)),
         ("losses", losses),
         ("average", format!("{AVERAGE_S:?}")),
-        ("uv_min", source.and_then(|source| source.uv_min).unwrap_or_default().to_owned()),
+        ("source", of_source.join("\n")),
         ("gains", gains(observation)),
         ("read", read(observation, file, name, source.is_some()) + unfitted(observation)),
         ("path", path.to_owned()),

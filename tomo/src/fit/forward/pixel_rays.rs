@@ -125,7 +125,8 @@ impl RingRays {
         let columns = (0..self.count).map(|k| (k as f64 + 0.5) / count - 0.5);
         let places = columns.zip(rows).map(|(u, v)| [u, v - middle]);
         // Columns stay where they are about a mean of 0: every other lattice has them as its rows.
-        let turned = |[u, v]: [f64; 2]| if self.lattice % 2 == 0 { [u, v] } else { [v, u] };
+        let turned =
+            |[u, v]: [f64; 2]| if self.lattice.is_multiple_of(2) { [u, v] } else { [v, u] };
         places.map(turned).collect()
     }
 }

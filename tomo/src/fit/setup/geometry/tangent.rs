@@ -66,15 +66,15 @@ fn tangent_weight(measured: &FitData, losses: &[Loss]) -> Option<f64> {
 
 impl FitData {
     /// Visibilities with free phases, and gains as far as priors say, about images of some frames; none if a frame has
-    /// several times, whose phases differ.
+    /// several times or channels, whose phases differ.
     fn tangents(&self, frames: &[usize], images: &[f32]) -> Result<Option<ScanTerm<f32>>> {
         let mut scans: Vec<Option<Scan<f32>>> = (0..self.times.len()).map(|_| None).collect();
         let pixels = images.len() / frames.len().max(1);
         for (frame, image) in frames.iter().zip(images.chunks(pixels.max(1))) {
             let (part, sky) = self.part(*frame)?;
-            let mut times = part.stokes_i().map(|(row, _)| row.time_h);
-            let Some(time) = times.next() else { continue };
-            if times.any(|other| other != time) {
+            let mut places = part.stokes_i().map(|(row, _)| (row.time_h, row.channel));
+            let Some(place) = places.next() else { continue };
+            if places.any(|other| other != place) {
                 return Ok(None);
             }
             let transform = self.transform(&part, sky)?;
