@@ -126,32 +126,3 @@ pub(super) fn data_term<T: Float>(
     let rest = norm::<T, _>(&moved::<T, _>(&sum, &gradient, -1.5));
     assert!(rest <= tolerance * norm::<T, _>(&gradient), "{name}: weights are off by {rest}");
 }
-
-/// The gradient of χ²(F x) with respect to pixels, from the adjoint of a data term's gradient,
-/// against central differences along random directions.
-pub(super) fn chain<T: Float>(
-    name: &str,
-    operator: &impl Operator<T>,
-    term: &dyn DataTerm<T>,
-    movie: &[T],
-    h: f64,
-    tolerance: f64,
-) {
-    let value = |movie: &[T], gradient: &mut [Complex<T>]| {
-        let mut model = vec![Complex::new(T::zero(), T::zero()); operator.data()];
-        operator.forward(movie, &mut model);
-        term.value_and_gradient(&model, T::one(), gradient)
-    };
-    let mut pull = vec![Complex::new(T::zero(), T::zero()); operator.data()];
-    value(movie, &mut pull);
-    let mut gradient = vec![T::zero(); movie.len()];
-    operator.adjoint(&pull, &mut gradient);
-    for seed in 11..14 {
-        let direction = random::<T, T>(movie.len(), seed);
-        let at = |s: f64| value(&moved::<T, T>(movie, &direction, s * h), &mut pull.clone());
-        let slope = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * h);
-        let exact = dot::<T, T>(&gradient, &direction);
-        let scale = norm::<T, T>(&gradient) * norm::<T, T>(&direction);
-        assert!((slope - exact).abs() <= tolerance * scale, "{name}: {slope} {exact}, of {scale}");
-    }
-}

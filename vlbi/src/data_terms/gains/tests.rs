@@ -1,27 +1,20 @@
 //! The term of free gains beside those that gains cannot touch.
 
+use super::super::polarized::tests::off;
+use super::super::tests::{observation, of_precision};
 use super::*;
 use crate::array::Station;
 use crate::conformance;
 use crate::data_terms::ClosureTerm;
 use crate::noise::{GainErrors, add_thermal_noise, apply_gains};
-use crate::observation::{Basis, Measured, Row};
 use crate::products::ClosureKind;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 /// A scan of seven stations with gains of 15 % and random phases, and its true visibilities.
 fn scan(seed: u64, snr: f64) -> (Observation, Vec<Complex64>) {
-    let mut random = Pcg64Mcg::seed_from_u64(seed);
-    let mut observation = Observation::empty(Basis::Stokes);
+    let mut observation = observation(1, snr, seed);
     observation.stations = (0..7).map(|k| Station::named(&format!("S{k}"))).collect();
-    for (a, b) in (0..7u16).flat_map(|a| (a + 1..7).map(move |b| (a, b))) {
-        let phase = random.random_range(-3.0..3.0);
-        let visibility = Complex64::from_polar(random.random_range(0.5..1.5), phase);
-        let i = Measured { visibility, noise_sigma: random.random_range(0.5..1.0) / snr };
-        let stations = if (a + b) % 3 == 0 { [b, a] } else { [a, b] };
-        observation.rows.push(Row::total_intensity(1.0, stations, [0.0; 2], i));
-    }
     let truth = observation.rows.iter().map(|row| row.products[0]).collect();
     let errors = GainErrors { scan_amplitude: 0.15, random_phases: true, ..GainErrors::default() };
     apply_gains(&mut observation, &errors, seed);
@@ -31,13 +24,6 @@ fn scan(seed: u64, snr: f64) -> (Observation, Vec<Complex64>) {
 
 fn priors(free_phases: bool) -> GainPriors {
     GainPriors { free_phases, amplitude_sigma: vec![0.15; 7] }
-}
-
-/// A model that is off by 10 %.
-fn off(truth: &[Complex64]) -> Vec<Complex64> {
-    let mut random = Pcg64Mcg::seed_from_u64(12);
-    let mut part = || 0.1 * random.random_range(-1.0..1.0);
-    truth.iter().map(|v| v + Complex64::new(part(), part())).collect()
 }
 
 #[test]
@@ -50,8 +36,7 @@ fn exact_gradients_of_the_least_chi2() {
     conformance::data_term::<f64>("amplitudes free", &held, &model, 1e-3, 1e-7);
     let amplitudes = GainTerm::amplitudes(&data, &priors(true)).unwrap();
     conformance::data_term::<f64>("of amplitudes", &amplitudes, &model, 1e-3, 1e-7);
-    let single: Vec<Complex<f32>> =
-        model.iter().map(|v| Complex::new(v.re as f32, v.im as f32)).collect();
+    let single = of_precision::<f32>(&model);
     conformance::data_term::<f32>("in single precision", &free, &single, 1e-2, 2e-3);
 }
 

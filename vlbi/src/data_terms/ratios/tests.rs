@@ -1,4 +1,5 @@
 use super::super::polarized::tests::{off, scan};
+use super::super::tests::of_precision;
 use super::*;
 use crate::conformance;
 use crate::noise::{add_thermal_noise, apply_leakage};
@@ -18,8 +19,7 @@ fn exact_gradients_of_ratios() {
     let (data, truth, _) = scan(0.0, true);
     let (model, term) = (off(&truth), RatioTerm::new(&data, 0.0).unwrap());
     conformance::data_term::<f64>("ratios", &term, &model, 1e-3, 1e-7);
-    let single: Vec<Complex<f32>> =
-        model.iter().map(|v| Complex::new(v.re as f32, v.im as f32)).collect();
+    let single = of_precision::<f32>(&model);
     conformance::data_term::<f32>("in single precision", &term, &single, 1e-2, 2e-3);
 }
 
