@@ -25,20 +25,6 @@ pub enum Method {
     Taylor,
 }
 
-impl Method {
-    /// All of them, in the order of their cost at low precision.
-    pub const ALL: [Method; 3] = [Method::Rk45, Method::Dop853, Method::Taylor];
-
-    /// The name that commands, files and documents use.
-    pub fn name(self) -> &'static str {
-        match self {
-            Method::Rk45 => "rk45-mino",
-            Method::Dop853 => "dop853-mino",
-            Method::Taylor => "taylor-mino",
-        }
-    }
-}
-
 /// An adaptive tracer in Mino time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tracer {
@@ -233,30 +219,5 @@ mod tests {
         }
         path.intervals_within(0.5 * r_min, 20.0, &mut intervals);
         assert_eq!(intervals.len(), 1);
-    }
-
-    /// Requests for other quantities do not change r and θ.
-    #[test]
-    fn exact_same_positions_whatever_is_wanted() {
-        let hole = Kerr::new(0.94).unwrap();
-        let observer = Observer::at_infinity(Inclination::from_degrees(60.0).unwrap());
-        let ray = observer.ray(&hole, -4.0, 5.0).unwrap();
-        let tracer = Tracer::new(1e-11).unwrap();
-        let positions = [(false, false), (false, true), (true, false), (true, true)].map(|w| {
-            let mut path = Path::new();
-            tracer.trace(
-                &hole,
-                &ray,
-                Quantities { azimuth: w.0, time: w.1, velocity: true },
-                &mut path,
-            );
-            path.at(0.4 * path.mino_total())
-        });
-        for p in &positions[1..] {
-            assert!((p.radius() / positions[0].radius() - 1.0).abs() < 1e-9);
-            assert!((p.cos_theta() - positions[0].cos_theta()).abs() < 1e-9);
-        }
-        assert_eq!((positions[0].azimuth, positions[0].delay), (0.0, 0.0));
-        assert!(positions[1].delay != 0.0 && positions[2].azimuth != 0.0);
     }
 }

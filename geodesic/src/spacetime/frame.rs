@@ -102,14 +102,9 @@ impl ZamoFrame {
         [time, v[1] / self.radial, v[2] * self.length, around]
     }
 
-    /// The velocity in this frame, in units of c, of matter at rest with respect to infinity, along e_φ; it is
-    /// not below 1 in magnitude where there is no rest, in the ergosphere.
-    pub fn velocity_at_rest(&self) -> f64 {
-        self.orbital_velocity(0.0)
-    }
-
     /// The velocity in this frame, along e_φ, of matter that circles the axis with dφ/dt =
-    /// `rate`, in radians per M.
+    /// `rate`, in radians per M. That at rest with respect to infinity, of rate 0, is not below 1 in magnitude in the
+    /// ergosphere, where there is no rest.
     pub fn orbital_velocity(&self, rate: f64) -> f64 {
         self.girth * self.sin * (rate - self.drag) / self.lapse
     }

@@ -2,7 +2,8 @@
 //! that was not requested.
 
 use kerrlight_geodesic::{
-    Error, Inclination, Integrator, Kerr, Observer, Outcome, Placement, Points, RayTable, Request,
+    Error, Inclination, Integrator, Kerr, Observer, Outcome, Path, Placement, Points, Quantities,
+    RayTable, Request, Tracer,
 };
 
 fn at_infinity(degrees: f64) -> Observer {
@@ -150,9 +151,9 @@ fn exact_path_length_samples_are_equidistant() {
     }
     let inclination = Inclination::from_degrees(70.0).unwrap();
     let ray = Observer::at_infinity(inclination).ray(&hole, -6.0, 3.0).unwrap();
-    let mut path = kerrlight_geodesic::Path::new();
-    let tracer = kerrlight_geodesic::Tracer::new(1e-13).unwrap();
-    tracer.trace(&hole, &ray, kerrlight_geodesic::Quantities::POLAR, &mut path);
+    let mut path = Path::new();
+    let tracer = Tracer::new(1e-13).unwrap();
+    tracer.trace(&hole, &ray, Quantities::POLAR, &mut path);
     let rule = kerrlight_geodesic::quadrature::gauss_legendre(40);
     for pair in table.samples.mino_time.windows(2) {
         let length: f64 = rule
@@ -261,6 +262,12 @@ fn exact_columns_that_were_not_asked_for_are_empty() {
     let nothing = trace(0.9, &observer, [-6.0, 2.0], &Request::default());
     assert!(nothing.samples.is_empty() && nothing.crossings.is_empty());
     assert!(nothing.crossing_count[0] > 0 && nothing.mino_total[0] > 0.0);
+    // What a path was not asked for is exactly 0.
+    let (hole, mut path) = (Kerr::new(0.9).unwrap(), Path::new());
+    let ray = observer.ray(&hole, -6.0, 2.0).unwrap();
+    Tracer::new(1e-11).unwrap().trace(&hole, &ray, Quantities::POLAR, &mut path);
+    let point = path.at(0.4 * path.mino_total());
+    assert_eq!((point.azimuth, point.delay), (0.0, 0.0));
 }
 
 /// Misuse is an error that names the field, its value and what is allowed.
@@ -300,15 +307,15 @@ fn regress_empty_pieces_and_paths() {
         assert!(table.samples.is_empty() && table.samples.of(0).is_empty());
         assert!(table.samples.of(1).is_empty() && table.samples.of(99).is_empty());
     }
-    let path = kerrlight_geodesic::Path::new();
+    let path = Path::new();
     assert!(path.at(0.3).radius().is_nan() && path.uncertainty_at(0.3).radius.is_infinite());
-    let mut path = kerrlight_geodesic::Path::new();
+    let mut path = Path::new();
     let hole = Kerr::new(0.5).unwrap();
     let ray = at_infinity(20.0).ray(&hole, 5.0, 5.0).unwrap();
-    let tracer = kerrlight_geodesic::Tracer::new(1e-9).unwrap();
-    tracer.with_max_steps(0).trace(&hole, &ray, kerrlight_geodesic::Quantities::ALL, &mut path);
+    let tracer = Tracer::new(1e-9).unwrap();
+    tracer.with_max_steps(0).trace(&hole, &ray, Quantities::ALL, &mut path);
     assert!(path.at(0.0).radius().is_nan());
-    tracer.trace(&hole, &ray, kerrlight_geodesic::Quantities::ALL, &mut path);
+    tracer.trace(&hole, &ray, Quantities::ALL, &mut path);
     let mut pieces = Vec::new();
     for [lo, hi] in [[3.0, 2.0], [f64::NAN, 2.0], [1.0, f64::NAN], [-1.0, 5.0], [0.0, 0.0]] {
         path.intervals_within(lo, hi, &mut pieces);

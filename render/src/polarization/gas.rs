@@ -9,11 +9,6 @@ use kerrlight_geodesic::{Kerr, PathPoint, ZamoFrame, orbits};
 pub struct Gas(pub [f64; 4]);
 
 impl Gas {
-    /// Gas without angular momentum, at rest in the frame.
-    pub fn zamo() -> Self {
-        Gas([1.0, 0.0, 0.0, 0.0])
-    }
-
     /// Gas with the contravariant Boyer–Lindquist four-velocity (uᵗ, uʳ, u^θ, u^φ), the last two in M⁻¹.
     ///
     /// γ follows from the other three, so that its rounding does not become a mass.
@@ -30,19 +25,6 @@ impl Gas {
             let gamma = 1.0 / (1.0 - square).sqrt();
             Gas([gamma, gamma * v[0], gamma * v[1], gamma * v[2]])
         })
-    }
-
-    /// Gas that moves in the equatorial plane of the frame with `speed` (in units of c) in the
-    /// direction cos χ e_r + sin χ e_φ: the fluid of Narayan et al. 2021, eq. 8, and Gelles et
-    /// al. 2021. `None` unless it is slower than light.
-    pub fn boosted(speed: f64, chi: f64) -> Option<Self> {
-        let (sin, cos) = chi.sin_cos();
-        Self::with_velocity([speed * cos, 0.0, speed * sin])
-    }
-
-    /// Gas at rest with respect to infinity; `None` in the ergosphere.
-    pub fn at_rest(frame: &ZamoFrame) -> Option<Self> {
-        Self::with_velocity([0.0, 0.0, frame.velocity_at_rest()])
     }
 
     /// Gas that circles the axis with Ω = 1/(r^{3/2} + a), a geodesic in the equatorial plane;

@@ -10,8 +10,6 @@ use image::RgbImage;
 pub enum Through {
     /// The node with the largest value, the first of several.
     Maximum,
-    /// Σ e x/Σ e over the nodes, of values above 0.
-    Centroid,
     /// A place in M.
     Point([f64; 3]),
 }
@@ -22,7 +20,6 @@ impl Through {
         let middle = core::array::from_fn(|k| 0.5 * (volume.low[k] + volume.high[k]));
         match self {
             Self::Maximum => maximum(volume).unwrap_or(middle),
-            Self::Centroid => centroid(volume).unwrap_or(middle),
             Self::Point(point) => point,
         }
     }
@@ -31,7 +28,6 @@ impl Through {
     pub fn name(self) -> &'static str {
         match self {
             Self::Maximum => "brightest node",
-            Self::Centroid => "centroid of the emission",
             Self::Point(_) => "chosen point",
         }
     }
@@ -41,18 +37,6 @@ fn maximum(volume: &Volume) -> Option<[f64; 3]> {
     let above = volume.values().iter().enumerate().filter(|(_, value)| **value > 0.0);
     let best = above.reduce(|best, next| if next.1 > best.1 { next } else { best });
     best.map(|(k, _)| volume.position(k))
-}
-
-fn centroid(volume: &Volume) -> Option<[f64; 3]> {
-    let mut sums = [0.0; 4];
-    for (k, value) in volume.values().iter().enumerate().filter(|(_, value)| **value > 0.0) {
-        let ([x, y, z], weight) = (volume.position(k), f64::from(*value));
-        for (sum, term) in sums.iter_mut().zip([x, y, z, 1.0]) {
-            *sum += weight * term;
-        }
-    }
-    let [x, y, z, total] = sums;
-    (total > 0.0).then(|| [x, y, z].map(|sum| sum / total))
 }
 
 /// Axes to the right, upward and along the line of sight of each slice.
@@ -221,9 +205,7 @@ mod tests {
         let distance =
             |p: [f64; 3]| p.iter().zip(centre).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
         assert!(distance(Through::Maximum.point(&scene)).sqrt() < 0.5 * 3f64.sqrt() * 10.0 / 64.0);
-        assert!(distance(Through::Centroid.point(&scene)).sqrt() < 1e-3);
         let empty = Volume::new([2; 3], [0.0; 3], [1.0, 2.0, 4.0], vec![0.0; 8]).unwrap();
-        assert_eq!(Through::Centroid.point(&empty), [0.5, 1.0, 2.0]);
         assert_eq!(Through::Maximum.point(&empty), [0.5, 1.0, 2.0]);
     }
 

@@ -29,7 +29,7 @@ pub use words::{range_of, short};
 use crate::Error;
 use crate::fit::settings::{FitFile, Kind};
 use crate::fit::setup::{self, FitData, Instrument};
-use crate::fit::{Loss, Motion, State, Trainer};
+use crate::fit::{Loss, Motion, Region, State, Trainer};
 use kerrlight_common::frames::Frames;
 use kerrlight_render::volume::Volume;
 use kerrlight_render::volume::metrics::{self, Comparison, Mask};
@@ -240,8 +240,8 @@ impl<'t> Fit<'_, 't> {
     /// Returns the distance of a volume from the truth inside the region; none without a truth.
     fn closeness(&self, volume: &Volume) -> Result<Option<Comparison>, Error> {
         let Some(truth) = &self.true_volume else { return Ok(None) };
-        let region = self.file.region.limits();
-        let mask = Mask::new(region.r_min, region.r_max, region.z_width)?;
+        let Region { r_min, r_max, z_width } = self.file.region.limits();
+        let mask = Mask { r_min, r_max, z_width };
         Ok(Some(metrics::compare(volume, truth, Some(&mask))?))
     }
 }

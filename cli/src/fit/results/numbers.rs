@@ -16,7 +16,7 @@ use crate::usage::usage;
 use kerrlight_common::frames::Frames;
 use kerrlight_render::volume::metrics::{self, Mask};
 use kerrlight_tomo::fit::settings::AxisSearch;
-use kerrlight_tomo::fit::{State, Trainer};
+use kerrlight_tomo::fit::{Region, State, Trainer};
 use kerrlight_tomo::recovery::results::{BandResults, GeometryResults, HeldOutResults};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -210,9 +210,8 @@ impl Estimate<'_> {
         let (Some(truth), Some(volume)) = (&self.measured.truth, &self.true_volume) else {
             return Ok(None);
         };
-        let region = &self.file.region;
-        let z_width = region.z_width.unwrap_or(f64::INFINITY);
-        let mask = Mask::new(region.r_min, region.r_max, z_width)?;
+        let Region { r_min, r_max, z_width } = self.file.region.limits();
+        let mask = Mask { r_min, r_max, z_width };
         let all = metrics::compare(&found.volume, volume, None)?;
         let inside = metrics::compare(&found.volume, volume, Some(&mask))?;
         Ok(Some(Closeness {

@@ -1,6 +1,6 @@
 //! Traced rays.
 
-use crate::integrate::outcome::{Outcome, Unresolved};
+use crate::integrate::outcome::Outcome;
 use crate::integrate::path::Path;
 use crate::screen::observer::Ray;
 use crate::spacetime::point::PathPoint;
@@ -38,7 +38,7 @@ impl From<&PathPoint> for PlaneCrossing {
 }
 
 /// Properties of a ray as a whole.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct TracedRay {
     /// λ = L/E, in M.
     pub lambda: f64,
@@ -63,25 +63,6 @@ pub struct TracedRay {
     pub stepped: bool,
     /// True if its path is traced beside the closed form.
     pub with_path: bool,
-}
-
-impl Default for TracedRay {
-    /// A ray that has not been traced.
-    fn default() -> Self {
-        TracedRay {
-            lambda: 0.0,
-            eta: 0.0,
-            outcome: Outcome::Unresolved(Unresolved::StepLimit),
-            crossing_count: 0,
-            crossings: 0..0,
-            mino_total: 0.0,
-            until: 0.0,
-            surface: None,
-            exit: None,
-            stepped: false,
-            with_path: false,
-        }
-    }
 }
 
 impl TracedRay {
