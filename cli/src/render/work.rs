@@ -108,7 +108,9 @@ impl Work<'_> {
             Error::Render(RenderError::Stopped) => {
                 Interrupted(format!("stopped; {}", partial.kept())).into()
             }
-            Error::Exr(error) => anyhow::anyhow!(unwritten(&error, &partial)),
+            Error::Exr(error) => {
+                anyhow::anyhow!("cannot write {}: {error}; {}", partial.shown(), partial.kept())
+            }
             _ if self.device_failure().is_some() => {
                 self.told(&format!("{}, or with --device cpu to start over", partial.kept()))
             }
@@ -122,14 +124,3 @@ impl Work<'_> {
 }
 
 const STOPPED: &str = "stopped; nothing is kept";
-
-/// Explains why bands cannot be written, and what is left.
-fn unwritten(error: &dyn std::error::Error, partial: &Partial) -> String {
-    let io = error.source().and_then(|source| source.downcast_ref::<std::io::Error>());
-    match io {
-        Some(told) if told.get_ref().is_some() => {
-            format!("{told}; finished bands are kept: run the same command again to resume")
-        }
-        _ => format!("cannot write {}: {error}; {}", partial.shown(), partial.kept()),
-    }
-}

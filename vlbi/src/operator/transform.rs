@@ -66,14 +66,6 @@ impl<T: Float> Transform<T> {
             Transform::Fast(_) => None,
         }
     }
-
-    /// Bytes that are kept.
-    pub fn memory_kept(&self) -> usize {
-        match self {
-            Transform::Direct(direct) => direct.memory_kept(),
-            Transform::Fast(fast) => fast.memory_kept(),
-        }
-    }
 }
 
 /// Time of both transform and adjoint, measured (docs/measurements/interferometry.md), whose ratios matter: a pixel

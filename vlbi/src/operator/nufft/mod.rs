@@ -127,11 +127,6 @@ impl Nufft {
         self.accuracy
     }
 
-    /// Bytes that are kept for the visibilities.
-    pub fn memory_kept(&self) -> usize {
-        self.sites.len() * size_of::<Site>()
-    }
-
     /// A column with its first cells repeated at its end.
     fn column_length(&self) -> usize {
         self.rows + self.kernel.width
