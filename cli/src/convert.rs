@@ -8,7 +8,7 @@ use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use kerrlight_vlbi::Error;
 use kerrlight_vlbi::array::Station;
-use kerrlight_vlbi::files::{self, FileError};
+use kerrlight_vlbi::files;
 use kerrlight_vlbi::gains::is_same_station;
 use kerrlight_vlbi::light_curve::LightCurve;
 use kerrlight_vlbi::observation::{Averaging, Flags, Observation};
@@ -288,12 +288,10 @@ fn agree(told: f64, given: f64) -> bool {
 /// An error, with the options that give what the data lack where that is the error.
 fn told(error: anyhow::Error) -> anyhow::Error {
     match error.downcast_ref() {
-        Some(Error::MissingMetadata(_) | Error::File(FileError::MissingMetadata(_))) => {
-            anyhow!(
-                "{} with --source, --array, --mjd, --frequency or --bandwidth",
-                crate::plain::reasons(&error)
-            )
-        }
+        Some(Error::MissingMetadata(_)) => anyhow!(
+            "{} with --source, --array, --mjd, --frequency or --bandwidth",
+            crate::plain::reasons(&error)
+        ),
         _ => error,
     }
 }

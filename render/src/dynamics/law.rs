@@ -1,7 +1,8 @@
 //! Laws of motion, as files write them.
 
+use super::AngularVelocity;
 use super::infall::{Falling, Law, Profile};
-use super::{AngularVelocity, Perturbation};
+use super::perturbed::Perturbation;
 use crate::Error;
 use kerrlight_geodesic::infall::Mixture;
 use schemars::JsonSchema;
@@ -91,9 +92,6 @@ pub struct Perturbed<N = f64> {
     pub seed: Option<u64>,
 }
 
-/// Radii of the table of a perturbed law.
-const ROWS: usize = 100;
-
 impl<N> Velocity<N> {
     /// Itself with other numbers in place of those that may not be known.
     pub fn map<M>(self, f: &impl Fn(N) -> M) -> Velocity<M> {
@@ -134,7 +132,7 @@ impl Velocity {
             Velocity::Table { radii, rates } => AngularVelocity::Table { radii, rates },
             Velocity::Perturbed(law) => {
                 let Perturbed { of, deviation, correlation_length, radii, seed: own } = law;
-                let by = Perturbation { deviation, correlation_length, radii, rows: ROWS };
+                let by = Perturbation { deviation, correlation_length, radii };
                 let of = of.angular(seed, drag)?;
                 if of.falling().is_some() {
                     let allowed = "a law of matter that stays at its radius";
@@ -149,10 +147,10 @@ impl Velocity {
             }
             Velocity::Profile { radii, angular, radial } => {
                 match Profile::new(radii, angular, radial)? {
-                    profile if profile.is_circular() => AngularVelocity::Profile(profile),
-                    profile => {
+                    profile if profile.falls() => {
                         AngularVelocity::Falling(Arc::new(Falling::new(Law::Profile(profile))?))
                     }
+                    profile => AngularVelocity::Profile(profile),
                 }
             }
         }

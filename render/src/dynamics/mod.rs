@@ -17,6 +17,5 @@ mod tests;
 
 pub use angular_velocity::{AngularVelocity, Injection, WayBack};
 pub use law::{Perturbed, Velocity};
-pub use perturbed::Perturbation;
 pub use pull_back::{Cotangents, Turned, pull_back, pull_back_vjp};
 pub use sphere::{Axis, ZeroAxis};

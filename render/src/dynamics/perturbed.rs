@@ -10,20 +10,21 @@ use rand_pcg::Pcg64;
 /// A Gaussian process over the radius: mean 0, covariance s² exp(−(r − r')²/(2 ℓ²)), as in the
 /// mismatch study of Levis et al. 2022 (their Fig. 7).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Perturbation {
+pub(super) struct Perturbation {
     /// s, radians a unit of time.
     pub deviation: f64,
     /// ℓ, M.
     pub correlation_length: f64,
     /// The first and the last radius of the table, M.
     pub radii: [f64; 2],
-    /// Rows of the table.
-    pub rows: usize,
 }
+
+/// Rows of the table.
+const ROWS: usize = 100;
 
 impl Perturbation {
     fn checked(self) -> Result<Self, Error> {
-        let Self { deviation, correlation_length, radii: [first, last], rows } = self;
+        let Self { deviation, correlation_length, radii: [first, last] } = self;
         for (field, value, ok, allowed) in [
             ("deviation", deviation, deviation >= 0.0 && deviation.is_finite(), "0 or above"),
             (
@@ -33,7 +34,6 @@ impl Perturbation {
                 "above 0",
             ),
             ("radii", first, first > 0.0 && first < last && last.is_finite(), "above 0, growing"),
-            ("rows", rows as f64, (2..=1000).contains(&rows), "2 to 1000"),
         ] {
             if !ok {
                 return Err(Error::out_of_range(field, value, allowed));
@@ -45,8 +45,8 @@ impl Perturbation {
     /// Radii of the table.
     fn table(&self) -> Vec<f64> {
         let [first, last] = self.radii;
-        let step = (last - first) / (self.rows - 1) as f64;
-        (0..self.rows).map(|k| first + step * k as f64).collect()
+        let step = (last - first) / (ROWS - 1) as f64;
+        (0..ROWS).map(|k| first + step * k as f64).collect()
     }
 
     /// Draws the perturbation of the velocity at each radius. The square root of the covariance comes
@@ -74,7 +74,7 @@ impl AngularVelocity {
     ///
     /// # Errors
     /// If a number of the perturbation is out of its range.
-    pub fn perturbed(&self, by: Perturbation, seed: u64) -> Result<Self, Error> {
+    pub(super) fn perturbed(&self, by: Perturbation, seed: u64) -> Result<Self, Error> {
         let radii = by.checked()?.table();
         let drawn = by.draw(&radii, seed);
         let rates = radii.iter().zip(drawn).map(|(r, by)| self.rate(*r) + by).collect();
@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     const BY: Perturbation =
-        Perturbation { deviation: 0.3, correlation_length: 0.5, radii: [1.0, 10.0], rows: 100 };
+        Perturbation { deviation: 0.3, correlation_length: 0.5, radii: [1.0, 10.0] };
 
     /// Variance and correlations of many draws are those of the process.
     #[test]
@@ -124,6 +124,5 @@ mod tests {
         assert!(
             text(Perturbation { correlation_length: 0.0, ..BY }).contains("correlation_length")
         );
-        assert!(text(Perturbation { rows: 1, ..BY }).contains("rows = 1 "));
     }
 }

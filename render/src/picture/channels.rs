@@ -24,7 +24,7 @@ pub struct ChannelKind {
     /// Tests whether a scene has it, with pixels refined or not.
     pub(super) present: Present,
     /// Source of its values in a pixel.
-    value: Value,
+    pub(super) value: Value,
     /// True if pictures have it only where `screen.channels` names it or its layer.
     pub on_request: bool,
     /// True if it is in the unit of intensity.
@@ -33,7 +33,7 @@ pub struct ChannelKind {
 
 /// Source of a channel in a pixel: its light and its central ray, or what is kept besides.
 #[derive(Clone, Copy)]
-enum Value {
+pub(super) enum Value {
     Pixel(fn(&Pixel) -> f64),
     Layers(fn(&Layers) -> f64),
 }
@@ -76,17 +76,6 @@ impl ChannelKind {
     ) -> Self {
         let (value, present) = (Value::Pixel(value), always as Present);
         ChannelKind { name, unit, meaning, present, value, on_request: false, scales: false }
-    }
-
-    pub(super) const fn on_request(
-        name: &'static str,
-        unit: &'static str,
-        meaning: &'static str,
-        present: Present,
-        value: fn(&Layers) -> f64,
-    ) -> Self {
-        let value = Value::Layers(value);
-        ChannelKind { name, unit, meaning, present, value, on_request: true, scales: false }
     }
 }
 

@@ -27,14 +27,7 @@ pub struct Plan {
 impl Raster {
     /// Returns the plan of the picture.
     pub fn plan(&self) -> Plan {
-        Plan::of(&self.prepared)
-    }
-}
-
-impl Plan {
-    /// The plan of a prepared scene.
-    pub fn of(prepared: &PreparedScene) -> Self {
-        let mut plan = Plan { steps: Vec::new() };
+        let (mut plan, prepared) = (Plan { steps: Vec::new() }, &self.prepared);
         plan.rays(prepared);
         plan.layers(prepared);
         plan.surfaces(prepared);
@@ -44,7 +37,9 @@ impl Plan {
         plan.sky(prepared);
         plan
     }
+}
 
+impl Plan {
     fn say(&mut self, part: Part, done: bool, what: impl Into<String>) {
         self.steps.push(Step { part, what: what.into(), done });
     }

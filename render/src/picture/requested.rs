@@ -1,6 +1,6 @@
 //! Channels on request: what compositors and engines take apart.
 
-use super::channels::{ChannelKind, Present, always};
+use super::channels::{ChannelKind, Present, Value, always};
 use crate::transport::{Layers, PreparedScene};
 
 const OPACITY: &str = "share of the light from behind that is held up: by the horizon, opaque surfaces and absorbing gas";
@@ -47,7 +47,8 @@ const fn channel(
     present: Present,
     value: fn(&Layers) -> f64,
 ) -> ChannelKind {
-    ChannelKind::on_request(name, unit, meaning, present, value)
+    let value = Value::Layers(value);
+    ChannelKind { name, unit, meaning, present, value, on_request: true, scales: false }
 }
 
 /// The channels that pictures have only where `screen.channels` names them or their layers.

@@ -13,6 +13,7 @@ pub(super) struct Workspace {
     pub scratch: Scratch,
     pub alpha: Vec<f64>,
     pub beta: Vec<f64>,
+    /// The squares whose centres have been pushed.
     pub squares: Vec<Square>,
     pub seen: Vec<RayResult>,
     /// Other layers of the rays, if any are wanted.
@@ -38,11 +39,6 @@ impl Workspace {
     pub fn push_ray(&mut self, x: f64, y: f64) {
         self.alpha.push(x);
         self.beta.push(y);
-    }
-
-    /// The squares whose centres have been pushed.
-    pub fn squares(&self) -> &[Square] {
-        &self.squares
     }
 
     /// Returns the results of all rays, in their order.

@@ -53,11 +53,6 @@ impl PowerLaw {
         Ok(PowerLaw { index, linear: (index + 1.0) / (index + 5.0 / 3.0), circular })
     }
 
-    /// Spectral index α of the spectrum ν^−α, dimensionless.
-    pub fn spectral_index(&self) -> f64 {
-        self.index
-    }
-
     /// The emissivity in the gas frame, the direction of its polarisation that on the screen,
     /// relative to that of a field of strength 1 normal to the ray. No power of g is in it.
     ///

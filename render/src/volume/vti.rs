@@ -3,19 +3,10 @@
 //!
 //! <https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html>
 
-use super::Volume;
 use super::metrics::same_nodes;
+use super::{Shown, Volume};
 use crate::Error;
 use std::io::{self, Write};
-
-/// A volume as a field of a file.
-#[derive(Clone, Copy, Debug)]
-pub struct Field<'a> {
-    /// Its name in the file: letters, digits and `_`.
-    pub name: &'a str,
-    /// Its values.
-    pub volume: &'a Volume,
-}
 
 /// Reason why a file is not written.
 #[derive(Debug, thiserror::Error)]
@@ -29,12 +20,12 @@ pub enum VtiError {
     Empty,
 }
 
-/// Writes fields on the same nodes, the first of them as the active one. Coordinates
-/// are in M.
+/// Writes volumes on the same nodes as fields, the first of them as the active one. Coordinates are in M, names are of
+/// letters, digits and `_`.
 ///
 /// # Errors
 /// If the nodes differ, a name is not allowed or used twice, or the bytes cannot be written.
-pub fn write(out: &mut impl Write, fields: &[Field]) -> Result<(), Error> {
+pub fn write(out: &mut impl Write, fields: &[Shown]) -> Result<(), Error> {
     let Some(first) = fields.first() else { return Err(VtiError::Empty.into()) };
     for (k, field) in fields.iter().enumerate() {
         let simple = field.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
@@ -52,7 +43,7 @@ pub fn write(out: &mut impl Write, fields: &[Field]) -> Result<(), Error> {
     Ok(())
 }
 
-fn header(fields: &[Field], first: &Field) -> String {
+fn header(fields: &[Shown], first: &Shown) -> String {
     let volume = first.volume;
     let last = volume.nodes().map(|n| n - 1);
     let extent = format!("0 {} 0 {} 0 {}", last[0], last[1], last[2]);
@@ -61,7 +52,7 @@ fn header(fields: &[Field], first: &Field) -> String {
         core::array::from_fn(|k| (volume.high()[k] - volume.low()[k]) / last[k] as f64);
     // Each field is preceded by its length in 64 bits.
     let block = 8 + 4 * volume.values().len();
-    let array = |(k, field): (usize, &Field)| {
+    let array = |(k, field): (usize, &Shown)| {
         let (name, offset) = (field.name, k * block);
         format!(
             r#"        <DataArray type="Float32" Name="{name}" format="appended" offset="{offset}"/>"#
@@ -117,8 +108,8 @@ mod tests {
         let doubled = volume.values().iter().map(|v| 2.0 * v).collect();
         let doubled = Volume::new(volume.nodes(), volume.low(), volume.high(), doubled).unwrap();
         let fields = [
-            Field { name: "emission", volume: &volume },
-            Field { name: "emission_truth", volume: &doubled },
+            Shown { name: "emission", volume: &volume },
+            Shown { name: "emission_truth", volume: &doubled },
         ];
         let mut bytes = Vec::new();
         write(&mut bytes, &fields).unwrap();
@@ -151,7 +142,7 @@ mod tests {
     fn wrong_fields_are_named() {
         let (volume, mut bytes) = (ramp(), Vec::new());
         let other = Volume::new([2, 3, 4], [-5.0; 3], [5.0; 3], vec![0.0; 24]).unwrap();
-        let field = |name, volume| Field { name, volume };
+        let field = |name, volume| Shown { name, volume };
         assert!(matches!(write(&mut bytes, &[]), Err(Error::Vti(VtiError::Empty))));
         for name in ["", "a\"b", "a b"] {
             assert!(matches!(

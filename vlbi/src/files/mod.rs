@@ -29,7 +29,7 @@ pub use text_image::{is_text_image, parse as parse_text_image};
 pub use uvfits::{read as read_uvfits, write as write_uvfits};
 
 use super::array::{MOST_STATIONS, Station};
-use super::observation::{MissingMetadata, Observation};
+use super::observation::Observation;
 use crate::Error;
 use std::collections::HashMap;
 
@@ -56,9 +56,6 @@ pub enum FileError {
     /// An error of the file as a whole.
     #[error("{0}")]
     Whole(String),
-    /// The data lack what the format needs.
-    #[error(transparent)]
-    MissingMetadata(#[from] MissingMetadata),
 }
 
 impl FileError {

@@ -25,8 +25,8 @@ pub fn write(found: &Summary, prepared: &Problem, folder: &Path) -> anyhow::Resu
         let bytes = VolumeFile { volume: (*volume).clone(), axis: None }.to_npz();
         file(&format!("{name}.npz"))?.write(&bytes)?;
     }
-    let fields: Vec<vti::Field<'_>> =
-        volumes.into_iter().map(|(name, volume)| vti::Field { name, volume }).collect();
+    let fields: Vec<Shown<'_>> =
+        volumes.into_iter().map(|(name, volume)| Shown { name, volume }).collect();
     let write = |out: &mut std::io::BufWriter<&std::fs::File>| Ok(vti::write(out, &fields)?);
     file("posterior.vti")?.write_with(write)?;
     let triangle = triangle(found);

@@ -24,7 +24,7 @@ use super::folder::Folder;
 use gains::Gains;
 use kerrlight_common::frames::Frames;
 use kerrlight_common::units::MICROARCSECOND;
-use kerrlight_render::volume::{Volume, VolumeFile, vti};
+use kerrlight_render::volume::{Shown, Volume, VolumeFile, vti};
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::setup::{self, FitData, Instrument, PreviewImage, PreviewView};
 use kerrlight_tomo::fit::{Loss, Motion, State};
@@ -131,10 +131,10 @@ impl Estimate<'_> {
             self.folder.file(name)?.write(&file.to_npz())
         };
         save("volume.npz", volume, state.now.axis.vector())?;
-        let mut fields = vec![vti::Field { name: "emission", volume }];
+        let mut fields = vec![Shown { name: "emission", volume }];
         if let (Some(volume), Some(truth)) = (&self.true_volume, &self.measured.truth) {
             save("truth.npz", volume, truth.axis().vector())?;
-            fields.push(vti::Field { name: "truth", volume });
+            fields.push(Shown { name: "truth", volume });
         }
         let write = |out: &mut std::io::BufWriter<&std::fs::File>| Ok(vti::write(out, &fields)?);
         self.folder.file("volume.vti")?.write_with(write)

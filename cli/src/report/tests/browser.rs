@@ -5,8 +5,7 @@ use crate::output::Output;
 use crate::report::{Report, View3d};
 use kerrlight_render::dynamics::{self, AngularVelocity, Turned, pull_back};
 use kerrlight_render::points::{Coordinates, CoordinatesMut};
-use kerrlight_render::volume::Volume;
-use kerrlight_render::volume::vti::{self, Field};
+use kerrlight_render::volume::{Shown, Volume, vti};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -67,8 +66,8 @@ fn write(report: &Report, folder: &Path) {
     report.write(&Output::new(&folder.join("report.html"), "html").unwrap()).unwrap();
     let view = report.view.as_ref().unwrap();
     let fields = [
-        Field { name: "emission", volume: &view.recovered },
-        Field { name: "emission_truth", volume: view.truth.as_ref().unwrap() },
+        Shown { name: "emission", volume: &view.recovered },
+        Shown { name: "emission_truth", volume: view.truth.as_ref().unwrap() },
     ];
     let output = Output::new(&folder.join("emission.vti"), "vti").unwrap();
     output.write_with(|file| Ok(vti::write(file, &fields)?)).unwrap();

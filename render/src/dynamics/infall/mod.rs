@@ -95,7 +95,7 @@ impl Falling {
             }
             Law::Profile(profile) => profile,
         };
-        if profile.is_circular() {
+        if !profile.falls() {
             return Err(Error::out_of_range("radial", 0.0, "not 0, where matter falls"));
         }
         let table = profile.trajectory();

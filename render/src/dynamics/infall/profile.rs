@@ -46,11 +46,6 @@ impl Profile {
         Ok(Self { radii, angular: [angular, of_angular], radial: [radial, of_radial] })
     }
 
-    /// Returns whether matter stays at its radius.
-    pub fn is_circular(&self) -> bool {
-        !self.falls()
-    }
-
     /// Returns whether matter changes its radius.
     pub fn falls(&self) -> bool {
         self.radial[0].iter().any(|v| *v != 0.0)
@@ -142,7 +137,7 @@ mod tests {
             let [_, turn] = steps.rates(2.0 + 0.05 * f64::from(k));
             assert!((0.1..=0.5).contains(&turn), "{turn}");
         }
-        assert!(steps.is_circular());
+        assert!(!steps.falls());
     }
 
     #[test]

@@ -4,23 +4,14 @@ use core::f64::consts::TAU;
 use kerrlight_geodesic::vector::{cross, difference, dot};
 
 /// Reason why a polygon cannot be cut.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Uncut {
     /// Its outline crosses itself.
+    #[error("the outline of the polygon crosses itself")]
     Crosses,
     /// It is not convex and has too many corners.
+    #[error("the polygon is not convex and has more than {MOST_CORNERS} corners")]
     Corners,
-}
-
-impl core::fmt::Display for Uncut {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Uncut::Crosses => f.write_str("the outline of the polygon crosses itself"),
-            Uncut::Corners => {
-                write!(f, "the polygon is not convex and has more than {MOST_CORNERS} corners")
-            }
-        }
-    }
 }
 
 /// Triangles of a polygon, as numbers of its corners.

@@ -10,6 +10,7 @@ use crate::picture::pixels::Pixel;
 const MOST_SAMPLES: u32 = 4096;
 
 /// A pixel that is being cut.
+#[derive(Default)]
 pub(super) struct Cut {
     /// Index among the tile's pixels.
     pub(super) pixel: usize,
@@ -33,32 +34,6 @@ pub(super) struct Cut {
 }
 
 impl Cut {
-    /// A pixel that is still in one piece; its number, its place in the picture and what is around.
-    pub(super) fn whole(
-        pixel: usize,
-        [column, row]: [usize; 2],
-        [bright, disc]: [f64; 2],
-        edge: bool,
-        around: [Light; 9],
-    ) -> Self {
-        let (cells, contrast) = (Vec::new(), 0.0);
-        let (samples, rays, unresolved) = (0, 0, 0);
-        Self {
-            pixel,
-            column,
-            row,
-            cells,
-            bright,
-            edge,
-            disc,
-            around,
-            contrast,
-            samples,
-            rays,
-            unresolved,
-        }
-    }
-
     /// Root of the sum of squares: the errors of cells at an edge are independent.
     pub(super) fn inner_error(&self) -> f64 {
         self.cells.iter().map(|cell| cell.total().powi(2)).sum::<f64>().sqrt()

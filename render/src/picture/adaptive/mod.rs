@@ -102,7 +102,7 @@ impl Adaptive<'_> {
     /// The light of the squares of `work`.
     fn sample(&self, work: &mut Workspace) -> Result<Vec<Light>, Error> {
         let mut seen = work.observe(self.prepared)?.to_vec();
-        let squares = work.squares().to_vec();
+        let squares = work.squares.clone();
         let counted = self.resolve(&squares, &mut seen, work)?;
         Ok(seen.iter().zip(&counted).map(Light::new).collect())
     }
@@ -195,8 +195,9 @@ impl Adaptive<'_> {
                     rings.is_some_and(|rings| rings.count(square) > 0)
                 };
                 if contrast.is_some() || error > tolerance || ring() {
-                    let (place, edge) = ([column, row], contrast.is_some());
-                    cuts.push(Cut::whole(pixels.len(), place, [bright, disc], edge, around));
+                    let (pixel, edge) = (pixels.len(), contrast.is_some());
+                    let whole = Cut { pixel, column, row, ..Cut::default() };
+                    cuts.push(Cut { bright, edge, disc, around, ..whole });
                 }
                 pixels.push(Pixel { missed, ..of_one_ray(center, error) });
             }
