@@ -66,6 +66,14 @@ impl<T: Float> Transform<T> {
             Transform::Fast(_) => None,
         }
     }
+
+    /// Returns the one that it is.
+    fn operator(&self) -> &dyn Operator<T> {
+        match self {
+            Transform::Direct(direct) => direct,
+            Transform::Fast(fast) => fast,
+        }
+    }
 }
 
 /// Time of both transform and adjoint, measured (docs/measurements/interferometry.md), whose ratios matter: a pixel
@@ -92,38 +100,23 @@ fn is_fast_cheaper(grid: ImageGrid, frames: &[Vec<[f64; 2]>], accuracy: f64) -> 
 
 impl<T: Float> Operator<T> for Transform<T> {
     fn frames(&self) -> usize {
-        match self {
-            Transform::Direct(direct) => direct.frames(),
-            Transform::Fast(fast) => Operator::<T>::frames(fast),
-        }
+        self.operator().frames()
     }
 
     fn pixels(&self) -> usize {
-        match self {
-            Transform::Direct(direct) => direct.pixels(),
-            Transform::Fast(fast) => Operator::<T>::pixels(fast),
-        }
+        self.operator().pixels()
     }
 
     fn data(&self) -> usize {
-        match self {
-            Transform::Direct(direct) => direct.data(),
-            Transform::Fast(fast) => Operator::<T>::data(fast),
-        }
+        self.operator().data()
     }
 
     fn forward(&self, movie: &[T], data: &mut [Complex<T>]) {
-        match self {
-            Transform::Direct(direct) => direct.forward(movie, data),
-            Transform::Fast(fast) => fast.forward(movie, data),
-        }
+        self.operator().forward(movie, data);
     }
 
     fn adjoint(&self, data: &[Complex<T>], movie: &mut [T]) {
-        match self {
-            Transform::Direct(direct) => direct.adjoint(data, movie),
-            Transform::Fast(fast) => fast.adjoint(data, movie),
-        }
+        self.operator().adjoint(data, movie);
     }
 }
 

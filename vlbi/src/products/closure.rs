@@ -1,7 +1,6 @@
 //! Closure phases and log closure amplitudes of scans.
 
 use super::independent::keep_independent;
-use super::layers::Layers;
 use crate::observation::{Measured, Observation};
 use std::collections::HashMap;
 
@@ -65,11 +64,9 @@ impl Baseline {
 }
 
 /// A candidate: stations, and baselines with signs.
-struct Candidate<const N: usize> {
+struct Candidate {
     stations: Vec<u16>,
-    members: [usize; N],
-    signs: [i8; N],
-    variance: f64,
+    legs: Vec<(usize, i8)>,
 }
 
 impl ClosureSet {
@@ -79,7 +76,8 @@ impl ClosureSet {
     /// Baselines weaker than `least_snr` times their noise are left out, and those without error. Rows that repeat a
     /// baseline of their scan make sets of their own.
     pub fn of(observation: &Observation, kind: ClosureKind, least_snr: f64) -> Vec<ClosureSet> {
-        let mut scans: HashMap<(u64, u16), Layers<Baseline>> = HashMap::new();
+        let mut scans: HashMap<(u64, u16, usize), Vec<Baseline>> = HashMap::new();
+        let mut counts = HashMap::new();
         for (visibility, (row, measured)) in observation.stokes_i().enumerate() {
             // Above, not at, the limit: a visibility of 0 has no phase, even where the limit is 0.
             let strong = measured.visibility.norm() > least_snr * measured.noise_sigma;
@@ -90,16 +88,18 @@ impl ClosureSet {
             let [a, b] = row.stations;
             let (stations, sense) = if ascending { ([a, b], 1) } else { ([b, a], -1) };
             let baseline = Baseline { stations, visibility, sense, measured };
-            let layers = scans.entry((row.time_h.to_bits(), row.channel)).or_default();
-            layers.add(stations, baseline);
+            // The first rows of all baselines, the second ones, and so on: none is lost.
+            let (time, channel) = (row.time_h.to_bits(), row.channel);
+            let layer = counts.entry((time, channel, stations)).or_insert(0);
+            scans.entry((time, channel, *layer)).or_default().push(baseline);
+            *layer += 1;
         }
-        let sets = scans.into_iter().flat_map(|((time, channel), layers)| {
-            let set = move |rows: Vec<Baseline>| (channel, scan(f64::from_bits(time), &rows, kind));
-            layers.all().map(set)
+        let sets = scans.into_iter().map(|((time, channel, layer), rows)| {
+            ((channel, layer), scan(f64::from_bits(time), &rows, kind))
         });
-        let mut sets: Vec<(u16, ClosureSet)> =
+        let mut sets: Vec<((u16, usize), ClosureSet)> =
             sets.filter(|(_, set)| !set.closures.is_empty()).collect();
-        // A HashMap has no order; the sort is stable, so that layers of a scan keep theirs.
+        // A HashMap has no order.
         sets.sort_by(|(j, a), (k, b)| a.time_h.total_cmp(&b.time_h).then(j.cmp(k)));
         sets.into_iter().map(|(_, set)| set).collect()
     }
@@ -112,10 +112,11 @@ fn scan(time_h: f64, baselines: &[Baseline], kind: ClosureKind) -> ClosureSet {
     stations.sort_unstable();
     stations.dedup();
     let find = |a: u16, b: u16| index.get(&[a.min(b), a.max(b)]).copied();
-    let closures = match kind {
-        ClosureKind::Phase => choose(triangles(&stations, find), baselines, kind),
-        ClosureKind::LogAmplitude => choose(quadrangles(&stations, find), baselines, kind),
+    let candidates = match kind {
+        ClosureKind::Phase => triangles(&stations, find),
+        ClosureKind::LogAmplitude => quadrangles(&stations, find),
     };
+    let closures = choose(candidates, baselines, kind);
     let variance: HashMap<usize, f64> =
         baselines.iter().map(|b| (b.visibility, b.variance())).collect();
     let shared = |a: &Closure, b: &Closure| -> f64 {
@@ -130,10 +131,8 @@ fn scan(time_h: f64, baselines: &[Baseline], kind: ClosureKind) -> ClosureSet {
     ClosureSet { time_h, closures, covariance }
 }
 
-type Members<const N: usize> = (Vec<u16>, [usize; N], [i8; N]);
-
 /// All triangles of stations in ascending order: V₁₂ V₂₃ V₃₁.
-fn triangles(stations: &[u16], find: impl Fn(u16, u16) -> Option<usize>) -> Vec<Members<3>> {
+fn triangles(stations: &[u16], find: impl Fn(u16, u16) -> Option<usize>) -> Vec<Candidate> {
     let mut found = Vec::new();
     for (i, &a) in stations.iter().enumerate() {
         for (j, &b) in stations.iter().enumerate().skip(i + 1) {
@@ -141,7 +140,8 @@ fn triangles(stations: &[u16], find: impl Fn(u16, u16) -> Option<usize>) -> Vec<
             for &c in &stations[j + 1..] {
                 if let (Some(bc), Some(ac)) = (find(b, c), find(a, c)) {
                     // V₃₁ is the conjugate of V₁₃.
-                    found.push((vec![a, b, c], [ab, bc, ac], [1, 1, -1]));
+                    let legs = vec![(ab, 1), (bc, 1), (ac, -1)];
+                    found.push(Candidate { stations: vec![a, b, c], legs });
                 }
             }
         }
@@ -151,7 +151,7 @@ fn triangles(stations: &[u16], find: impl Fn(u16, u16) -> Option<usize>) -> Vec<
 
 /// The three quadrangles of every four stations: |V₁₂V₃₄|/|V₁₃V₂₄|, |V₁₂V₃₄|/|V₁₄V₂₃| and
 /// |V₁₃V₂₄|/|V₁₄V₂₃|, all in the form of the first.
-fn quadrangles(stations: &[u16], find: impl Fn(u16, u16) -> Option<usize>) -> Vec<Members<4>> {
+fn quadrangles(stations: &[u16], find: impl Fn(u16, u16) -> Option<usize>) -> Vec<Candidate> {
     let mut found = Vec::new();
     let n = stations.len();
     for i in 0..n {
@@ -162,7 +162,8 @@ fn quadrangles(stations: &[u16], find: impl Fn(u16, u16) -> Option<usize>) -> Ve
                     for [p, q, r, s] in [[a, b, c, d], [a, b, d, c], [a, c, d, b]] {
                         let legs = [find(p, q), find(r, s), find(p, r), find(q, s)];
                         if let [Some(x), Some(y), Some(z), Some(w)] = legs {
-                            found.push((vec![p, q, r, s], [x, y, z, w], [1, 1, -1, -1]));
+                            let legs = vec![(x, 1), (y, 1), (z, -1), (w, -1)];
+                            found.push(Candidate { stations: vec![p, q, r, s], legs });
                         }
                     }
                 }
@@ -172,30 +173,28 @@ fn quadrangles(stations: &[u16], find: impl Fn(u16, u16) -> Option<usize>) -> Ve
     found
 }
 
-fn choose<const N: usize>(
-    members: Vec<Members<N>>,
-    baselines: &[Baseline],
-    kind: ClosureKind,
-) -> Vec<Closure> {
-    let mut candidates: Vec<Candidate<N>> = members
-        .into_iter()
-        .map(|(stations, members, signs)| {
-            let variance = members.iter().map(|b| baselines[*b].variance()).sum();
-            Candidate { stations, members, signs, variance }
-        })
-        .collect();
-    candidates.sort_by(|a, b| a.variance.total_cmp(&b.variance));
-    let listed = candidates.iter().enumerate().map(|(k, c)| (k, c.members));
-    let kept = keep_independent(baselines.len(), listed);
-    kept.into_iter().map(|k| closure(&candidates[k], baselines, kind)).collect()
+fn choose(candidates: Vec<Candidate>, baselines: &[Baseline], kind: ClosureKind) -> Vec<Closure> {
+    let variance =
+        |c: &Candidate| -> f64 { c.legs.iter().map(|(b, _)| baselines[*b].variance()).sum() };
+    let mut candidates: Vec<(f64, Candidate)> =
+        candidates.into_iter().map(|candidate| (variance(&candidate), candidate)).collect();
+    candidates.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    let members = candidates.iter().map(|(_, c)| c.legs.iter().map(|(b, _)| *b));
+    let kept = keep_independent(baselines.len(), members);
+    let of = |k: usize| {
+        let (variance, candidate) = &candidates[k];
+        closure(candidate, variance.sqrt(), baselines, kind)
+    };
+    kept.into_iter().map(of).collect()
 }
 
-fn closure<const N: usize>(
-    candidate: &Candidate<N>,
+fn closure(
+    candidate: &Candidate,
+    noise_sigma: f64,
     baselines: &[Baseline],
     kind: ClosureKind,
 ) -> Closure {
-    let legs = || candidate.members.iter().map(|b| &baselines[*b]).zip(candidate.signs);
+    let legs = || candidate.legs.iter().map(|(b, sign)| (&baselines[*b], *sign));
     let value = match kind {
         // A product instead of a sum of angles stays in (−π, π].
         ClosureKind::Phase => legs()
@@ -224,7 +223,7 @@ fn closure<const N: usize>(
         stations: candidate.stations.clone(),
         legs: legs().map(|(b, s)| Leg { visibility: b.visibility, sign: sign(b, s) }).collect(),
         value,
-        noise_sigma: candidate.variance.sqrt(),
+        noise_sigma,
     }
 }
 

@@ -6,17 +6,17 @@
 /// Closure quantities are sums of ±1 times a property of each baseline. Independence modulo 2
 /// implies independence; and the sets that it keeps are largest ones when all baselines are
 /// there: (n − 1)(n − 2)/2 triangles, n(n − 3)/2 quadrangles of n stations.
-pub fn keep_independent<const N: usize>(
+pub fn keep_independent(
     baselines: usize,
-    candidates: impl Iterator<Item = (usize, [usize; N])>,
+    candidates: impl Iterator<Item = impl Iterator<Item = usize>>,
 ) -> Vec<usize> {
     let words = baselines.div_ceil(64);
     // Rows in echelon form, by their lowest baseline.
     let mut echelon: Vec<Option<Vec<u64>>> = vec![None; baselines];
     let mut kept = Vec::new();
-    for (index, members) in candidates {
+    for (index, members) in candidates.enumerate() {
         let mut row = vec![0u64; words];
-        members.iter().for_each(|b| row[b / 64] ^= 1 << (b % 64));
+        members.for_each(|b| row[b / 64] ^= 1 << (b % 64));
         while let Some(lowest) = lowest(&row) {
             match &echelon[lowest] {
                 Some(pivot) => row.iter_mut().zip(pivot).for_each(|(a, b)| *a ^= b),

@@ -5,7 +5,6 @@
 mod closure;
 mod count;
 mod independent;
-mod layers;
 
 pub use closure::{Closure, ClosureKind, ClosureSet, Leg};
 pub use count::ClosureCount;
