@@ -15,8 +15,10 @@ pub use polarized::PolarizedTerm;
 pub use ratios::RatioTerm;
 pub use visibilities::{AmplitudeTerm, VisibilityTerm};
 
+use super::Complex64;
 use super::observation::{Measured, Observation};
 use super::operator::Float;
+use super::polarimetry::MODELLED;
 use core::f64::consts::{PI, TAU};
 use num_complex::Complex;
 
@@ -134,6 +136,15 @@ fn inverse_variances<T: Float>(data: &[Measured]) -> Result<Vec<T>, DataTermErro
         inverse.is_finite().then_some(inverse).ok_or(overflow)
     };
     data.iter().enumerate().map(one).collect()
+}
+
+/// I, Q and U of a row of a model, which has I of all rows, then Q, then U.
+fn stokes<T: Float>(model: &[Complex<T>], row: usize) -> [Complex64; MODELLED] {
+    let rows = model.len() / MODELLED;
+    [0, 1, 2].map(|k| {
+        let v = model[k * rows + row];
+        Complex64::new(v.re.double(), v.im.double())
+    })
 }
 
 /// Amplitudes at or below this count as 0: their squares underflow, and phase and logarithm mean nothing.

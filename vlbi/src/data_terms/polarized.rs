@@ -1,7 +1,7 @@
 //! Products of circular feeds, or Stokes parameters, of a model with I, Q and U; with leakage that is held, and gains that
 //! are solved for beside every model.
 
-use super::{DataTerm, GainTerm, Residual, VisibilityTerm};
+use super::{DataTerm, GainTerm, Residual, VisibilityTerm, stokes};
 use crate::Complex64;
 use crate::Error;
 use crate::gains::{GainPriors, ScanGains};
@@ -101,18 +101,10 @@ impl PolarizedTerm {
         self.all.iter().map(|at| by_row[at.row][at.product]).collect()
     }
 
-    /// I, Q and U of a row.
-    fn stokes<T: Float>(&self, model: &[Complex<T>], row: usize) -> [Complex64; MODELLED] {
-        [0, 1, 2].map(|k| {
-            let v = model[k * self.rows + row];
-            Complex64::new(v.re.double(), v.im.double())
-        })
-    }
-
     fn products<T: Float>(&self, responses: &[Response], model: &[Complex<T>]) -> Vec<Complex64> {
         assert_eq!(model.len(), MODELLED * self.rows);
         let of = |(at, response): (&Product, &Response)| {
-            self.stokes(model, at.row).iter().zip(response).map(|(v, factor)| v * factor).sum()
+            stokes(model, at.row).iter().zip(response).map(|(v, factor)| v * factor).sum()
         };
         self.all.iter().zip(responses).map(of).collect()
     }
@@ -142,7 +134,7 @@ impl PolarizedTerm {
             value: *value,
             weight: sigma.powi(-2),
             gain: gain(self.stations[at.row]),
-            model: self.stokes(model, at.row),
+            model: stokes(model, at.row),
         };
         self.all.iter().zip(&self.values).map(one).collect()
     }

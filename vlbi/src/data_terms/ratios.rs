@@ -1,6 +1,6 @@
 //! Polarimetric ratios of a model with I, Q and U.
 
-use super::{DataTerm, DataTermError, Residual};
+use super::{DataTerm, DataTermError, Residual, stokes};
 use crate::Complex64;
 use crate::Error;
 use crate::observation::{Basis, Measured, Observation, Row};
@@ -60,14 +60,6 @@ impl RatioTerm {
     pub fn uv(observation: &Observation, least_snr: f64) -> Vec<[f64; 2]> {
         strong(observation, least_snr).map(|(row, _)| row.uv).collect()
     }
-
-    /// I, Q and U of the model on a baseline.
-    fn stokes<T: Float>(&self, model: &[Complex<T>], row: usize) -> [Complex64; MODELLED] {
-        [0, 1, 2].map(|k| {
-            let v = model[k * self.baselines.len() + row];
-            Complex64::new(v.re.double(), v.im.double())
-        })
-    }
 }
 
 impl Baseline {
@@ -112,12 +104,11 @@ fn strong(observation: &Observation, least_snr: f64) -> impl Iterator<Item = (&R
 /// Q ± iU of a row, each with the turn of its U.
 fn crossed(row: &Row, basis: Basis) -> Vec<(Complex64, Measured)> {
     let j = Complex64::i();
-    let measured = |k: usize| row.product(k).filter(|datum| !datum.is_unmeasured());
     let both = match basis {
-        Basis::Circular => [measured(2), measured(3)],
+        Basis::Circular => [row.measured(2), row.measured(3)],
         Basis::Stokes => {
             let sum = |turn: Complex64| {
-                let (q, u) = measured(1).zip(measured(2))?;
+                let (q, u) = row.measured(1).zip(row.measured(2))?;
                 let visibility = q.visibility + turn * u.visibility;
                 Some(Measured { visibility, noise_sigma: q.noise_sigma.hypot(u.noise_sigma) })
             };
@@ -150,7 +141,7 @@ impl<T: Float> DataTerm<T> for RatioTerm {
         assert_eq!((model.len(), gradient.len()), (MODELLED * count, MODELLED * count));
         let mut total = 0.0;
         for (row, baseline) in self.baselines.iter().enumerate() {
-            let stokes = self.stokes(model, row);
+            let stokes = stokes(model, row);
             let (residuals, best) = baseline.innovations(stokes);
             total += residuals.iter().map(Complex64::norm_sqr).sum::<f64>();
             if is_dark(stokes[0]) {
@@ -172,7 +163,7 @@ impl<T: Float> DataTerm<T> for RatioTerm {
 
     fn residuals(&self, model: &[Complex<T>]) -> Vec<Residual> {
         let of = |(row, baseline): (usize, &Baseline)| {
-            let (residuals, _) = baseline.innovations(self.stokes(model, row));
+            let (residuals, _) = baseline.innovations(stokes(model, row));
             let data = baseline.crossed.iter().map(|(_, p)| p.visibility / p.noise_sigma);
             let parts = |(value, datum): (Complex64, Complex64)| {
                 [(value.re, datum.re), (value.im, datum.im)]

@@ -2,10 +2,10 @@
 
 use super::*;
 use crate::Error;
+use crate::conformance;
 use crate::noise::add_thermal_noise;
 use crate::observation::{Basis, Row};
 use crate::products::{ClosureKind, ClosureSet};
-use crate::{Complex64, conformance};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 

@@ -3,7 +3,7 @@
 use super::EarthError;
 
 /// JD of MJD 0.
-pub(super) const MJD_ZERO: f64 = 2_400_000.5;
+pub(crate) const MJD_ZERO: f64 = 2_400_000.5;
 
 /// TAI − UTC in seconds on a day.
 ///

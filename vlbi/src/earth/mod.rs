@@ -5,6 +5,7 @@ mod sidereal;
 mod ut1;
 mod view;
 
+pub(crate) use leap_seconds::MJD_ZERO;
 pub use leap_seconds::tai_minus_utc;
 pub use sidereal::{Moment, gmst_hours, hours_utc_of_gmst};
 pub use ut1::{Ut1, ut1_minus_utc};

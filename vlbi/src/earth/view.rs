@@ -86,6 +86,23 @@ impl View {
         }
     }
 
+    /// Makes views at hours of UTC of a day: those that follow each other at one time are made once.
+    pub(crate) fn of_day(
+        source: SourcePosition,
+        mjd: i32,
+        frame: Frame,
+    ) -> impl FnMut(f64) -> Result<Self, Error> {
+        let mut last: Option<(f64, Self)> = None;
+        move |hours_utc| match last {
+            Some((hours, view)) if hours == hours_utc => Ok(view),
+            _ => {
+                let view = Self::new(source, Moment { mjd, hours_utc }, Ut1::Table, frame)?;
+                last = Some((hours_utc, view));
+                Ok(view)
+            }
+        }
+    }
+
     /// The view at a Greenwich sidereal time in hours, of a source with coordinates of date.
     pub fn at_gmst(source: SourcePosition, gmst_hours: f64) -> Self {
         // The source's longitude east of Greenwich.

@@ -117,8 +117,7 @@ fn centred(header: &Header<'_>, sizes: [usize; 2]) -> Result<(), FileError> {
 
 /// Returns whether columns run from east to west, and the side of a pixel in radians.
 fn pixel(header: &Header<'_>) -> Result<(bool, f64), FileError> {
-    let step = |keyword| header.number(keyword).map(|step| step.unwrap_or(0.0));
-    let (east, north) = (step("CDELT1")?, step("CDELT2")?);
+    let (east, north) = (header.number_or("CDELT1", 0.0)?, header.number_or("CDELT2", 0.0)?);
     if (east.abs() - north.abs()).abs() > 1e-6 * north.abs() || north <= 0.0 {
         return Err(header.error("CDELT2", "positive degrees, and square pixels with CDELT1"));
     }
@@ -156,11 +155,8 @@ fn stokes(header: &Header<'_>, axes: &[usize]) -> Result<Option<Vec<usize>>, Fil
 
 /// Stokes parameters along an axis of numbers: 1 to 4 for I, Q, U and V.
 fn numbered(header: &Header<'_>, axis: usize, length: usize) -> Result<Vec<usize>, FileError> {
-    let number = |name: &str, default| {
-        header.number(&format!("{name}{axis}")).map(|value| value.unwrap_or(default))
-    };
-    let (value, step, pixel) =
-        (number("CRVAL", 1.0)?, number("CDELT", 1.0)?, number("CRPIX", 1.0)?);
+    let number = |name: &str| header.number_or(&format!("{name}{axis}"), 1.0);
+    let (value, step, pixel) = (number("CRVAL")?, number("CDELT")?, number("CRPIX")?);
     let of_plane = |k: usize| {
         let code = value + (k as f64 + 1.0 - pixel) * step;
         let stokes = (1..=4).find(|stokes| f64::from(*stokes) == code);

@@ -5,7 +5,7 @@ mod write;
 pub use write::write;
 
 use super::FileError;
-use super::fits::{Header, Unit};
+use super::fits::{Header, Unit, stored};
 use super::fits_axes::{self, Place};
 use crate::Error;
 use crate::operator::ImageGrid;
@@ -91,8 +91,8 @@ fn take(
 fn values(unit: &Unit<'_>, count: usize) -> Result<Vec<f64>, FileError> {
     let header = &unit.header;
     let size = header.number_size()?;
-    let scale = header.number("BSCALE")?.unwrap_or(1.0);
-    let zero = header.number("BZERO")?.unwrap_or(0.0);
+    let scale = header.number_or("BSCALE", 1.0)?;
+    let zero = header.number_or("BZERO", 0.0)?;
     // Below, 8 bytes are a double, and 1 byte is no number.
     if header.integer("BITPIX")? == Some(8) || header.integer("BITPIX")? == Some(64) {
         return Err(header.error("BITPIX", "16, 32, -32 or -64 in an image"));
@@ -103,12 +103,7 @@ fn values(unit: &Unit<'_>, count: usize) -> Result<Vec<f64>, FileError> {
     let data = unit.data.get(..count * size);
     let data = data.ok_or_else(|| header.error("NAXIS", "axes of positive length"))?;
     let value = |(index, cell): (usize, &[u8])| {
-        let stored = match (float, cell) {
-            (false, &[a, b]) => i16::from_be_bytes([a, b]).into(),
-            (false, &[a, b, c, d]) => i32::from_be_bytes([a, b, c, d]).into(),
-            (true, &[a, b, c, d]) => f32::from_be_bytes([a, b, c, d]).into(),
-            (_, cell) => f64::from_be_bytes(cell.try_into().unwrap_or([0; 8])),
-        };
+        let stored = stored(float, cell);
         let value = if blank == Some(stored) { f64::NAN } else { stored * scale + zero };
         if f64::is_finite(value) {
             Ok(value)

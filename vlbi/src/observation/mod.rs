@@ -93,12 +93,16 @@ impl Row {
         (!noise_sigma.is_nan()).then_some(Measured { visibility, noise_sigma })
     }
 
+    /// Product `k`, if it was measured.
+    pub fn measured(&self, k: usize) -> Option<Measured> {
+        self.product(k).filter(|product| !product.is_unmeasured())
+    }
+
     /// The products that Stokes I is made of: itself, or the parallel hands that were measured.
     pub fn parts_of_i(&self, basis: Basis) -> [Option<Measured>; 2] {
-        let hand = |k: usize| self.product(k).filter(|hand| !hand.is_unmeasured());
         match basis {
             Basis::Stokes => [self.product(0), None],
-            Basis::Circular => [hand(0), hand(1)],
+            Basis::Circular => [self.measured(0), self.measured(1)],
         }
     }
 
@@ -212,11 +216,11 @@ impl Observation {
 
     /// Returns whether more than total intensity was measured: RL and LR, or Q, U or V.
     pub fn is_polarized(&self) -> bool {
-        let measured = |row: &Row, k: usize| row.product(k).is_some_and(|p| !p.is_unmeasured());
-        self.rows.iter().any(|row| match self.basis {
-            Basis::Circular => measured(row, 2) || measured(row, 3),
-            Basis::Stokes => (1..4).any(|k| measured(row, k)),
-        })
+        let beside_i = match self.basis {
+            Basis::Circular => 2..4,
+            Basis::Stokes => 1..4,
+        };
+        self.rows.iter().any(|row| beside_i.clone().any(|k| row.measured(k).is_some()))
     }
 
     /// The data as Stokes I only, of every row that has it.

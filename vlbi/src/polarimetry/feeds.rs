@@ -3,7 +3,7 @@
 use crate::Complex64;
 use crate::Error;
 use crate::array::{FeedRotation, Station};
-use crate::earth::{Frame, Moment, Ut1, View};
+use crate::earth::{Frame, View};
 use crate::observation::{MissingMetadata, Observation};
 
 /// Stations of 2017: EHT Collaboration 2021, ApJL 910, L12, table 1.
@@ -42,19 +42,9 @@ pub fn turns(observation: &Observation) -> Result<Vec<[Complex64; 2]>, Error> {
         observation.stations.iter().map(|station| station.position).collect();
     let rotations: Vec<FeedRotation> = observation.stations.iter().map(feed_rotation).collect();
     let mut all = Vec::with_capacity(observation.rows.len());
-    let mut last: Option<(f64, View)> = None;
+    let mut view_at = View::of_day(source, mjd, Frame::Catalogue);
     for row in &observation.rows {
-        // Rows of a time follow each other: one view serves all of them.
-        let view = match last {
-            Some((time_h, view)) if time_h == row.time_h => view,
-            _ => View::new(
-                source,
-                Moment { mjd, hours_utc: row.time_h },
-                Ut1::Table,
-                Frame::Catalogue,
-            )?,
-        };
-        last = Some((row.time_h, view));
+        let view = view_at(row.time_h)?;
         let turn = |k: u16| {
             let position =
                 positions[usize::from(k)].ok_or(MissingMetadata("positions of stations"))?;

@@ -22,16 +22,11 @@ const UNITS: [Matrix; super::MODELLED] = [
 ];
 
 /// Hands of RR, LL, RL, LR: 0 is R, 1 is L.
-const HANDS: [[usize; 2]; 4] = [[0, 0], [1, 1], [0, 1], [1, 0]];
+pub const HANDS: [[usize; 2]; 4] = [[0, 0], [1, 1], [0, 1], [1, 0]];
 
 /// J of a station with these d_R and d_L whose feeds are turned by φ: `turn` is e^{2iφ}.
 pub fn jones([right, left]: [Complex64; 2], turn: Complex64) -> Matrix {
     [[ONE, right * turn], [left * turn.conj(), ONE]]
-}
-
-/// The hands of a product of circular feeds, 0 for R and 1 for L.
-pub fn hands(product: usize) -> [usize; 2] {
-    HANDS[product]
 }
 
 /// The coherencies of I, Q and U.

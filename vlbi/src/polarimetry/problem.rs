@@ -3,7 +3,7 @@
 //! linear problem of small leakage.
 
 use super::Leakage;
-use super::jones::{coherency, hands, jones, leaked};
+use super::jones::{HANDS, coherency, jones, leaked};
 use crate::Complex64;
 use nalgebra::{DMatrix, DVector};
 
@@ -72,7 +72,7 @@ impl LeakageDatum {
 
     /// Derivatives with respect to d of the first station, and to d̄ of the second.
     fn parts(&self, leakage: &Leakage) -> [Part; 2] {
-        let [p, q] = hands(self.product);
+        let [p, q] = HANDS[self.product];
         let sky = coherency(self.model);
         let [first, second] = [0, 1].map(|k| jones(leakage[self.stations[k]], self.turns[k]));
         // d_R stands with e^{2iφ}, d_L with its conjugate.

@@ -1,6 +1,6 @@
 //! The products of an observation one by one.
 
-use crate::observation::{Basis, Measured, Observation, Row};
+use crate::observation::{Basis, Observation, Row};
 
 /// A product of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,7 +31,7 @@ impl Products {
         };
         let (mut rows, mut all, mut data) = (Vec::new(), Vec::new(), Vec::new());
         for row in &observation.rows {
-            let products = known.clone().filter_map(|k| Some((k, measured(row, k)?)));
+            let products = known.clone().filter_map(|k| Some((k, row.measured(k)?)));
             let before = all.len();
             for (product, datum) in products {
                 all.push(Product { row: rows.len(), product });
@@ -50,14 +50,11 @@ impl Products {
     }
 }
 
-fn measured(row: &Row, product: usize) -> Option<Measured> {
-    row.product(product).filter(|datum| !datum.is_unmeasured())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::Complex64;
+    use crate::observation::Measured;
 
     #[test]
     fn exact_products_that_were_measured() {

@@ -1,7 +1,7 @@
 //! Tables of leakage.
 
 use super::NoFeeds;
-use super::jones::{Matrix, hands};
+use super::jones::{HANDS, Matrix};
 use super::{Leakage, jones, leaked, turns};
 use crate::Complex64;
 use crate::Error;
@@ -77,7 +77,7 @@ impl LeakageTable {
         let terms: Vec<_> = observation.stations.iter().map(|s| self.of(&s.name)).collect();
         let known = |row: &Row| {
             let has_terms = row.stations.iter().all(|k| terms[usize::from(*k)].is_some());
-            has_terms && (0..4).all(|k| row.product(k).is_some_and(|x| !x.is_unmeasured()))
+            has_terms && (0..4).all(|k| row.measured(k).is_some())
         };
         observation.rows.retain(known);
         let turns = turns(observation)?;
@@ -121,13 +121,11 @@ fn inverse([[_, a], [b, _]]: &Matrix) -> Matrix {
 
 /// Standard deviations of [`leaked`] products whose parts have these and are independent.
 fn summed(sigma: [f64; 4], first: &Matrix, second: &Matrix) -> [f64; 4] {
-    [0, 1, 2, 3].map(|product| {
-        let [p, q] = hands(product);
-        let part = |k: usize| {
-            let [r, s] = hands(k);
-            (first[p][r].norm() * second[q][s].norm() * sigma[k]).powi(2)
+    HANDS.map(|[p, q]| {
+        let part = |([r, s], sigma): ([usize; 2], f64)| {
+            (first[p][r].norm() * second[q][s].norm() * sigma).powi(2)
         };
-        (0..4).map(part).sum::<f64>().sqrt()
+        HANDS.into_iter().zip(sigma).map(part).sum::<f64>().sqrt()
     })
 }
 

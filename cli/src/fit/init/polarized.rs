@@ -59,8 +59,8 @@ fn is_polarized(observation: &Observation) -> bool {
     };
     let (mut chi2, mut count) = (0.0, 0.0f64);
     for row in &observation.rows {
-        for datum in crossed.into_iter().filter_map(|k| row.product(k)) {
-            if datum.is_unmeasured() || datum.noise_sigma <= 0.0 {
+        for datum in crossed.into_iter().filter_map(|k| row.measured(k)) {
+            if datum.noise_sigma <= 0.0 {
                 continue;
             }
             chi2 += datum.visibility.norm_sqr() / datum.noise_sigma.powi(2);

@@ -90,7 +90,7 @@ fn exact_the_least_over_stokes_i() {
     let (model, term) = (off(&truth), RatioTerm::new(&data, 0.0).unwrap());
     let plain = |row: usize| {
         let baseline = &term.baselines[row];
-        let stokes = term.stokes(&model, row);
+        let stokes = stokes(&model, row);
         let ratios: Vec<_> = baseline.ratios(stokes).collect();
         let sum = |i: Complex64| {
             let own = (i - baseline.i.visibility).norm_sqr() / baseline.i.noise_sigma.powi(2);

@@ -87,6 +87,11 @@ impl<'a> Header<'a> {
         }
     }
 
+    /// A finite number; `default` if the keyword is not there.
+    pub fn number_or(&self, keyword: &str, default: f64) -> Result<f64, FileError> {
+        self.number(keyword).map(|number| number.unwrap_or(default))
+    }
+
     /// A whole number, if the keyword is there.
     pub fn integer(&self, keyword: &str) -> Result<Option<i64>, FileError> {
         match self.plain(keyword).map(str::parse) {

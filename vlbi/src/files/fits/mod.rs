@@ -45,6 +45,21 @@ impl<'a> Unit<'a> {
         let data = &bytes[start..start + size];
         Ok(Unit { header, data, offset: start, next: start + padded })
     }
+
+    /// Returns whether it is an extension of this name.
+    pub fn is_named(&self, name: &str) -> bool {
+        self.header.text("EXTNAME").as_deref() == Some(name)
+    }
+}
+
+/// A number of the data: of 2 or 4 bytes a whole one unless it is a `float`, of 8 bytes a double.
+pub fn stored(float: bool, cell: &[u8]) -> f64 {
+    match (float, cell) {
+        (false, &[a, b]) => i16::from_be_bytes([a, b]).into(),
+        (false, &[a, b, c, d]) => i32::from_be_bytes([a, b, c, d]).into(),
+        (true, &[a, b, c, d]) => f32::from_be_bytes([a, b, c, d]).into(),
+        (_, cell) => f64::from_be_bytes(cell.try_into().unwrap_or([0; 8])),
+    }
 }
 
 /// All units of a file.

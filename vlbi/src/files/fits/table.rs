@@ -118,9 +118,7 @@ fn columns(header: &Header<'_>, row_size: usize) -> Result<Vec<Column>, FileErro
         if MULTIPLES.contains(&&*header.text(&unit).unwrap_or_default().to_ascii_uppercase()) {
             return Err(header.error(&unit, "METERS, HZ, DEGREES and other units of AIPS"));
         }
-        let number = |name: &str, default| {
-            header.number(&format!("{name}{k}")).map(|value| value.unwrap_or(default))
-        };
+        let number = |name: &str, default| header.number_or(&format!("{name}{k}"), default);
         let scale = [number("TSCAL", 1.0)?, number("TZERO", 0.0)?];
         columns.push(Column { name, offset, repeat, code, scale });
         offset = end.ok_or_else(bad)?;

@@ -4,11 +4,8 @@ use super::super::fits::{Cards, ColumnData, binary_table};
 use super::mounts::{self, Mount};
 use crate::Error;
 use crate::array::Station;
-use crate::earth::{tai_minus_utc, ut1_minus_utc};
+use crate::earth::{MJD_ZERO, tai_minus_utc, ut1_minus_utc};
 use crate::observation::Channel;
-
-/// Julian date of MJD 0.
-const MJD_ZERO: f64 = 2_400_000.5;
 
 /// The table of stations with geocentric positions, of an observation on a day.
 ///
@@ -112,9 +109,7 @@ mod tests {
         let primary = &units[0].header;
         assert_eq!(primary.number("EQUINOX").unwrap(), Some(2000.0));
         assert_eq!(primary.number("EPOCH").unwrap(), Some(2000.0));
-        let antennas =
-            units.iter().find(|u| u.header.text("EXTNAME").as_deref() == Some("AIPS AN"));
-        let antennas = antennas.unwrap();
+        let antennas = units.iter().find(|unit| unit.is_named("AIPS AN")).unwrap();
         let text = |key: &str| antennas.header.text(key);
         assert_eq!(text("FRAME").as_deref(), Some("ITRF"));
         assert_eq!(

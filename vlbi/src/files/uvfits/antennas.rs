@@ -25,10 +25,7 @@ impl AntennaTables {
         let mut numbers = HashMap::new();
         let mut frequency_hz = None;
         let mut remarks = Vec::new();
-        for unit in units {
-            if unit.header.text("EXTNAME").as_deref() != Some("AIPS AN") {
-                continue;
-            }
+        for unit in units.iter().filter(|unit| unit.is_named("AIPS AN")) {
             let subarray = unit.header.integer("EXTVER")?.unwrap_or(1);
             let table = Table::new(unit)?;
             let fail = |row: usize, message: &str| {
@@ -87,7 +84,7 @@ fn station(unit: &Unit<'_>, table: &Table<'_>, row: usize) -> Result<Option<Stat
     let name = name.map(|name| name.split_whitespace().collect::<Vec<_>>().join("_"));
     let mut position = [0.0; 3];
     for (k, keyword) in ["ARRAYX", "ARRAYY", "ARRAYZ"].into_iter().enumerate() {
-        let centre = unit.header.number(keyword)?.unwrap_or(0.0);
+        let centre = unit.header.number_or(keyword, 0.0)?;
         let offset = table.number(row, "STABXYZ", k).unwrap_or(f64::NAN);
         let left = k == 1 && unit.header.text("XYZHAND").as_deref() == Some("LEFT");
         position[k] = centre + if left { -offset } else { offset };

@@ -57,7 +57,7 @@ impl Flag {
 /// # Errors
 /// If the table is damaged, or no date tells from when its times count.
 pub fn read(units: &[Unit<'_>]) -> Result<Vec<Flag>, FileError> {
-    let named = |unit: &&Unit<'_>| unit.header.text("EXTNAME").as_deref() == Some("AIPS FG");
+    let named = |unit: &&Unit<'_>| unit.is_named("AIPS FG");
     let version = |unit: &&Unit<'_>| unit.header.integer("EXTVER").ok().flatten();
     let Some(unit) = units.iter().filter(named).max_by_key(version) else { return Ok(Vec::new()) };
     let table = Table::new(unit)?;

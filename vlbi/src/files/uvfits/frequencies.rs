@@ -19,8 +19,7 @@ pub fn channels(
     if places.len() > usize::from(u16::MAX) {
         return Err(header.error("NAXIS4", format!("{} channels are too many", places.len())));
     }
-    let named = |unit: &&Unit<'_>| unit.header.text("EXTNAME").as_deref() == Some("AIPS FQ");
-    let unit = units.iter().find(named);
+    let unit = units.iter().find(|unit| unit.is_named("AIPS FQ"));
     let table = unit.map(Table::new).transpose()?;
     let setup = selectors::only(&units[0], layout, "FREQSEL")?;
     let row = table.as_ref().and_then(|table| setup_row(table, setup));

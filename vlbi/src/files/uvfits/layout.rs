@@ -1,7 +1,7 @@
 //! Layout of a random group.
 
 use super::super::FileError;
-use super::super::fits::Header;
+use super::super::fits::{Header, stored};
 use crate::observation::Basis;
 
 /// The parameters, and what they number (AIPS memo 117, table 5).
@@ -111,7 +111,9 @@ impl Layout {
         let stokes = find(&axes, "STOKES", header)?;
         let (products, basis) = products(header, stokes)?;
         let frequency = find(&axes, "FREQ", header)?;
-        let at = |name: &str| header.number(&format!("{name}{}", frequency.keyword));
+        let at = |name: &str, default| {
+            header.number_or(&format!("{name}{}", frequency.keyword), default)
+        };
         let parameter = Parameters::read(header, parameters)?;
         parameter.check_projection()?;
         let selector = |(name, _)| Some((name, parameter.optional(name)?));
@@ -131,8 +133,8 @@ impl Layout {
                 .optional("TAU1")
                 .zip(parameter.optional("TAU2"))
                 .map(|(a, b)| [a, b]),
-            scale: header.number("BSCALE")?.unwrap_or(1.0),
-            zero: header.number("BZERO")?.unwrap_or(0.0),
+            scale: header.number_or("BSCALE", 1.0)?,
+            zero: header.number_or("BZERO", 0.0)?,
             // The standard has BLANK for whole numbers alone.
             blank: header.integer("BLANK")?.filter(|_| bits > Some(0)),
             complex_stride: complex.stride,
@@ -141,21 +143,16 @@ impl Layout {
             product_stride: stokes.stride,
             basis,
             channels: channels(&axes, header)?,
-            frequency_hz: at("CRVAL")?.unwrap_or(0.0),
-            reference_channel: at("CRPIX")?.unwrap_or(1.0),
-            channel_width_hz: at("CDELT")?.unwrap_or(0.0),
+            frequency_hz: at("CRVAL", 0.0)?,
+            reference_channel: at("CRPIX", 1.0)?,
+            channel_width_hz: at("CDELT", 0.0)?,
         })
     }
 
     /// Number `index` of a group.
     fn stored(&self, group: &[u8], index: usize) -> f64 {
         let cell = &group[index * self.number_size..(index + 1) * self.number_size];
-        match (self.float, cell) {
-            (false, &[a, b]) => i16::from_be_bytes([a, b]).into(),
-            (false, &[a, b, c, d]) => i32::from_be_bytes([a, b, c, d]).into(),
-            (true, &[a, b, c, d]) => f32::from_be_bytes([a, b, c, d]).into(),
-            (_, cell) => f64::from_be_bytes(cell.try_into().unwrap_or([0; 8])),
-        }
+        stored(self.float, cell)
     }
 
     /// A parameter of a group.
@@ -225,9 +222,7 @@ fn find<'a>(axes: &'a [Axis], name: &str, header: &Header<'_>) -> Result<&'a Axi
 /// Returns the places of the four products along the axis of polarisations.
 fn products(header: &Header<'_>, axis: &Axis) -> Result<([Option<usize>; 4], Basis), FileError> {
     let k = axis.keyword;
-    let value = |name: &str, default: f64| -> Result<f64, FileError> {
-        Ok(header.number(&format!("{name}{k}"))?.unwrap_or(default))
-    };
+    let value = |name: &str, default| header.number_or(&format!("{name}{k}"), default);
     let (first, step, reference) =
         (value("CRVAL", f64::NAN)?, value("CDELT", 1.0)?, value("CRPIX", 1.0)?);
     let circular = first < 0.0;
@@ -286,11 +281,11 @@ impl<'a, 'b> Parameters<'a, 'b> {
             // Later parts of a date may be named `_DATE`.
             let Some(name) = header.text(&format!("PTYPE{k}")) else { continue };
             let name = name.trim_start_matches('_').to_owned();
-            let scale = header.number(&format!("PSCAL{k}"))?.unwrap_or(1.0);
+            let scale = header.number_or(&format!("PSCAL{k}"), 1.0)?;
             if scale == 0.0 {
                 return Err(header.error(&format!("PSCAL{k}"), "any number but 0"));
             }
-            let zero = header.number(&format!("PZERO{k}"))?.unwrap_or(0.0);
+            let zero = header.number_or(&format!("PZERO{k}"), 0.0)?;
             named.push((name, Parameter { index: k - 1, scale, zero }));
         }
         Ok(Parameters { header, named })

@@ -9,14 +9,11 @@ use super::layout::{Antennas, Layout, SELECTORS, is_measured};
 use super::selectors;
 use crate::Complex64;
 use crate::Error;
-use crate::earth::SourcePosition;
+use crate::earth::{MJD_ZERO, SourcePosition};
 use crate::observation::{Observation, Row};
 
 /// The longest integration of a group, seconds.
 const LONGEST_INTEGRATION_S: f64 = 1e9;
-
-/// JD of MJD 0.
-const MJD_ZERO: f64 = 2_400_000.5;
 
 /// Reads UVFITS.
 ///

@@ -53,8 +53,7 @@ pub struct TableSource {
 /// # Errors
 /// If there are several, each with its name, or coordinates are not of J2000.
 pub fn source(units: &[Unit<'_>], layout: &Layout) -> Result<Option<TableSource>, FileError> {
-    let named = |unit: &&Unit<'_>| unit.header.text("EXTNAME").as_deref() == Some("AIPS SU");
-    let unit = units.iter().find(named);
+    let unit = units.iter().find(|unit| unit.is_named("AIPS SU"));
     let table = unit.map(Table::new).transpose()?;
     let row_of = |number: i64| {
         let table = table.as_ref()?;
@@ -120,7 +119,7 @@ pub fn check_header(header: &Header<'_>) -> Result<(), FileError> {
         let name = header.text(&format!("CTYPE{k}")).unwrap_or_default();
         let keyword = format!("CROTA{k}");
         let is_place = name.starts_with("RA") || name.starts_with("DEC");
-        if is_place && header.number(&keyword)?.unwrap_or(0.0) != 0.0 {
+        if is_place && header.number_or(&keyword, 0.0)? != 0.0 {
             return Err(header.error(&keyword, "0: (u, v) are of north and east"));
         }
     }

@@ -1,6 +1,6 @@
 //! w of baselines: (u, v) come with the data, w from where the stations are.
 
-use crate::earth::{Frame, Moment, SourcePosition, Ut1, View};
+use crate::earth::{Frame, SourcePosition, View};
 use crate::observation::{Observation, Row};
 use kerrlight_common::units::SPEED_OF_LIGHT;
 
@@ -62,23 +62,12 @@ impl<'a> Baselines<'a> {
 
     /// (u, v, w) of rows in seconds of light.
     fn uvw(&self, rows: &[&Row], frame: Frame) -> Option<Vec<[f64; 3]>> {
-        let mut last: Option<(f64, View)> = None;
-        let mut all = Vec::with_capacity(rows.len());
-        for row in rows {
-            let view = match last {
-                Some((time_h, view)) if time_h == row.time_h => view,
-                _ => self.view(row.time_h, frame)?,
-            };
-            last = Some((row.time_h, view));
+        let mut view_at = View::of_day(self.source, self.mjd, frame);
+        let uvw = |row: &&Row| {
             let [first, second] = row.stations.map(|k| self.positions[usize::from(k)]);
-            all.push(view.uvw(first, second, SPEED_OF_LIGHT));
-        }
-        Some(all)
-    }
-
-    fn view(&self, hours_utc: f64, frame: Frame) -> Option<View> {
-        let moment = Moment { mjd: self.mjd, hours_utc };
-        View::new(self.source, moment, Ut1::Table, frame).ok()
+            Some(view_at(row.time_h).ok()?.uvw(first, second, SPEED_OF_LIGHT))
+        };
+        rows.iter().map(uvw).collect()
     }
 }
 

@@ -4,7 +4,7 @@ use super::super::fits::{Cards, padded};
 use super::super::{FileError, check_numbers};
 use super::{antenna_table, frequencies, w_coordinate};
 use crate::Error;
-use crate::earth::SourcePosition;
+use crate::earth::{MJD_ZERO, SourcePosition};
 use crate::observation::{Basis, Channel, MissingMetadata, Observation, Row};
 use std::borrow::Cow;
 
@@ -181,7 +181,7 @@ fn group_bytes(groups: &[&[Row]], w_seconds: &[f64], facts: &Facts) -> Vec<u8> {
         let [u, v] = row.uv.map(|x| x / frequency_hz / facts.uv_scale);
         let baseline = 256.0 * antennas[0] + antennas[1];
         // Single precision holds a Julian date to a quarter of a day: its fraction is stored apart.
-        let day = 2_400_000.5 + f64::from(facts.mjd);
+        let day = MJD_ZERO + f64::from(facts.mjd);
         let w = w_seconds / facts.uv_scale;
         let parameters = [u, v, w, baseline, day, row.time_h / 24.0, row.integration_s];
         let opacity = row.opacity.map(f64::from);
