@@ -99,6 +99,8 @@ fn matching(l: f64) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::LUMINANCE;
+    use kerrlight_geodesic::vector::dot;
 
     /// Chromaticities of the Planckian locus for the CIE 1931 observer: illuminant A (2856 K),
     /// 6504 K, 2000 K, 10,000 K and the limit of infinite temperature.
@@ -133,8 +135,7 @@ mod tests {
         let white = linear_srgb([0.3127 / 0.3290, 1.0, (1.0 - 0.3127 - 0.3290) / 0.3290]);
         assert!(white.iter().all(|c| (c - 1.0).abs() < 1e-3), "{white:?}");
         for t in [1500.0, 4000.0, 30_000.0] {
-            let [r, g, b] = BlackBody::new(t).color(t).map(f64::from);
-            let luminance = 0.2126 * r + 0.7152 * g + 0.0722 * b;
+            let luminance = dot(LUMINANCE, BlackBody::new(t).color(t).map(f64::from));
             let outside = if t < 1900.0 { 0.02 } else { 1e-3 };
             assert!((luminance - 1.0).abs() < outside, "{t} K: {luminance}");
         }

@@ -1,5 +1,8 @@
 //! Colour maps from [0, 1] to sRGB.
 
+use super::LUMINANCE;
+use kerrlight_geodesic::vector::dot;
+
 /// Colour maps by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -31,7 +34,7 @@ fn afmhot(x: f64) -> [f64; 3] {
 fn lightness(rgb: [f64; 3]) -> f64 {
     let linear =
         rgb.map(|c| if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) });
-    let y = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2];
+    let y = dot(LUMINANCE, linear);
     if y > 216.0 / 24389.0 { 116.0 * y.cbrt() - 16.0 } else { y * 24389.0 / 27.0 }
 }
 

@@ -11,6 +11,22 @@ pub(crate) struct Colors {
     pub pixels: Vec<[f32; 3]>,
 }
 
+/// Bilinear look-up in a picture with rows of `width` pixels, between two columns and between two rows, each with the
+/// weight of the second.
+#[inline]
+pub(crate) fn bilinear(
+    pixels: &[[f32; 3]],
+    width: usize,
+    (x0, x1, tx): (usize, usize, f32),
+    (y0, y1, ty): (usize, usize, f32),
+) -> [f32; 3] {
+    let at = |x: usize, y: usize| pixels[y * width + x];
+    let (a, b, c, d) = (at(x0, y0), at(x1, y0), at(x0, y1), at(x1, y1));
+    core::array::from_fn(|k| {
+        (1.0 - ty) * ((1.0 - tx) * a[k] + tx * b[k]) + ty * ((1.0 - tx) * c[k] + tx * d[k])
+    })
+}
+
 /// Columns and rows of a picture, as its header states them.
 pub(crate) fn dimensions(bytes: &[u8]) -> Result<(u32, u32), ImageError> {
     reader(bytes)?.into_dimensions()

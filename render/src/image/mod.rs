@@ -10,6 +10,9 @@ pub(crate) mod profile;
 pub mod reduce;
 pub mod ticks;
 
+/// Shares of linear red, green and blue in the luminance (Rec. 709).
+pub(crate) const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
+
 /// A named channel, row by row from the top.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {

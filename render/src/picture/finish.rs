@@ -61,7 +61,7 @@ impl Raster {
         out: impl Write + Seek,
         reduction: Option<&mut Reduction>,
     ) -> Result<()> {
-        let layout = Layout::styled(self.grid.width, self.grid.height, &self.names(), style)?;
+        let layout = Layout::new(self.grid.width, self.grid.height, &self.names(), style)?;
         layout.write(out, attributes, |write| {
             self.for_each_band(journal, summary, Some(&layout), reduction, write)
         })

@@ -31,7 +31,7 @@ pub use tally::Summary;
 
 use crate::Error;
 use crate::image::Picture;
-use crate::image::exr::Layout;
+use crate::image::exr::{Layout, Style};
 use crate::scene::{Rings, Scene};
 use crate::transport::{Assets, Meter, PreparedScene, RayResult, Scratch, names};
 use grid::Grid;
@@ -122,7 +122,7 @@ impl Raster {
         let channels = choice::chosen(&prepared, refined, scene.screen.channels.as_deref())?;
         let rings = resolver(scene, &prepared);
         let names: Vec<&str> = channels.iter().map(|kind| kind.name).collect();
-        let layout = Layout::new(grid.width, grid.height, &names)?;
+        let layout = Layout::new(grid.width, grid.height, &names, Style::default())?;
         let unit = if scene.screen.total_flux_jy.is_none() { own_unit(scene) } else { 1.0 };
         let scene = scene.clone();
         Ok(Raster { scene, prepared, grid, rings, channels, layout, unit, tile: TILE })

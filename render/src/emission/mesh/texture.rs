@@ -1,7 +1,7 @@
 //! Pictures on surfaces.
 
 use super::MeshError;
-use crate::image::decode::{Colors, dimensions, linear_colors};
+use crate::image::decode::{Colors, bilinear, dimensions, linear_colors};
 use kerrlight_common::memory;
 
 /// A picture in linear colour.
@@ -84,13 +84,9 @@ impl Texture {
             }
         };
         let [across, down] = self.placement.wrap;
-        let (x0, x1, tx) = across.neighbours(u, self.width);
-        let (y0, y1, ty) = down.neighbours(v, self.height);
-        let at = |x: usize, y: usize| self.pixels[y * self.width + x];
-        let (a, b, c, d) = (at(x0, y0), at(x1, y0), at(x0, y1), at(x1, y1));
-        core::array::from_fn(|k| {
-            (1.0 - ty) * ((1.0 - tx) * a[k] + tx * b[k]) + ty * ((1.0 - tx) * c[k] + tx * d[k])
-        })
+        let columns = across.neighbours(u, self.width);
+        let rows = down.neighbours(v, self.height);
+        bilinear(&self.pixels, self.width, columns, rows)
     }
 }
 

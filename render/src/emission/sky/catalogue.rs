@@ -249,6 +249,8 @@ impl CatalogueSky {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::LUMINANCE;
+    use kerrlight_geodesic::vector::dot;
 
     #[test]
     fn exact_stars_of_a_table() {
@@ -258,7 +260,7 @@ mod tests {
         let near = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
         assert!(near(stars[0].direction, [0.0, 1.0, 0.0]) && stars[0].light == [1.0; 3]);
         assert!(near(stars[1].direction, [0.0, 0.0, 1.0]));
-        let luminance = |c: [f32; 3]| 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
+        let luminance = |c: [f32; 3]| dot(LUMINANCE, c.map(f64::from));
         assert!((luminance(stars[1].light) - 0.01).abs() < 2e-4, "{:?}", stars[1]);
         assert!((luminance(stars[2].light) - 10.0).abs() < 0.2);
         // The Sun is white with a little red, a giant redder.

@@ -6,10 +6,10 @@ use crate::image::{Picture, exr};
 /// Width, height and linear colours of an EXR.
 pub(super) fn colors(bytes: &[u8]) -> Result<(usize, usize, Vec<[f32; 3]>), PanoramaError> {
     let refuse = |why: &str| Err(PanoramaError::Content(why.to_owned()));
-    if !exr::is_whole(bytes).map_err(PanoramaError::exr)? {
+    let header = exr::Header::of(bytes).map_err(PanoramaError::exr)?;
+    if !header.whole {
         return refuse("an EXR of part of its display window, which would not fit the sky");
     }
-    let header = exr::Header::of(bytes).map_err(PanoramaError::exr)?;
     if header.cube {
         return refuse("an EXR with envmap = cube: latitude and longitude are expected");
     }

@@ -3,7 +3,7 @@
 use super::beam::Beam;
 use super::exr_sky;
 use crate::Error;
-use crate::image::decode::{Colors, dimensions, linear_colors};
+use crate::image::decode::{Colors, bilinear, dimensions, linear_colors};
 use crate::image::exr;
 use crate::image::profile::other_than_srgb;
 use core::f64::consts::{PI, TAU};
@@ -114,15 +114,10 @@ impl Panorama {
         let fx = u * self.width as f64 - 0.5;
         let fy = (v * self.height as f64 - 0.5).clamp(0.0, (self.height - 1) as f64);
         let (cx, cy) = (fx.floor(), fy.floor());
-        let (tx, ty) = ((fx - cx) as f32, (fy - cy) as f32);
         let column = |k: f64| k.rem_euclid(self.width as f64) as usize % self.width;
-        let (x0, x1) = (column(cx), column(cx + 1.0));
-        let (y0, y1) = (cy as usize, (cy as usize + 1).min(self.height - 1));
-        let at = |x: usize, y: usize| self.pixels[y * self.width + x];
-        let (a, b, c, d) = (at(x0, y0), at(x1, y0), at(x0, y1), at(x1, y1));
-        core::array::from_fn(|k| {
-            (1.0 - ty) * ((1.0 - tx) * a[k] + tx * b[k]) + ty * ((1.0 - tx) * c[k] + tx * d[k])
-        })
+        let columns = (column(cx), column(cx + 1.0), (fx - cx) as f32);
+        let rows = (cy as usize, (cy as usize + 1).min(self.height - 1), (fy - cy) as f32);
+        bilinear(&self.pixels, self.width, columns, rows)
     }
 
     /// The picture with its coarser versions, for [`mean_color`](Self::mean_color).

@@ -171,15 +171,7 @@ impl Layout {
     ///
     /// # Errors
     /// If a side is 0 or beyond 32 bits, there is no channel or one twice.
-    pub fn new(width: usize, height: usize, names: &[&str]) -> Result<Self> {
-        Self::styled(width, height, names, Style::default())
-    }
-
-    /// The same in some style.
-    ///
-    /// # Errors
-    /// As for [`new`](Self::new).
-    pub fn styled(width: usize, height: usize, names: &[&str], style: Style) -> Result<Self> {
+    pub fn new(width: usize, height: usize, names: &[&str], style: Style) -> Result<Self> {
         let mut order: Vec<usize> = (0..names.len()).collect();
         order.sort_by_key(|k| names[*k]);
         let twice = order.windows(2).any(|pair| names[pair[0]] == names[pair[1]]);
@@ -340,7 +332,7 @@ mod tests {
     /// The exr crate reads what is written here, compressible or not.
     #[test]
     fn code_bands_are_read_by_the_exr_crate() {
-        let layout = Layout::new(37, 20, &["b", "a"]).unwrap();
+        let layout = Layout::new(37, 20, &["b", "a"], Style::default()).unwrap();
         let mut state = 1u32;
         let mut noise = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

@@ -48,7 +48,7 @@ pub fn encode_in_style(
     style: Style,
 ) -> Result<Vec<u8>, crate::Error> {
     let names: Vec<&str> = picture.channels.iter().map(|c| c.name.as_str()).collect();
-    let layout = Layout::styled(picture.width, picture.height, &names, style)?;
+    let layout = Layout::new(picture.width, picture.height, &names, style)?;
     let bands = (0..layout.bands()).into_par_iter().map(|band| {
         let Range { start, end } = layout.rows(band);
         let values = start * picture.width..end * picture.width;
@@ -103,21 +103,11 @@ pub fn dimensions(bytes: &[u8]) -> Result<(u32, u32), crate::Error> {
     Ok((number(size.0)?, number(size.1)?))
 }
 
-/// Returns whether the pixels of the first layer fill the display window.
-///
-/// # Errors
-/// If the bytes are no EXR file.
-pub fn is_whole(bytes: &[u8]) -> Result<bool, crate::Error> {
-    let data = MetaData::read_from_unbuffered(Cursor::new(bytes), true)?;
-    Ok(data.headers.first().is_none_or(|header| {
-        let window = header.shared_attributes.display_window;
-        (window.position, window.size) == (header.own_attributes.layer_position, header.layer_size)
-    }))
-}
-
 /// Header of the first layer: the meaning of its pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
+    /// True if its pixels fill the display window.
+    pub whole: bool,
     /// True if it is the six faces of a cube.
     pub cube: bool,
     /// Chromaticities of red, green, blue and white, where they are not those of Rec. 709.
@@ -142,7 +132,9 @@ impl Header {
         let same = |given: &[[f32; 2]; 4]| {
             given.iter().flatten().zip(REC_709.iter().flatten()).all(|(a, b)| (a - b).abs() < 2e-3)
         };
+        let window = shared.display_window;
         Ok(Header {
+            whole: (window.position, window.size) == (own.layer_position, header.layer_size),
             cube: matches!(own.environment_map, Some(EnvironmentMap::Cube)),
             foreign_primaries: primaries.filter(|given| !same(given)),
         })
