@@ -1,7 +1,7 @@
 //! Laws of motion, as files write them.
 
 use super::AngularVelocity;
-use super::infall::{Falling, Law, Profile};
+use super::infall::{Falling, Family, Law, Profile};
 use super::perturbed::Perturbation;
 use crate::Error;
 use kerrlight_geodesic::infall::Mixture;
@@ -142,7 +142,7 @@ impl Velocity {
             }
             Velocity::Infall { xi, beta_r, beta_phi, drag: own } => {
                 let mixture = Mixture { xi, beta_r, beta_phi };
-                let law = Law::Family { spin: own.unwrap_or(drag), mixture };
+                let law = Law::Family(Family { spin: own.unwrap_or(drag), mixture });
                 AngularVelocity::Falling(Arc::new(Falling::new(law)?))
             }
             Velocity::Profile { radii, angular, radial } => {

@@ -1,7 +1,7 @@
 //! Unit vectors, and steps on the sphere.
 
 use crate::Error;
-use kerrlight_geodesic::vector::dot;
+use kerrlight_geodesic::vector::{cross, dot};
 
 /// A unit vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,12 +63,7 @@ impl Axis {
         let mut unit = [0.0; 3];
         unit[least] = 1.0;
         let east = Self::new(self.tangent(unit)).unwrap_or(self).0;
-        let north = [
-            n[1] * east[2] - n[2] * east[1],
-            n[2] * east[0] - n[0] * east[2],
-            n[0] * east[1] - n[1] * east[0],
-        ];
-        [n, east, north]
+        [n, east, cross(n, east)]
     }
 
     /// The direction of self + step: a step on the sphere, in radians to first order. A step that leads to the

@@ -43,6 +43,6 @@ pub(super) fn mean(rays: &[Layers], side: usize) -> Layers {
 }
 
 /// Number of the most central of `side`² rays.
-fn central(side: usize) -> usize {
+pub(super) fn central(side: usize) -> usize {
     side / 2 * side + side / 2
 }

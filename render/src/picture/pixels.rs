@@ -132,9 +132,8 @@ fn with_rings(mut pixel: Pixel, squares: &[Counted]) -> Pixel {
 
 /// One pixel from its rays, row by row.
 fn mean(rays: &[RayResult], side: usize) -> Pixel {
-    let central = side / 2;
     let mut pixel = Pixel {
-        center: rays.get(central * side + central).copied().unwrap_or_default(),
+        center: rays.get(layers::central(side)).copied().unwrap_or_default(),
         rays: rays.len() as u32,
         ..Pixel::default()
     };

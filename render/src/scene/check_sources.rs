@@ -1,6 +1,6 @@
 //! Checks of sources whose values depend on each other: gas, discs, spots, meshes and the sky.
 
-use super::invalid::{Invalid, number, positive};
+use super::invalid::{Invalid, number, positive, square_of_axis};
 use super::{Disc, Gas, Mesh, Sky, Spot};
 use kerrlight_geodesic::{Kerr, orbits};
 
@@ -40,13 +40,9 @@ const LONGEST_SHEAR: f64 = 2000.0;
 
 pub(super) fn check_spot(spot: &Spot, k: usize, hole: &Kerr, time: f64) -> Result<(), Invalid> {
     let key = |name: &str| format!("spot.{k}.{name}");
-    let norm = spot.axis.iter().map(|x| x * x).sum::<f64>();
-    if !(1e-30..=1e30).contains(&norm) {
-        let allowed = "three numbers that are not all 0, with a length in [1e-15, 1e15]";
-        return Err(Invalid::new(key("axis"), format!("{:?}", spot.axis), allowed));
-    }
+    let square = square_of_axis(key("axis"), spot.axis)?;
     // Matter about another axis meets the component of the spin along it.
-    let along = Kerr::new(hole.spin() * spot.axis[2] / norm.sqrt());
+    let along = Kerr::new(hole.spin() * spot.axis[2] / square.sqrt());
     let least = along.map_or(3.0, |hole| orbits::photon_orbit(&hole).max(3.0));
     let allowed = format!("a radius above {least:.4}, where circular orbits end");
     number(key("radius"), spot.radius, spot.radius > least, &allowed)?;
@@ -63,15 +59,7 @@ pub(super) fn check_spot(spot: &Spot, k: usize, hole: &Kerr, time: f64) -> Resul
 
 pub(super) fn check_mesh(mesh: &Mesh, k: usize, redshift: bool) -> Result<(), Invalid> {
     let key = |name: &str| format!("mesh.{k}.{name}");
-    let norm = mesh.rotation_axis.iter().map(|x| x * x).sum::<f64>();
-    if !(1e-30..=1e30).contains(&norm) {
-        let allowed = "three numbers that are not all 0, with a length in [1e-15, 1e15]";
-        return Err(Invalid::new(
-            key("rotation_axis"),
-            format!("{:?}", mesh.rotation_axis),
-            allowed,
-        ));
-    }
+    square_of_axis(key("rotation_axis"), mesh.rotation_axis)?;
     if redshift && mesh.velocity.is_none() {
         let why = "needed with redshift = true: \"static\" or \"keplerian\"";
         return Err(Invalid::missing(key("velocity"), why));

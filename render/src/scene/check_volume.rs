@@ -1,6 +1,6 @@
 //! Checks of volumes whose values depend on each other.
 
-use super::invalid::{Invalid, number, positive};
+use super::invalid::{Invalid, number, positive, square_of_axis};
 use super::{Rotation, Scene, VolumeRegion, VolumeSource, rotation};
 
 pub(super) fn check_volume(volume: &VolumeSource, k: usize) -> Result<(), Invalid> {
@@ -9,11 +9,7 @@ pub(super) fn check_volume(volume: &VolumeSource, k: usize) -> Result<(), Invali
     check_rotation(volume, &key)?;
     check_region(volume, &key)?;
     if let Some(axis) = volume.axis {
-        let norm = axis.iter().map(|x| x * x).sum::<f64>();
-        if !(1e-30..=1e30).contains(&norm) {
-            let allowed = "three numbers that are not all 0, with a length in [1e-15, 1e15]";
-            return Err(Invalid::new(key("axis"), format!("{axis:?}"), allowed));
-        }
+        square_of_axis(key("axis"), axis)?;
     }
     Ok(())
 }

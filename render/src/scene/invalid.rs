@@ -154,3 +154,13 @@ pub(super) fn number(
 pub(super) fn positive(key: impl Into<String>, value: f64) -> Result<(), Invalid> {
     number(key, value, value > 0.0 && value.is_finite(), "a finite number above 0")
 }
+
+/// Returns the square of the length of an axis, and refuses one without direction.
+pub(super) fn square_of_axis(key: impl Into<String>, axis: [f64; 3]) -> Result<f64, Invalid> {
+    let square = axis.iter().map(|x| x * x).sum::<f64>();
+    if (1e-30..=1e30).contains(&square) {
+        return Ok(square);
+    }
+    let allowed = "three numbers that are not all 0, with a length in [1e-15, 1e15]";
+    Err(Invalid::new(key, format!("{axis:?}"), allowed))
+}

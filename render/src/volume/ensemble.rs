@@ -204,8 +204,7 @@ fn centroid(volume: &Volume, nodes: &[usize]) -> [f64; 4] {
             *sum += e * term;
         }
     }
-    let width = |k: usize| (volume.high()[k] - volume.low()[k]) / (volume.nodes()[k] - 1) as f64;
-    let cell: f64 = (0..3).map(width).product();
+    let cell: f64 = volume.spacing().iter().product();
     let [x, y, z, all] = sums;
     if all > 0.0 { [x / all, y / all, z / all, all * cell] } else { [0.0; 4] }
 }

@@ -137,10 +137,14 @@ impl Volume {
         &self.values
     }
 
+    /// Edges of a cell along x, y and z, M.
+    pub fn spacing(&self) -> [f64; 3] {
+        core::array::from_fn(|k| (self.high[k] - self.low[k]) / (self.nodes[k] - 1) as f64)
+    }
+
     /// The shortest edge of a cell, M.
     pub fn finest(&self) -> f64 {
-        let edge = |axis: usize| (self.high[axis] - self.low[axis]) / (self.nodes[axis] - 1) as f64;
-        (0..3).map(edge).fold(f64::INFINITY, f64::min)
+        self.spacing().into_iter().fold(f64::INFINITY, f64::min)
     }
 
     /// The lowest and the highest corner of every cell that is not 0 all over.

@@ -48,8 +48,7 @@ fn header(fields: &[Shown], first: &Shown) -> String {
     let last = volume.nodes().map(|n| n - 1);
     let extent = format!("0 {} 0 {} 0 {}", last[0], last[1], last[2]);
     let [x, y, z] = volume.low();
-    let [dx, dy, dz]: [f64; 3] =
-        core::array::from_fn(|k| (volume.high()[k] - volume.low()[k]) / last[k] as f64);
+    let [dx, dy, dz] = volume.spacing();
     // Each field is preceded by its length in 64 bits.
     let block = 8 + 4 * volume.values().len();
     let array = |(k, field): (usize, &Shown)| {

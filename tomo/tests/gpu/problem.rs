@@ -3,7 +3,7 @@
 
 use kerrlight_geodesic::infall::Mixture;
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
-use kerrlight_render::dynamics::infall::{Falling, Law};
+use kerrlight_render::dynamics::infall::{Falling, Family, Law};
 use kerrlight_render::dynamics::{AngularVelocity, Axis, Injection};
 use kerrlight_tomo::fit::{
     BatchSize, Data, ForwardModel, FrameTerm, ImageTerm, LightCurveTerm, Motion, Objective,
@@ -42,7 +42,8 @@ pub fn model() -> ForwardModel<f32> {
 /// one.
 fn falling(beta_r: f64) -> AngularVelocity {
     let mixture = Mixture { xi: 0.8, beta_r, beta_phi: 0.9 };
-    AngularVelocity::Falling(Arc::new(Falling::new(Law::Family { spin: 0.6, mixture }).unwrap()))
+    let law = Law::Family(Family { spin: 0.6, mixture });
+    AngularVelocity::Falling(Arc::new(Falling::new(law).unwrap()))
 }
 
 fn model_of(velocity: AngularVelocity) -> ForwardModel<f32> {

@@ -52,10 +52,8 @@ impl Estimate<'_> {
 
 /// ∫ e dV, M³.
 fn integral(volume: &Volume) -> f64 {
-    let cell =
-        |k: usize| (volume.high()[k] - volume.low()[k]) / (volume.nodes()[k].max(2) - 1) as f64;
     let sum: f64 = volume.values().iter().map(|x| f64::from(*x)).sum();
-    sum * (0..3).map(cell).product::<f64>()
+    sum * volume.spacing().iter().product::<f64>()
 }
 
 impl Changes {

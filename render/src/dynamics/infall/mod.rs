@@ -32,12 +32,7 @@ const NARROW: f64 = 1e-4;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Law {
     /// The family between circular orbits and free fall ([`Infall`]), about the axis of the flow.
-    Family {
-        /// a of the hole as the flow sees it, M: negative where it is retrograde.
-        spin: f64,
-        /// Mixture of circles and free fall.
-        mixture: Mixture,
-    },
+    Family(Family),
     /// Values between knots.
     Profile(Profile),
 }
@@ -77,10 +72,12 @@ impl Origin {
 }
 
 /// Numbers of the family.
-#[derive(Clone, Copy)]
-struct Family {
-    spin: f64,
-    mixture: Mixture,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Family {
+    /// a of the hole as the flow sees it, M: negative where it is retrograde.
+    pub spin: f64,
+    /// Mixture of circles and free fall.
+    pub mixture: Mixture,
 }
 
 impl Falling {
@@ -90,9 +87,7 @@ impl Falling {
     /// If a number is out of its range, or a profile's matter does not change its radius.
     pub fn new(law: Law) -> Result<Self, Error> {
         let profile = match &law {
-            Law::Family { spin, mixture } => {
-                return Family { spin: *spin, mixture: *mixture }.falling(law);
-            }
+            Law::Family(family) => return family.falling(),
             Law::Profile(profile) => profile,
         };
         if !profile.falls() {
@@ -117,8 +112,8 @@ impl Falling {
         let r = Along::parameter(r, 0);
         let [fall, turn] = match (&self.law, &self.flow) {
             (Law::Profile(profile), _) => profile.rates(r),
-            (Law::Family { .. }, Some(flow)) => flow.rates(outside(flow, r)),
-            (Law::Family { .. }, None) => [Along::constant(0.0); 2],
+            (Law::Family(_), Some(flow)) => flow.rates(outside(flow, r)),
+            (Law::Family(_), None) => [Along::constant(0.0); 2],
         };
         [fall, turn * Along::constant(self.factor)]
     }
@@ -234,8 +229,8 @@ impl Family {
         }
     }
 
-    fn falling(self, law: Law) -> Result<Falling, Error> {
-        let flow = self.flow()?;
+    fn falling(self) -> Result<Falling, Error> {
+        let (law, flow) = (Law::Family(self), self.flow()?);
         let circular = self.circular_from()?;
         Ok(Falling { law, factor: 1.0, table: self.trajectory()?, flow: Some(flow), circular })
     }

@@ -4,7 +4,7 @@ use ode_solvers::{Dop853, System, Vector2};
 
 fn family(spin: f64, [xi, beta_r, beta_phi]: [f64; 3]) -> Falling {
     let mixture = Mixture { xi, beta_r, beta_phi };
-    Falling::new(Law::Family { spin, mixture }).unwrap()
+    Falling::new(Law::Family(Family { spin, mixture })).unwrap()
 }
 
 /// Matter on its way back.
@@ -146,7 +146,7 @@ fn exact_signs_of_rotation() {
 fn exact_numbers_out_of_range_are_named() {
     let refused = |xi, beta_r| {
         let mixture = Mixture { xi, beta_r, beta_phi: 1.0 };
-        Falling::new(Law::Family { spin: 0.5, mixture }).unwrap_err().to_string()
+        Falling::new(Law::Family(Family { spin: 0.5, mixture })).unwrap_err().to_string()
     };
     assert!(refused(1.5, 1.0).contains("xi = 1.5 is not allowed"));
     assert!(refused(1.0, f64::NAN).contains("beta_r = NaN"));

@@ -85,9 +85,7 @@ struct Marcher<'a> {
 
 impl<'a> Marcher<'a> {
     fn new(volume: &'a Volume, view: View, hole_radius: f64) -> Self {
-        let extent = |k: usize| volume.high[k] - volume.low[k];
-        let spacing = core::array::from_fn(|k| extent(k) / (volume.nodes[k] - 1) as f64);
-        let step = spacing.into_iter().fold(f64::INFINITY, f64::min);
+        let (spacing, step) = (volume.spacing(), volume.finest());
         Self { volume, frame: view.frame(), hole_radius, spacing, step }
     }
 

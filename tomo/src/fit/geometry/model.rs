@@ -49,7 +49,8 @@ impl Law {
 fn infall(drag: Option<f64>, geometry: &Geometry, axis: Axis) -> Result<AngularVelocity, Error> {
     let [xi, beta_r, beta_phi] = Parameter::FLOW.map(|parameter| geometry.get(parameter));
     let spin = drag.unwrap_or(geometry.get(Parameter::Spin) * axis.vector()[2]);
-    let law = infall::Law::Family { spin, mixture: Mixture { xi, beta_r, beta_phi } };
+    let mixture = Mixture { xi, beta_r, beta_phi };
+    let law = infall::Law::Family(infall::Family { spin, mixture });
     Ok(AngularVelocity::Falling(Arc::new(Falling::new(law)?)))
 }
 
