@@ -9,6 +9,26 @@ use kerrlight_tomo::fit::{FrameTerm, Shape, Weighted};
 /// Part of the mean light below which a pixel is dark.
 const DARK: f64 = 1e-3;
 
+/// Number of data of a term in some frames.
+pub(crate) fn count(term: &dyn FrameTerm<f64>, frames: &[usize]) -> usize {
+    frames.iter().map(|frame| term.degrees_of_freedom(*frame)).sum()
+}
+
+/// χ² per datum of a term in some frames; adds `weight` times its gradient.
+pub(crate) fn reduced_chi2(
+    term: &dyn FrameTerm<f64>,
+    frames: &[usize],
+    images: &[f64],
+    weight: f64,
+    gradient: &mut [f64],
+) -> f64 {
+    // A part of the frames may have no datum of a kind.
+    let scale = 1.0 / count(term, frames).max(1) as f64;
+    let of_frame =
+        |frame: &usize| term.value_and_gradient(*frame, images, weight * scale, gradient);
+    scale * frames.iter().map(of_frame).sum::<f64>()
+}
+
 /// A Gaussian prior of the flux.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FluxPrior {
@@ -100,14 +120,9 @@ impl ImageProblem<'_> {
         slope
     }
 
-    /// Data of a kind in the frames that count.
-    fn count(&self, term: &dyn FrameTerm<f64>) -> usize {
-        self.frames.iter().map(|frame| term.degrees_of_freedom(*frame)).sum()
-    }
-
     /// Number of data of each kind.
     pub(super) fn counts(&self) -> Vec<usize> {
-        self.terms.iter().map(|term| self.count(&*term.term)).collect()
+        self.terms.iter().map(|term| count(&*term.term, &self.frames)).collect()
     }
 
     /// The loss of the data and of a flux (over its expectation) alone, and its gradient with respect to the pixels, without that
@@ -115,7 +130,7 @@ impl ImageProblem<'_> {
     pub(super) fn data_and_gradient(&self, image: &[f64], flux: f64) -> (f64, Vec<f64>) {
         let mut gradient = vec![0.0; image.len()];
         let one = |Weighted { weight, term }: &Weighted<dyn FrameTerm<f64>>| {
-            weight * self.term(&**term, image, *weight, &mut gradient)
+            weight * reduced_chi2(&**term, &self.frames, image, *weight, &mut gradient)
         };
         let value: f64 = self.terms.iter().map(one).sum();
         (value + self.flux_prior(self.flux.jy * flux).0, gradient)
@@ -129,27 +144,15 @@ impl ImageProblem<'_> {
     /// χ² per datum of each kind of data.
     pub fn chi2(&self, image: &[f64]) -> Vec<f64> {
         let mut none = vec![0.0; image.len()];
-        self.terms.iter().map(|term| self.term(&*term.term, image, 0.0, &mut none)).collect()
+        let one = |term: &Weighted<dyn FrameTerm<f64>>| {
+            reduced_chi2(&*term.term, &self.frames, image, 0.0, &mut none)
+        };
+        self.terms.iter().map(one).collect()
     }
 
     /// The weighted sum of χ² per datum.
     pub fn misfit(&self, image: &[f64]) -> f64 {
         self.chi2(image).iter().zip(self.terms).map(|(chi2, term)| term.weight * chi2).sum()
-    }
-
-    /// χ² per datum of one kind; adds `weight` times its gradient.
-    fn term(
-        &self,
-        term: &dyn FrameTerm<f64>,
-        image: &[f64],
-        weight: f64,
-        gradient: &mut [f64],
-    ) -> f64 {
-        // A part of the frames may have no datum of a kind.
-        let scale = 1.0 / self.count(term).max(1) as f64;
-        let of_frame =
-            |frame: &usize| term.value_and_gradient(*frame, image, weight * scale, gradient);
-        scale * self.frames.iter().map(of_frame).sum::<f64>()
     }
 
     /// The loss; overwrites the gradient.
@@ -158,7 +161,7 @@ impl ImageProblem<'_> {
         let image: Vec<f64> = shares.iter().map(|share| share * flux).collect();
         let mut of_image = vec![0.0; image.len()];
         let data = self.terms.iter().map(|Weighted { weight, term }| {
-            weight * self.term(&**term, &image, *weight, &mut of_image)
+            weight * reduced_chi2(&**term, &self.frames, &image, *weight, &mut of_image)
         });
         let mut value: f64 = data.sum();
         // All pixels go as F: the slope with ln F is Σ g I. Penalties see shares alone.
@@ -180,7 +183,7 @@ impl ImageProblem<'_> {
     /// The prior of the flux as one datum of each kind, and its slope with ln F.
     fn flux_prior(&self, flux: f64) -> (f64, f64) {
         let one = |term: &Weighted<dyn FrameTerm<f64>>| {
-            term.weight / self.count(&*term.term).max(1) as f64
+            term.weight / count(&*term.term, &self.frames).max(1) as f64
         };
         let scale: f64 = self.terms.iter().map(one).sum();
         let off = (flux - self.flux.jy) / self.flux.sigma_jy;

@@ -63,9 +63,7 @@ impl ShapeFit {
 
     /// Full width at half maximum of the round Gaussian with the same second moment about the centroid, µas.
     fn width_uas(&self, grid: ImageGrid) -> f64 {
-        let places = (0..grid.pixels()).map(|k| {
-            [grid.east(k % grid.width), grid.north(k / grid.width)].map(|x| x / MICROARCSECOND)
-        });
+        let places = (0..grid.pixels()).map(|k| grid.place_uas(k));
         let mut moments = [0.0; 3];
         for (share, [east, north]) in self.shares.iter().zip(places) {
             moments[0] += share * east;
@@ -162,8 +160,8 @@ impl Shape {
             }
         };
         let of = |k: usize| {
-            let place = [grid.east(k % grid.width), grid.north(k / grid.width)];
-            light(place[0] / MICROARCSECOND, place[1] / MICROARCSECOND)
+            let [east, north] = grid.place_uas(k);
+            light(east, north)
         };
         let all: Vec<f64> = (0..grid.pixels()).map(of).collect();
         // A ring that a step has put beyond the field lights no pixel: 0, not 0/0.

@@ -25,8 +25,8 @@ fn ring(
     [a, angle]: [f64; 2],
 ) -> Vec<f64> {
     let of = |k: usize| {
-        let east = grid.east(k % grid.width) / MICROARCSECOND - at[0];
-        let north = grid.north(k / grid.width) / MICROARCSECOND - at[1];
+        let [east, north] = grid.place_uas(k);
+        let (east, north) = (east - at[0], north - at[1]);
         let off = (east.hypot(north) - 0.5 * diameter) / fwhm;
         let turn = east.atan2(north) - angle.to_radians();
         (-4.0 * core::f64::consts::LN_2 * off * off).exp() * (1.0 + a * turn.cos())
@@ -34,7 +34,7 @@ fn ring(
     (0..grid.pixels()).map(of).collect()
 }
 
-fn grid(side: usize) -> ImageGrid {
+pub(super) fn grid(side: usize) -> ImageGrid {
     ImageGrid::new(side, side, 120.0 * MICROARCSECOND).unwrap()
 }
 
@@ -137,16 +137,20 @@ pub(super) fn spoil(seen: &mut Observation, seed: u64) {
     add_thermal_noise(seen, seed);
 }
 
-/// A ring of 44 µas and 0.6 Jy, brighter in the south, through the array of 2017 with thermal noise, gains of 20 % in every
-/// scan and no phases at all.
-fn observed(seed: u64) -> Observation {
-    let grid = grid(96);
-    let mut pixels = ring(grid, [44.0, 16.0], [0.0, 0.0], [0.5, 170.0]);
-    let sum: f64 = pixels.iter().sum();
-    pixels.iter_mut().for_each(|x| *x *= 0.6 / sum);
+/// A ring of 44 µas and 0.6 Jy, brighter in the south, on a grid, and the array of 2017 without any error.
+fn clean(grid: ImageGrid) -> (Vec<f64>, Observation) {
+    let mut image = ring(grid, [44.0, 16.0], [0.0, 0.0], [0.5, 170.0]);
+    let sum: f64 = image.iter().sum();
+    image.iter_mut().for_each(|x| *x *= 0.6 / sum);
     let (mut seen, hours) = night();
-    let movie = Movie { grid, pixels: pixels.repeat(hours.len()) };
+    let movie = Movie { grid, pixels: image.repeat(hours.len()) };
     simulate::fill(&mut seen, &movie, Pulse::Triangle, &hours, Method::Direct).unwrap();
+    (image, seen)
+}
+
+/// The same with thermal noise, gains of 20 % in every scan and no phases at all.
+fn observed(seed: u64) -> Observation {
+    let (_, mut seen) = clean(grid(96));
     spoil(&mut seen, seed);
     seen
 }
@@ -186,13 +190,7 @@ fn exact_scattering_and_variability_of_data() {
 #[test]
 fn exact_redrawn_data_have_gains_of_the_priors() {
     let file = StaticImageFile::parse(SETTINGS).unwrap();
-    let grid = file.image.grid().unwrap();
-    let mut image = ring(grid, [44.0, 16.0], [0.0, 0.0], [0.5, 170.0]);
-    let sum: f64 = image.iter().sum();
-    image.iter_mut().for_each(|x| *x *= 0.6 / sum);
-    let (mut seen, hours) = night();
-    let movie = Movie { grid, pixels: image.repeat(hours.len()) };
-    simulate::fill(&mut seen, &movie, Pulse::Triangle, &hours, Method::Direct).unwrap();
+    let (image, seen) = clean(file.image.grid().unwrap());
     let measured = data::total_intensity(&file, seen, "data").unwrap();
     let known = FitData { gains: None, ..measured.without_truth() };
     let drawn = |measured: &FitData, seed: u64| {
@@ -330,8 +328,7 @@ fn exact_shapes_tell_a_ring_from_what_has_no_hole() {
 fn exact_a_disc_and_a_double_have_no_ring() {
     let grid = grid(60);
     let light = |of: &dyn Fn(f64, f64) -> f64| -> Vec<f64> {
-        let place = |k: usize| [grid.east(k % 60), grid.north(k / 60)].map(|x| x / MICROARCSECOND);
-        let all = (0..grid.pixels()).map(place);
+        let all = (0..grid.pixels()).map(|k| grid.place_uas(k));
         all.map(|[east, north]| of(east, north)).collect()
     };
     let bell = |x: f64| (-4.0 * core::f64::consts::LN_2 * x * x).exp();

@@ -39,9 +39,8 @@ impl LinearPolarization {
         let polarized: Vec<Complex<f64>> =
             q.iter().zip(&u).map(|(q, u)| Complex::new(*q, *u)).collect();
         let angle = |k: usize| {
-            let east = grid.east(k % grid.width) / MICROARCSECOND - centre_uas[0];
-            let north = grid.north(k / grid.width) / MICROARCSECOND - centre_uas[1];
-            east.atan2(north)
+            let [east, north] = grid.place_uas(k);
+            (east - centre_uas[0]).atan2(north - centre_uas[1])
         };
         let turned = |(k, p): (usize, &Complex<f64>)| p * Complex::cis(-2.0 * angle(k));
         let beta2: Complex<f64> = polarized.iter().enumerate().map(turned).sum();

@@ -3,6 +3,7 @@
 //! Q + iU = m I in every pixel with m = w/√(1 + |w|²): light is never polarised by more than all of it. Parameters are the
 //! real parts of w, pixel by pixel, then its imaginary parts; all are 0 where nothing is polarised.
 
+use crate::problem::{count, reduced_chi2};
 use kerrlight_tomo::fit::FrameTerm;
 
 /// Loss of the polarisation of an image.
@@ -37,20 +38,13 @@ impl PolarizedProblem<'_> {
 
     /// χ² per datum of images.
     pub fn chi2(&self, images: &[f64]) -> f64 {
-        self.data(images, 0.0, &mut vec![0.0; images.len()])
+        let mut none = vec![0.0; images.len()];
+        reduced_chi2(self.term, &self.frames, images, 0.0, &mut none)
     }
 
     /// Data in the frames that count.
     pub fn count(&self) -> usize {
-        self.frames.iter().map(|frame| self.term.degrees_of_freedom(*frame)).sum()
-    }
-
-    /// χ² per datum; adds `weight` times its gradient.
-    fn data(&self, images: &[f64], weight: f64, gradient: &mut [f64]) -> f64 {
-        let scale = 1.0 / self.count().max(1) as f64;
-        let of_frame =
-            |frame: &usize| self.term.value_and_gradient(*frame, images, weight * scale, gradient);
-        scale * self.frames.iter().map(of_frame).sum::<f64>()
+        count(self.term, &self.frames)
     }
 
     /// The loss; overwrites the gradient.
@@ -58,7 +52,7 @@ impl PolarizedProblem<'_> {
         let n = self.light.len();
         let images = self.images(parameters);
         let mut of_images = vec![0.0; images.len()];
-        let mut value = self.data(&images, 1.0, &mut of_images);
+        let mut value = reduced_chi2(self.term, &self.frames, &images, 1.0, &mut of_images);
         let (re, im) = parameters.split_at(n);
         let factors: Vec<f64> = re.iter().zip(im).map(|(a, b)| factor(*a, *b)).collect();
         let m: Vec<[f64; 2]> = (0..n).map(|k| [factors[k] * re[k], factors[k] * im[k]]).collect();

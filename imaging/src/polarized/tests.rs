@@ -6,9 +6,8 @@ use crate::data;
 use crate::settings::StaticImageFile;
 use crate::survey;
 use crate::survey::{Stage, SurveyWatch};
-use crate::tests::{SETTINGS, night, spoil};
+use crate::tests::{SETTINGS, grid, night, spoil};
 use core::sync::atomic::{AtomicUsize, Ordering};
-use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::noise::apply_leakage;
 use kerrlight_vlbi::observation::{Basis, Observation};
 use kerrlight_vlbi::operator::{ImageGrid, Method, Operator, Pulse, Transform};
@@ -26,12 +25,8 @@ fn settings() -> String {
 
 /// A ring of 44 µas, 16 µas wide and 0.6 Jy with m = 0.3 e^{i(2φ + 60°)} all around: I, Q and U, Jy.
 fn truth(grid: ImageGrid) -> Vec<f64> {
-    let place = |k: usize| {
-        let [east, north] = [grid.east(k % grid.width), grid.north(k / grid.width)];
-        [east, north].map(|x| x / MICROARCSECOND)
-    };
     let light = |k: usize| {
-        let [east, north] = place(k);
+        let [east, north] = grid.place_uas(k);
         let off = (east.hypot(north) - 22.0) / 16.0;
         (-4.0 * core::f64::consts::LN_2 * off * off).exp()
     };
@@ -39,13 +34,12 @@ fn truth(grid: ImageGrid) -> Vec<f64> {
     let stokes = |part: &dyn Fn(usize) -> f64| -> Vec<f64> {
         (0..grid.pixels()).map(|k| 0.6 / sum * light(k) * part(k)).collect()
     };
-    let twice = |k: usize| 2.0 * place(k)[0].atan2(place(k)[1]) + 60f64.to_radians();
+    let twice = |k: usize| {
+        let [east, north] = grid.place_uas(k);
+        2.0 * east.atan2(north) + 60f64.to_radians()
+    };
     [stokes(&|_| 1.0), stokes(&|k| 0.3 * twice(k).cos()), stokes(&|k| 0.3 * twice(k).sin())]
         .concat()
-}
-
-fn grid(side: usize) -> ImageGrid {
-    ImageGrid::new(side, side, 120.0 * MICROARCSECOND).unwrap()
 }
 
 /// Simulates a night of the array of 2017, with thermal noise, gains of 20 % and phases that are lost.

@@ -62,6 +62,11 @@ impl ImageGrid {
         (0.5 * (self.height as f64 - 1.0) - row as f64) * self.pixel_rad
     }
 
+    /// Angles of the centre of pixel `k` to the east and to the north, µas.
+    pub fn place_uas(&self, k: usize) -> [f64; 2] {
+        [self.east(k % self.width), self.north(k / self.width)].map(|x| x / MICROARCSECOND)
+    }
+
     /// Pixels of an image.
     pub fn pixels(&self) -> usize {
         self.width * self.height
