@@ -28,17 +28,7 @@ fn main() -> Answer<()> {
 
 /// The uniform of the shader: what [`wgsl::Task`] has of hole and camera, then this picture's own numbers.
 fn uniform(hole: &Kerr, camera: Camera, inner: f32) -> Vec<u8> {
-    let task = wgsl::Task {
-        hole: *hole,
-        view: View::Camera(camera),
-        rays: 0,
-        crossings: 0,
-        samples: 0,
-        row: 0,
-        quadratures: true,
-        end: 0.0,
-        sphere: 0.0,
-    };
+    let task = wgsl::Task::new(*hole, View::Camera(camera));
     let mut bytes = task.bytes()[..192].to_vec();
     bytes.extend([WIDTH, HEIGHT].into_iter().flat_map(u32::to_le_bytes));
     bytes.extend([TANGENT, inner, OUTER, 0.0, 0.0, 0.0].into_iter().flat_map(f32::to_le_bytes));

@@ -38,15 +38,11 @@ fn rays(device: &Compute, spin: f64, side: usize, samples: u32) -> Answer<()> {
     let row = 64 * 1024;
     let view = View::Screen(Observer::at_infinity(Inclination::from_degrees(60.0)?));
     let task = wgsl::Task {
-        hole,
-        view,
         rays: count as u32,
         crossings: 4,
         samples,
         row,
-        quadratures: true,
-        end: 0.0,
-        sphere: 0.0,
+        ..wgsl::Task::new(hole, view)
     };
     let at = |k: usize| -10.0 + 20.0 * (k as f64 + 0.5) / side as f64;
     let (x, y): (Vec<f64>, Vec<f64>) = (0..count).map(|k| (at(k % side), -at(k / side))).unzip();
@@ -92,17 +88,7 @@ fn rays(device: &Compute, spin: f64, side: usize, samples: u32) -> Answer<()> {
 fn disc(device: &Compute, width: u32, height: u32) -> Answer<()> {
     let hole = Kerr::new(0.9)?;
     let camera = Camera::new(&hole, Inclination::from_degrees(82.0)?, 40.0, Motion::Static)?;
-    let task = wgsl::Task {
-        hole,
-        view: View::Camera(camera),
-        rays: 0,
-        crossings: 0,
-        samples: 0,
-        row: 0,
-        quadratures: true,
-        end: 0.0,
-        sphere: 0.0,
-    };
+    let task = wgsl::Task::new(hole, View::Camera(camera));
     let mut uniform = task.bytes()[..192].to_vec();
     uniform.extend([width, height].into_iter().flat_map(u32::to_le_bytes));
     let edges = [0.55, orbits::isco(&hole) as f32, 16.0, 0.0, 0.0, 0.0f32];

@@ -38,17 +38,7 @@ pub(super) const ROW: u32 = WORKGROUP * 1024;
 
 /// The task of kernels that take rays from end to end, with all quantities.
 pub(super) fn whole_rays(hole: &Kerr, view: &View, rays: usize) -> Task {
-    Task {
-        hole: *hole,
-        view: *view,
-        rays: rays as u32,
-        crossings: 0,
-        samples: 0,
-        row: ROW,
-        quadratures: true,
-        end: 0.0,
-        sphere: 0.0,
-    }
+    Task { rays: rays as u32, row: ROW, ..Task::new(*hole, *view) }
 }
 
 impl Program {

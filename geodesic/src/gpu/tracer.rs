@@ -89,15 +89,13 @@ impl GpuTracer {
         assert_eq!(x.len(), y.len(), "as many y as x");
         rays.start(request);
         let task = Task {
-            hole: *hole,
-            view: *view,
-            rays: 0,
             crossings: request.crossings as u32,
             samples: request.samples as u32,
             row: ROW,
             quadratures: request.quadratures,
             end: request.end,
             sphere: request.sphere.map_or(0.0, |radius| 1.0 / radius),
+            ..Task::new(*hole, *view)
         };
         let most = self.most_rays(request);
         for (x, y) in x.chunks(most).zip(y.chunks(most)) {

@@ -192,6 +192,21 @@ pub struct Task {
 }
 
 impl Task {
+    /// A task of no rays yet, and of all quantities: to be completed by its other fields.
+    pub fn new(hole: Kerr, view: View) -> Self {
+        Task {
+            hole,
+            view,
+            rays: 0,
+            crossings: 0,
+            samples: 0,
+            row: 0,
+            quadratures: true,
+            end: 0.0,
+            sphere: 0.0,
+        }
+    }
+
     /// The bytes of the uniform.
     pub fn bytes(&self) -> [u8; TASK_BYTES] {
         let mut words = Vec::with_capacity(TASK_BYTES / 4);
