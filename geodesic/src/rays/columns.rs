@@ -5,6 +5,7 @@ use crate::integrate::uncertainty::Uncertainty;
 use crate::rays::block::PlaneCrossing;
 use crate::rays::request::Request;
 use crate::rays::sampling::{Sink, Summary};
+use crate::simd::span;
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::point::PathPoint;
 
@@ -34,9 +35,7 @@ impl Points {
     /// The places in the columns of the points of ray number `ray`: none if there is no such
     /// ray.
     pub fn of(&self, ray: usize) -> core::ops::Range<usize> {
-        let end = |ray: usize| self.ends.get(ray).copied().unwrap_or(self.radius.len());
-        let start = ray.checked_sub(1).map_or(0, end);
-        start..end(ray)
+        span(&self.ends, ray)
     }
 
     /// Returns the ends of each ray's points in the columns; those of the first ray start at 0.

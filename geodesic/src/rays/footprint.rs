@@ -25,6 +25,8 @@ use crate::numbers::vector::dot;
 use crate::rays::blocks::{BLOCK, check_columns, in_blocks};
 use crate::screen::camera::Camera;
 use crate::screen::observer::{Observer, Ray};
+use crate::screen::view::View;
+use crate::simd::span;
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::point::PathPoint;
 use crate::spacetime::quantities::Quantities;
@@ -173,8 +175,7 @@ pub struct Beams {
 impl Beams {
     /// The crossings of ray number `ray`; none if there is no such ray.
     pub fn of(&self, ray: usize) -> &[Disc] {
-        let end = |ray: usize| self.ends.get(ray).copied().unwrap_or(self.crossings.len());
-        &self.crossings[ray.checked_sub(1).map_or(0, end)..end(ray)]
+        &self.crossings[span(&self.ends, ray)]
     }
 
     fn take(&mut self, path: &Path<Number>, crossings: usize) {
@@ -249,10 +250,7 @@ pub fn of_screen(
     tolerance: f64,
     crossings: usize,
 ) -> Result<Beams, Error> {
-    let place = observer.with_inclination(observer.inclination().lift());
-    let lifted = hole.lift();
-    let ray = |alpha, beta| place.ray(&lifted, alpha, beta);
-    beams(hole, alpha, beta, tolerance, crossings, ray)
+    beams(hole, &View::Screen(*observer), alpha, beta, tolerance, crossings)
 }
 
 /// The beams around the points (`x[k]`, `y[k]`) of a camera's picture plane: see [`of_screen`].
@@ -269,28 +267,28 @@ pub fn of_camera(
     tolerance: f64,
     crossings: usize,
 ) -> Result<Beams, Error> {
-    beams(camera.hole(), x, y, tolerance, crossings, |x, y| camera.ray(x, y))
+    beams(camera.hole(), &View::Camera(*camera), x, y, tolerance, crossings)
 }
 
 fn beams(
     hole: &Kerr,
+    view: &View,
     first: &[f64],
     second: &[f64],
     tolerance: f64,
     crossings: usize,
-    ray: impl Fn(Number, Number) -> Result<Ray<Number>, Error> + Sync + Send,
 ) -> Result<Beams, Error> {
     check_columns(first, second)?;
     Tracer::new(tolerance)?;
-    let hole = hole.lift();
+    let lifted = hole.lift();
     let pieces = in_blocks(BLOCK, first, second, |first, second| -> Result<Beams, Error> {
         let mut beams = Beams::default();
         let mut path = Path::empty();
         for (first, second) in first.iter().zip(second) {
-            let ray = ray(Number::parameter(*first, 0), Number::parameter(*second, 1))?;
+            let ray = view.beam(hole, *first, *second)?;
             trace_series(
                 tolerance,
-                &hole,
+                &lifted,
                 &ray,
                 Quantities { azimuth: true, time: false, velocity: false },
                 &mut path,

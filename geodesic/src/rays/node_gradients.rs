@@ -35,7 +35,7 @@ use crate::rays::derivatives::{Gradient, with_parameters};
 use crate::rays::sampling::Trajectory;
 use crate::rays::trajectory::MinoPath;
 use crate::screen::observer::{Observer, Ray};
-use crate::simd::{GROWTH, Key, NodeRequest, Nodes, PanelRule};
+use crate::simd::{GROWTH, Key, NodeRequest, Nodes, PanelRule, span};
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::point::PathPoint;
 
@@ -92,9 +92,7 @@ impl DifferentiatedNodes {
 
     /// Those of ray `k`, one for each of [`Nodes::ray`]; none if there is no such ray.
     pub fn ray(&self, k: usize) -> &[DifferentiatedNode] {
-        let end = self.ends.get(k).copied().unwrap_or(0);
-        let start = k.checked_sub(1).and_then(|k| self.ends.get(k)).copied().unwrap_or(0);
-        self.nodes.get(start..end).unwrap_or(&[])
+        &self.nodes[span(&self.ends, k)]
     }
 
     fn append(&mut self, other: Self) {

@@ -1,10 +1,18 @@
 //! Columns of results that start on a cache line.
 
 use crate::error::Error;
-use core::ops::{Deref, DerefMut};
+use core::ops::{Deref, DerefMut, Range};
 
 /// Doubles per cache line.
 const LINE: usize = 8;
+
+/// Range of part number `k` of columns that hold one part after the other, by the ends of all parts; empty if there is no
+/// such part.
+#[inline]
+pub(crate) fn span(ends: &[usize], k: usize) -> Range<usize> {
+    let end = |k: usize| ends.get(k).or(ends.last()).copied().unwrap_or(0);
+    k.checked_sub(1).map_or(0, end)..end(k)
+}
 
 /// Something that starts on a cache line, so that no register in it lies across two.
 #[repr(align(64))]

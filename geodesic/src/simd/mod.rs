@@ -51,6 +51,7 @@ mod ray_nodes;
 mod sample;
 mod samples;
 
+pub(crate) use column::span;
 pub use crossings::{Crossing, Crossings, RayEnds};
 pub(crate) use error::MAX_STEP;
 pub use lanes::InstructionSet;

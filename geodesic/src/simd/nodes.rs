@@ -1,7 +1,7 @@
 //! Nodes of a quadrature along many rays, inside a sphere.
 
 use super::ScreenRays;
-use super::column::Aligned;
+use super::column::{Aligned, span};
 use super::error::{MAX_STEP, estimate};
 use super::lanes::{InstructionSet, Lanes, MAX_LANES, Task, dispatch};
 use super::march::{COLUMNS, GROWTH, Jump, Key, MAX_ORDER, March, RayLanes};
@@ -64,9 +64,8 @@ impl Nodes {
 
     /// The nodes of ray number `k`; none if there is no such ray.
     pub fn ray(&self, k: usize) -> RayNodes<'_> {
-        let end = self.ends.get(k).copied().unwrap_or(0);
-        let start = k.checked_sub(1).and_then(|k| self.ends.get(k)).copied().unwrap_or(0).min(end);
-        let column = |c: usize| self.columns[c].get(start..end).unwrap_or(&[]);
+        let range = span(&self.ends, k);
+        let column = |c: usize| self.columns[c].get(range.clone()).unwrap_or(&[]);
         RayNodes {
             radius: column(0),
             cos_theta: column(1),
@@ -168,10 +167,6 @@ impl Nodes {
         let mut layouts = vec![Key::default(); self.plan.len()];
         self.plan.iter().for_each(|plan| layouts[plan.ray] = plan.key);
         layouts
-    }
-
-    fn start_of(&self, ray: usize) -> usize {
-        ray.checked_sub(1).map_or(0, |ray| self.ends[ray])
     }
 }
 
@@ -365,7 +360,7 @@ fn gather<V: Lanes<f64>>(
         for (value, x) in values.iter_mut().zip(row) {
             value[l] = x;
         }
-        starts[l] = nodes.start_of(ray);
+        starts[l] = span(&nodes.ends, ray).start;
     }
     let [alpha, beta, approach, since, inward, last] = &values;
     let lanes = RayLanes {
