@@ -94,8 +94,8 @@ impl Shot {
         let film = Film::new(&self.scene, files.decoded);
         let mut film = film.with_context(|| self.source.name.clone())?;
         let common = Common {
-            legend: film.legend(),
-            identifiers: film.identifiers(),
+            legend: film.raster().legend(),
+            identifiers: film.raster().identifiers(),
             files: &files.identity,
         };
         let (mut shown, mut factor) = (Vec::with_capacity(times.len()), None);

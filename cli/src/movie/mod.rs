@@ -58,7 +58,7 @@ pub struct Movie {
 /// Refuses frames that there is no memory for.
 fn afford(film: &Film, scene: &Scene) -> anyhow::Result<()> {
     let (width, height) = (scene.screen.width, scene.screen.rows());
-    let (count, channels) = (film.batch(), film.names().len());
+    let (count, channels) = (film.batch(), film.raster().names().len());
     let what = || format!("{count} frames at once of {width} x {height} pixels");
     let pixels = f64::from(width) * f64::from(height);
     Ok(memory::afford(what, memory::frames(count as f64, pixels, channels as f64))?)
@@ -86,13 +86,13 @@ impl Movie {
         }
         // A missing channel is told before the frames are rendered.
         if animations.any() {
-            self.look.channels(&scene, &film.names())?;
+            self.look.channels(&scene, &film.raster().names())?;
         }
         if let Some(device) = self.device.open()? {
             film = film.with_device(device);
         }
         afford(&film, &scene)?;
-        let device = film.device().map_or("", RayDevice::name);
+        let device = film.raster().device().map_or("", RayDevice::name);
         let of = Origin { name: &source.name, text: &text, files: &files.identity, device };
         let mut sequence = Sequence::new(&self.output, &of, &times, &self.frames.part)?;
         for input in iter::once(&self.scene).chain(&files.paths) {
@@ -102,8 +102,8 @@ impl Movie {
             eprintln!("warning: nothing in this scene moves: all frames are the same");
         }
         sequence.find()?;
-        if let Some(device) = film.device() {
-            devices::announce(device, &film.beside_device());
+        if let Some(device) = film.raster().device() {
+            devices::announce(device, &film.raster().beside_device());
         }
         let start = Instant::now();
         let per_second = self.viewing.frames_per_second();

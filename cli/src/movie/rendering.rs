@@ -77,7 +77,7 @@ impl<'a> Rendering<'a> {
                 Err(Interrupted(self.there()).into())
             }
             Err(error) => {
-                let failure = self.film.device().and_then(RayDevice::failure);
+                let failure = self.film.raster().device().and_then(RayDevice::failure);
                 let told = failure.map(|failure| {
                     format!("{failure}; {}, or with --device cpu into another folder", self.there())
                 });

@@ -55,7 +55,7 @@ impl Film {
         }
         let screen = &self.raster.scene().screen;
         let pixels = screen.width as usize * screen.rows() as usize;
-        (MOST_VALUES / (pixels * self.names().len().max(1))).clamp(1, MOST_FRAMES)
+        (MOST_VALUES / (pixels * self.raster.names().len().max(1))).clamp(1, MOST_FRAMES)
     }
 
     /// Returns whether rays have to be traced anew for every frame: the camera moves, or pixels are
@@ -79,24 +79,9 @@ impl Film {
         Film { raster: self.raster.with_device(device).with_tile(TILE) }
     }
 
-    /// The device on which rays are traced, if it is not this processor.
-    pub fn device(&self) -> Option<&dyn RayDevice> {
-        self.raster.device()
-    }
-
-    /// Returns the parts of the scene that are traced on this processor even so.
-    pub fn beside_device(&self) -> Vec<&'static str> {
-        self.raster.beside_device()
-    }
-
-    /// Names of the channels.
-    pub fn names(&self) -> Vec<&'static str> {
-        self.raster.names()
-    }
-
-    /// Describes the channels.
-    pub fn legend(&self) -> String {
-        self.raster.legend()
+    /// Raster of its pictures, with their channels and the device on which rays are traced.
+    pub fn raster(&self) -> &Raster {
+        &self.raster
     }
 
     /// Returns the camera of a frame: see [`Raster::camera`].
@@ -105,11 +90,6 @@ impl Film {
     /// If the camera is impossible there.
     pub fn camera(&self, frame: &Frame) -> Result<CameraMatrices, Error> {
         self.raster.camera_at(frame.time)
-    }
-
-    /// Describes the numbers in the channel `id`: see [`Raster::identifiers`].
-    pub fn identifiers(&self) -> Option<String> {
-        self.raster.identifiers()
     }
 
     /// Factor from the scene's unit of intensity to that of the file, such that the frame has the
