@@ -44,47 +44,41 @@ impl Node {
             polar_velocity: point.velocity[2],
         }
     }
+
+    /// Its numbers, in their order.
+    fn values(&self) -> [f64; 8] {
+        let Node { radius, cos_theta, weight, mino_time, azimuth, delay, .. } = *self;
+        let [radial, polar] = [self.radial_velocity, self.polar_velocity];
+        [radius, cos_theta, weight, mino_time, azimuth, delay, radial, polar]
+    }
 }
 
 /// Nodes in columns, in order along a ray.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct NodeColumns {
-    radius: Vec<f64>,
-    cos_theta: Vec<f64>,
-    weight: Vec<f64>,
-    mino_time: Vec<f64>,
-    azimuth: Vec<f64>,
-    delay: Vec<f64>,
-    radial_velocity: Vec<f64>,
-    polar_velocity: Vec<f64>,
+    /// Radii, cos θ, weights, Mino times and so on, in the order of [`Node`].
+    columns: [Vec<f64>; 8],
 }
 
 impl NodeColumns {
     /// Number of nodes.
     pub fn len(&self) -> usize {
-        self.radius.len()
+        self.columns[0].len()
     }
 
     /// Returns whether there is no node.
     pub fn is_empty(&self) -> bool {
-        self.radius.is_empty()
+        self.columns[0].is_empty()
     }
 
     /// Removes all nodes and keeps the memory.
     pub fn clear(&mut self) {
-        self.columns().into_iter().for_each(Vec::clear);
+        self.columns.iter_mut().for_each(Vec::clear);
     }
 
     /// Appends a node.
     pub fn push(&mut self, node: Node) {
-        self.radius.push(node.radius);
-        self.cos_theta.push(node.cos_theta);
-        self.weight.push(node.weight);
-        self.mino_time.push(node.mino_time);
-        self.azimuth.push(node.azimuth);
-        self.delay.push(node.delay);
-        self.radial_velocity.push(node.radial_velocity);
-        self.polar_velocity.push(node.polar_velocity);
+        self.columns.iter_mut().zip(node.values()).for_each(|(column, value)| column.push(value));
     }
 
     /// Appends the nodes `range` of another.
@@ -92,23 +86,14 @@ impl NodeColumns {
     /// # Panics
     /// If it has no such nodes.
     pub fn extend(&mut self, other: &NodeColumns, range: Range<usize>) {
-        let from = other.view(range);
-        let from = [
-            from.radius,
-            from.cos_theta,
-            from.weight,
-            from.mino_time,
-            from.azimuth,
-            from.delay,
-            from.radial_velocity,
-            from.polar_velocity,
-        ];
-        self.columns().into_iter().zip(from).for_each(|(to, from)| to.extend_from_slice(from));
+        for (to, from) in self.columns.iter_mut().zip(&other.columns) {
+            to.extend_from_slice(&from[range.clone()]);
+        }
     }
 
     /// Mino times of all nodes.
     pub fn mino_times(&self) -> &[f64] {
-        &self.mino_time
+        &self.columns[3]
     }
 
     /// Puts `node` in the place of node `k`.
@@ -116,23 +101,12 @@ impl NodeColumns {
     /// # Panics
     /// If there is no such node.
     pub fn set(&mut self, k: usize, node: Node) {
-        let Node { radius, cos_theta, weight, mino_time, azimuth, delay, .. } = node;
-        let values = [
-            radius,
-            cos_theta,
-            weight,
-            mino_time,
-            azimuth,
-            delay,
-            node.radial_velocity,
-            node.polar_velocity,
-        ];
-        self.columns().into_iter().zip(values).for_each(|(column, value)| column[k] = value);
+        self.columns.iter_mut().zip(node.values()).for_each(|(column, value)| column[k] = value);
     }
 
     /// Weights of all nodes, in M.
     pub fn weights(&self) -> &[f64] {
-        &self.weight
+        &self.columns[2]
     }
 
     /// All nodes.
@@ -145,30 +119,7 @@ impl NodeColumns {
     /// # Panics
     /// If there are no such nodes.
     pub fn view(&self, range: Range<usize>) -> RayNodes<'_> {
-        RayNodes {
-            radius: &self.radius[range.clone()],
-            cos_theta: &self.cos_theta[range.clone()],
-            weight: &self.weight[range.clone()],
-            mino_time: &self.mino_time[range.clone()],
-            azimuth: &self.azimuth[range.clone()],
-            delay: &self.delay[range.clone()],
-            radial_velocity: &self.radial_velocity[range.clone()],
-            polar_velocity: &self.polar_velocity[range],
-            error: 0.0,
-        }
-    }
-
-    fn columns(&mut self) -> [&mut Vec<f64>; 8] {
-        [
-            &mut self.radius,
-            &mut self.cos_theta,
-            &mut self.weight,
-            &mut self.mino_time,
-            &mut self.azimuth,
-            &mut self.delay,
-            &mut self.radial_velocity,
-            &mut self.polar_velocity,
-        ]
+        RayNodes::of(self.columns.each_ref().map(|column| &column[range.clone()]), 0.0)
     }
 }
 

@@ -66,17 +66,8 @@ impl Nodes {
     pub fn ray(&self, k: usize) -> RayNodes<'_> {
         let range = span(&self.ends, k);
         let column = |c: usize| self.columns[c].get(range.clone()).unwrap_or(&[]);
-        RayNodes {
-            radius: column(0),
-            cos_theta: column(1),
-            weight: column(2),
-            mino_time: column(3),
-            azimuth: column(4),
-            delay: column(5),
-            radial_velocity: column(6),
-            polar_velocity: column(7),
-            error: self.error.get(k).copied().unwrap_or(f64::NAN),
-        }
+        let error = self.error.get(k).copied().unwrap_or(f64::NAN);
+        RayNodes::of(core::array::from_fn(column), error)
     }
 
     /// Places nodes on the rays that arrive at (`alpha[k]`, `beta[k]`), each up to the Mino time

@@ -23,3 +23,21 @@ pub struct RayNodes<'a> {
     /// proportion to the distance from the critical curve.
     pub error: f64,
 }
+
+impl<'a> RayNodes<'a> {
+    /// The nodes of columns in the order of the fields.
+    pub(crate) fn of(columns: [&'a [f64]; 8], error: f64) -> Self {
+        let [radius, cos_theta, weight, mino_time, azimuth, delay, radial, polar] = columns;
+        RayNodes {
+            radius,
+            cos_theta,
+            weight,
+            mino_time,
+            azimuth,
+            delay,
+            radial_velocity: radial,
+            polar_velocity: polar,
+            error,
+        }
+    }
+}
