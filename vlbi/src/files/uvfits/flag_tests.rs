@@ -1,7 +1,8 @@
 //! Flags: what each column of a row leaves of a file.
 
-use super::super::fits::{Cards, ColumnData, binary_table, padded};
+use super::super::fits::{ColumnData, binary_table, padded};
 use super::read;
+use super::tests::{random_groups, table_of_antennas};
 
 /// A row of the table: ANTS, TIME RANGE, IFS, CHANS, PFLAGS, SOURCE.
 #[derive(Clone)]
@@ -45,8 +46,6 @@ fn table(rows: &[Row], version: u8) -> Vec<u8> {
 /// Baselines 1-2, 1-3 and 2-3 at 6 h and 12 h of 2017 April 7, of RR and LL in two channels of two IFs; the value of each
 /// datum is its number.
 fn bytes(tables: &[Vec<u8>], date: &str) -> Vec<u8> {
-    let mut cards = Cards::default();
-    cards.value("SIMPLE", "T").value("BITPIX", -32).value("NAXIS", 7).value("NAXIS1", 0);
     let axes = [
         ("COMPLEX", 3, 1.0, 1.0),
         ("STOKES", 2, -1.0, -1.0),
@@ -55,16 +54,9 @@ fn bytes(tables: &[Vec<u8>], date: &str) -> Vec<u8> {
         ("RA", 1, 180.0, 1.0),
         ("DEC", 1, 12.0, 1.0),
     ];
-    for (k, (name, length, value, step)) in (2..).zip(axes) {
-        cards.value(&format!("NAXIS{k}"), length).text(&format!("CTYPE{k}"), name);
-        cards.number(&format!("CRVAL{k}"), value).number(&format!("CDELT{k}"), step);
-        cards.number(&format!("CRPIX{k}"), 1.0);
-    }
-    for (k, name) in (1..).zip(["UU---SIN", "VV---SIN", "BASELINE", "DATE", "DATE", "SOURCE"]) {
-        cards.text(&format!("PTYPE{k}"), name);
-    }
-    cards.value("GROUPS", "T").value("PCOUNT", 6).value("GCOUNT", 6).text("OBJECT", "M87");
-    cards.text("DATE-OBS", date);
+    let parameters = ["UU---SIN", "VV---SIN", "BASELINE", "DATE", "DATE", "SOURCE"];
+    let mut cards = random_groups(-32, &axes, &parameters, 6, &[]);
+    cards.text("OBJECT", "M87").text("DATE-OBS", date);
     let mut bytes = cards.finish();
     let mut numbers: Vec<f32> = Vec::new();
     for group in 0..6 {
@@ -74,13 +66,7 @@ fn bytes(tables: &[Vec<u8>], date: &str) -> Vec<u8> {
         numbers.extend((0..8).flat_map(|k| [(8 * group + k) as f32, 0.0, 1.0]));
     }
     bytes.extend(padded(numbers.into_iter().flat_map(f32::to_be_bytes).collect(), 0));
-    let names = ["A", "B", "C"].map(String::from).to_vec();
-    let columns = [
-        ("ANNAME", "", ColumnData::Text(8, names)),
-        ("STABXYZ", "METERS", ColumnData::Doubles(3, (1..10).map(f64::from).collect())),
-        ("NOSTA", "", ColumnData::Integers(1, vec![1, 2, 3])),
-    ];
-    bytes.extend(binary_table("AIPS AN", 3, &columns, |_| ()));
+    bytes.extend(table_of_antennas(&["A", "B", "C"], |_| ()));
     let columns = [
         ("FRQSEL", "", ColumnData::Integers(1, vec![1])),
         ("IF FREQ", "HZ", ColumnData::Doubles(2, vec![0.0, 2e9])),

@@ -1,7 +1,7 @@
 //! Files whose settings are not supported are refused, with name and value.
 
-use super::super::fits::{Cards, ColumnData, binary_table, padded};
-use super::tests::small;
+use super::super::fits::{ColumnData, binary_table, padded};
+use super::tests::{random_groups, small, table_of_antennas};
 use super::*;
 use crate::observation::Observation;
 
@@ -9,7 +9,7 @@ use crate::observation::Observation;
 struct Made {
     /// Random parameters besides those of a baseline, with their values in both groups.
     parameters: Vec<(&'static str, [f32; 2])>,
-    /// Lines of the header that replace or follow others.
+    /// Lines of the header that replace others or are more.
     header: Vec<(&'static str, String)>,
     /// Value of PTYPE1.
     u: &'static str,
@@ -37,32 +37,17 @@ fn plain() -> Made {
 
 /// Two groups of LL of one baseline, at 6 h and 12 h of MJD 57850, 230 GHz.
 fn bytes(made: &Made) -> Vec<u8> {
-    let mut cards = Cards::default();
-    cards.value("SIMPLE", "T").value("BITPIX", -32).value("NAXIS", 6).value("NAXIS1", 0);
     let axes = [
-        ("COMPLEX", 3, 1.0),
-        ("STOKES", 1, -2.0),
-        ("FREQ", 1, 230e9),
-        ("RA", 1, 180.0),
-        ("DEC", 1, 12.0),
+        ("COMPLEX", 3, 1.0, 1e9),
+        ("STOKES", 1, -2.0, 1e9),
+        ("FREQ", 1, 230e9, 1e9),
+        ("RA", 1, 180.0, 1e9),
+        ("DEC", 1, 12.0, 1e9),
     ];
-    for (k, (name, length, value)) in (2..).zip(axes) {
-        cards.value(&format!("NAXIS{k}"), length).text(&format!("CTYPE{k}"), name);
-        cards.number(&format!("CRVAL{k}"), value).number(&format!("CDELT{k}"), 1e9);
-        if !(name == "FREQ" && made.header.iter().any(|(key, _)| *key == "CRPIX4")) {
-            cards.number(&format!("CRPIX{k}"), 1.0);
-        }
-    }
-    let fixed = [made.u, "VV---SIN", "BASELINE", "DATE", "DATE"];
-    let names = fixed.into_iter().chain(made.parameters.iter().map(|(name, _)| *name));
-    for (k, name) in (1..).zip(names) {
-        cards.text(&format!("PTYPE{k}"), name);
-    }
-    cards.value("GROUPS", "T").value("PCOUNT", 5 + made.parameters.len()).value("GCOUNT", 2);
+    let mut names = vec![made.u, "VV---SIN", "BASELINE", "DATE", "DATE"];
+    names.extend(made.parameters.iter().map(|(name, _)| *name));
+    let mut cards = random_groups(-32, &axes, &names, 2, &made.header);
     cards.text("OBJECT", "MULTI");
-    for (key, value) in &made.header {
-        cards.value(key, value);
-    }
     let mut bytes = cards.finish();
     let mut data = Vec::new();
     for group in 0..2 {
@@ -73,12 +58,7 @@ fn bytes(made: &Made) -> Vec<u8> {
         data.extend(numbers.into_iter().flat_map(f32::to_be_bytes));
     }
     bytes.extend(padded(data, 0));
-    let columns = [
-        ("ANNAME", "", ColumnData::Text(8, vec!["A".into(), "B".into()])),
-        ("STABXYZ", "METERS", ColumnData::Doubles(3, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0])),
-        ("NOSTA", "", ColumnData::Integers(1, vec![1, 2])),
-    ];
-    bytes.extend(binary_table("AIPS AN", 2, &columns, |cards| {
+    bytes.extend(table_of_antennas(&["A", "B"], |cards| {
         cards.text("TIMSYS", made.time_system);
     }));
     made.tables.iter().for_each(|table| bytes.extend(table));

@@ -122,6 +122,44 @@ fn exact_what_is_not_known_is_asked_for() {
     assert!(fail(|o| o.rows.clear()).contains("no visibilities"));
 }
 
+/// Header of random groups: axes with names, lengths, first values and steps, parameters by their names; of the cards of the
+/// same name those of `own` count.
+pub(super) fn random_groups(
+    bits: i32,
+    axes: &[(&str, usize, f64, f64)],
+    parameters: &[&str],
+    groups: usize,
+    own: &[(&str, String)],
+) -> Cards {
+    let mut cards = Cards::default();
+    cards.value("SIMPLE", "T").value("BITPIX", bits);
+    cards.value("NAXIS", axes.len() + 1).value("NAXIS1", 0);
+    for (key, value) in own {
+        cards.value(key, value);
+    }
+    for (k, (name, length, value, step)) in (2..).zip(axes) {
+        cards.value(&format!("NAXIS{k}"), length).text(&format!("CTYPE{k}"), name);
+        cards.number(&format!("CRVAL{k}"), *value).number(&format!("CDELT{k}"), *step);
+        cards.number(&format!("CRPIX{k}"), 1.0);
+    }
+    for (k, name) in (1..).zip(parameters) {
+        cards.text(&format!("PTYPE{k}"), name);
+    }
+    cards.value("GROUPS", "T").value("PCOUNT", parameters.len()).value("GCOUNT", groups);
+    cards
+}
+
+/// Table of antennas with these names.
+pub(super) fn table_of_antennas(names: &[&str], more: impl FnOnce(&mut Cards)) -> Vec<u8> {
+    let count = names.len();
+    let columns = [
+        ("ANNAME", "", ColumnData::Text(8, names.iter().map(|name| (*name).to_owned()).collect())),
+        ("STABXYZ", "METERS", ColumnData::Doubles(3, (1..=3 * count).map(|x| x as f64).collect())),
+        ("NOSTA", "", ColumnData::Integers(1, (1..=count as i32).collect())),
+    ];
+    binary_table("AIPS AN", count, &columns, more)
+}
+
 /// Returns axes without an `AIPS FQ` table: IFs then have no frequencies of their own; channels
 /// have.
 fn foreign_axes() -> &'static str {
@@ -131,16 +169,12 @@ fn foreign_axes() -> &'static str {
 /// A file as others write it: axes in another order, two IFs of two channels, dates with PZERO,
 /// (u, v) with PSCAL, integers with BSCALE, a subarray, a baseline of a station with itself.
 fn foreign() -> Vec<u8> {
-    let mut cards = Cards::default();
-    cards.value("SIMPLE", "T").value("BITPIX", 16).value("NAXIS", 5).value("NAXIS1", 0);
-    for (axis, length, name) in [(2, 3, "COMPLEX"), (3, 2, "IF"), (4, 2, "FREQ"), (5, 1, "STOKES")]
-    {
-        cards.value(&format!("NAXIS{axis}"), length).text(&format!("CTYPE{axis}"), name);
-        let value = if name == "STOKES" { -2.0 } else { 1e11 };
-        cards.number(&format!("CRVAL{axis}"), value).number(&format!("CDELT{axis}"), 1e8);
-        cards.number(&format!("CRPIX{axis}"), 1.0);
-    }
-    cards.value("GROUPS", "T").value("PCOUNT", 5).value("GCOUNT", 3).number("BSCALE", 0.5);
+    let axes = [
+        ("COMPLEX", 3, 1e11, 1e8),
+        ("IF", 2, 1e11, 1e8),
+        ("FREQ", 2, 1e11, 1e8),
+        ("STOKES", 1, -2.0, 1e8),
+    ];
     let parameters = [
         ("DATE", 1.0, 2_457_850.5),
         ("UU-L-SIN", 1e-4, 0.0),
@@ -148,11 +182,11 @@ fn foreign() -> Vec<u8> {
         ("BASELINE", 0.01, 0.0),
         ("_DATE", 1.0 / 1024.0, 0.0),
     ];
-    for (k, (name, scale, zero)) in (1..).zip(parameters) {
-        cards.text(&format!("PTYPE{k}"), name);
+    let mut cards = random_groups(16, &axes, &parameters.map(|(name, ..)| name), 3, &[]);
+    for (k, (_, scale, zero)) in (1..).zip(parameters) {
         cards.number(&format!("PSCAL{k}"), scale).number(&format!("PZERO{k}"), zero);
     }
-    cards.number("OBSRA", 266.4).number("OBSDEC", -29.0);
+    cards.number("BSCALE", 0.5).number("OBSRA", 266.4).number("OBSDEC", -29.0);
     let mut bytes = cards.finish();
     // Values are halved by BSCALE: weights of 2 are 1, of 8 are 4.
     let group = |baseline: i16, weights: [i16; 4]| {
@@ -165,12 +199,7 @@ fn foreign() -> Vec<u8> {
     let groups = [group(25801, [2, 8, 0, -2]), group(25700, [2; 4]), group(25800, [0; 4])];
     bytes.extend(padded(groups.concat(), 0));
     for (version, names) in [(1, ["A", "B"]), (2, ["B", "C"])] {
-        let columns = [
-            ("ANNAME", "", ColumnData::Text(8, names.map(str::to_owned).to_vec())),
-            ("STABXYZ", "METERS", ColumnData::Doubles(3, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0])),
-            ("NOSTA", "", ColumnData::Integers(1, vec![1, 2])),
-        ];
-        let table = binary_table("AIPS AN", 2, &columns, |_| ());
+        let table = table_of_antennas(&names, |_| ());
         let text = String::from_utf8_lossy(&table[..2880]).into_owned();
         let version = format!("EXTVER  = {version:>20}");
         let text = text.replace(&format!("EXTVER  = {:>20}", 1), &version);
