@@ -55,7 +55,13 @@ impl CoarseView {
         };
         let movie = measured.movie.as_ref().map(thin).transpose()?;
         let measured = FitData { movie, ..measured.without_truth() };
-        let screen = Screen { pixels: places.len(), ..file.screen.clone() };
+        // Pixels keep their size, which rays within them are spread over.
+        let screen = Screen {
+            pixels: places.len(),
+            width: spacing(&file.screen)? * places.len() as f64,
+            width_of: WidthOf::Edges,
+            ..file.screen.clone()
+        };
         Ok(Self { file: FitFile { screen, ..file }, instrument, measured })
     }
 

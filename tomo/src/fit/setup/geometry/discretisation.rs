@@ -7,7 +7,7 @@ use super::seen_through;
 use crate::fit::geometry::{
     Effort, GeometryModel, GeometryProblem, ModelErrors, Refined, Refinement, Spread, Standing,
 };
-use crate::fit::settings::{FitFile, UnknownGeometry};
+use crate::fit::settings::UnknownGeometry;
 use crate::fit::setup::Result;
 use kerrlight_vlbi::operator::Pulse;
 
@@ -16,7 +16,6 @@ const MOST: usize = 128;
 
 /// Errors that the model has of itself in a geometry that a search has found with χ²/N of `reduced`.
 pub(super) fn errors(
-    file: &FitFile,
     unknown: &UnknownGeometry,
     place: &Place,
     problem: &GeometryProblem<'_, f32>,
@@ -32,7 +31,7 @@ pub(super) fn errors(
         let standing = problem.standing(geometry)?;
         let voxels = voxels(&standing, problem)?;
         let sums = sums(&standing, problem)?;
-        let pixels = pixels(file, unknown, place, &standing, problem)?;
+        let pixels = pixels(unknown, place, &standing, problem)?;
         let refined: Vec<Refined> = [voxels, sums, pixels].into_iter().flatten().collect();
         Ok(ModelErrors { known: standing.errors(problem.free, &refined), left_out: None })
     })
@@ -74,7 +73,6 @@ fn sums(standing: &Standing, problem: &GeometryProblem<'_, f32>) -> Result<Optio
 /// sums converge faster than any power of the pixel, unless the data are known to have pixels. Polarised light is seen along single
 /// rays.
 fn pixels(
-    file: &FitFile,
     unknown: &UnknownGeometry,
     Place { seen, at, view, errors, even }: &Place,
     standing: &Standing,
@@ -90,7 +88,7 @@ fn pixels(
         let (kind, rays) = even.map_or((means, at.rays.denser()), |even| (kind, even));
         // The model has the panels of the search already, and `seen_through` multiplies them.
         let rays = RaySampling { panels: 1, ..rays };
-        let model = seen_through(file, problem.model.clone(), rays)?;
+        let model = seen_through(&seen.view.file, problem.model.clone(), rays)?;
         return standing.refined(kind, &GeometryProblem { model: &model, ..*problem });
     }
     if seen.view.measured.pulse != Pulse::Delta {

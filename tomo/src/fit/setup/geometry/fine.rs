@@ -83,7 +83,7 @@ impl Detail<'_> {
         }
         let own = self.through(place, |problem| {
             let reduced = sure.reduced_chi2;
-            discretisation::errors(self.file, self.unknown, place, problem, spread, reduced)
+            discretisation::errors(self.unknown, place, problem, spread, reduced)
         })?;
         let spread = sure.spread.map(|spread| spread.beside(&self.unknown.free, own));
         Ok(Sure { spread, ..sure })
@@ -97,7 +97,7 @@ impl Detail<'_> {
     ) -> Result<R> {
         let Place { seen, at, view, errors, .. } = place;
         seen.with(self.unknown, view, *errors, self.memory, |problem| {
-            let model = seen_through(self.file, problem.model.clone(), at.rays)?;
+            let model = seen_through(&seen.view.file, problem.model.clone(), at.rays)?;
             work(&GeometryProblem { model: &model, ..*problem })
         })
     }
