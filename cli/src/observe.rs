@@ -123,9 +123,6 @@ impl Observe {
         let mut observation =
             schedule::observe_affordable(&array, source.position, &schedule, &setup)?;
         observation.source.clone_from(&source.name);
-        if observation.rows.is_empty() {
-            bail!("no two stations see {} at any time", source.name);
-        }
         let times_h = schedule.hours_utc(setup.ut1)?;
         let (movie, frames_h, said) = self.movie(&files, &times_h)?;
         if let Some(warning) = odd(&movie) {

@@ -4,7 +4,7 @@
 use crate::assets::{self, Reach};
 use crate::render::preview::PreviewOptions;
 use crate::render::report;
-use crate::render::source::{BUILT_IN, Source};
+use crate::render::source::{BUILT_IN, Source, at_time};
 use anyhow::Context;
 use kerrlight_common::memory;
 use kerrlight_render::image::exr::{self, Attributes, CameraMatrices, Style};
@@ -61,11 +61,6 @@ impl Shot {
         Ok(Shot { scene, source, text })
     }
 
-    /// The scene.
-    pub fn scene(&self) -> &Scene {
-        &self.scene
-    }
-
     /// Its picture. `progress` is told of finished rows and returns whether to go on.
     ///
     /// # Errors
@@ -90,6 +85,9 @@ impl Shot {
     /// As for [`Self::render`].
     pub fn film(&self, times: &[f64], progress: &Progress<'_>) -> anyhow::Result<Vec<Shown>> {
         self.afford(times.len())?;
+        for time in times {
+            at_time(&self.source.name, &self.text, *time)?;
+        }
         let files = assets::load(&self.scene, &self.source.folder, &[], Reach::default())?;
         let film = Film::new(&self.scene, files.decoded);
         let mut film = film.with_context(|| self.source.name.clone())?;

@@ -5,7 +5,6 @@ use crate::columns::{self, Column};
 use crate::interferometry::arguments::{self, Observing};
 use crate::interferometry::plots::{self, PlotFile};
 use crate::output::{self, Output};
-use anyhow::bail;
 use clap::Args;
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::schedule;
@@ -36,9 +35,6 @@ impl Uv {
         let (schedule, setup) = (self.observing.schedule()?, self.observing.setup()?);
         let source = &self.observing.source;
         let observation = schedule::observe_affordable(&array, source.position, &schedule, &setup)?;
-        if observation.rows.is_empty() {
-            bail!("no two stations see {} at any time", source.name);
-        }
         let (table, count) = (vec![table(&observation)], observation.rows.len());
         if let Some(output) = &output {
             output.write(&columns::csv(&table, count)?)?;

@@ -102,6 +102,9 @@ impl Plan {
         self.corruptions().apply(&mut observation, self.seed)?;
         let version = env!("CARGO_PKG_VERSION");
         observation.history = vec![format!("kerrlight {version} observe, from Python"), transform];
+        if self.scattering {
+            observation.history.push("scattering of Sgr A* (Johnson et al. 2018)".to_owned());
+        }
         observation.history.push(if self.thermal { "noise thermal" } else { "noise none" }.into());
         Ok(observation)
     }

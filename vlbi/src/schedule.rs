@@ -58,6 +58,9 @@ pub enum ScheduleError {
     /// Sidereal times with precession.
     #[error("hours of GMST require the catalogue frame")]
     GmstOfDate,
+    /// A source that is below the horizon of all stations but one.
+    #[error("no two stations see the source at any time")]
+    NothingSeen,
 }
 
 /// Most scans of a schedule.
@@ -260,7 +263,7 @@ const TRIAL: u32 = 256;
 /// The same as [`observe`], if there is memory for the rows of all scans.
 ///
 /// # Errors
-/// As [`observe`], or if there is no memory for the rows.
+/// As [`observe`], if no two stations see the source, or if there is no memory for the rows.
 pub fn observe_affordable(
     array: &Array,
     source: SourcePosition,
@@ -275,7 +278,11 @@ pub fn observe_affordable(
         let what = || format!("about {rows:.0} visibilities of {} scans", schedule.scans);
         memory::afford(what, bytes_of_rows(rows))?;
     }
-    observe(array, source, schedule, setup)
+    let observation = observe(array, source, schedule, setup)?;
+    if observation.rows.is_empty() {
+        return Err(ScheduleError::NothingSeen.into());
+    }
+    Ok(observation)
 }
 
 /// Bytes of rows of visibilities: when they are made, spoilt, and written.

@@ -3,13 +3,13 @@
 use crate::output::{self, Output};
 use crate::render::exr_options::ExrOptions;
 use crate::render::report;
+use crate::render::source::at_time;
 use anyhow::{Context, bail};
-use kerrlight_render::Error;
 use kerrlight_render::image::Picture;
 use kerrlight_render::image::exr::{self, Attributes, Style};
 use kerrlight_render::picture::Rendered;
 use kerrlight_render::picture::{Film, Frame};
-use kerrlight_render::scene::{Scene, apply_override};
+use kerrlight_render::scene::Scene;
 use rayon::prelude::*;
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
@@ -64,10 +64,7 @@ impl Sequence {
     ) -> anyhow::Result<Self> {
         let Origin { name, text, files, device } = of;
         let plan = |time: &f64| -> anyhow::Result<Plan> {
-            // `:?` writes whole numbers with a point, so that TOML reads a float.
-            let text = apply_override(text, &format!("observer.time={time:?}"))?;
-            let scene = Scene::parse(&text).map_err(Error::without_line);
-            let scene = scene.with_context(|| format!("{name} at the time {time} of a frame"))?;
+            let (scene, text) = at_time(name, text, *time)?;
             Ok(Plan { scene, text })
         };
         let plans: Vec<Plan> = times.iter().map(plan).collect::<Result<_, _>>()?;

@@ -88,3 +88,12 @@ fn scene_of_exr(path: &Path) -> anyhow::Result<(String, Option<String>)> {
     let files = attributes.get("files").or(attributes.get("frame_files"));
     Ok((scene, files.cloned()))
 }
+
+/// The scene of a text at a time of observation, M, and its text.
+pub fn at_time(name: &str, text: &str, time: f64) -> anyhow::Result<(Scene, String)> {
+    // `:?` writes whole numbers with a point, so that TOML reads a float.
+    let text = apply_override(text, &format!("observer.time={time:?}"))?;
+    let scene = Scene::parse(&text).map_err(Error::without_line);
+    let scene = scene.with_context(|| format!("{name} at the time {time} of a frame"))?;
+    Ok((scene, text))
+}

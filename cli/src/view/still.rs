@@ -3,9 +3,9 @@
 use super::subject::Subject;
 use crate::interrupt::SignalGuard;
 use anyhow::Context;
+use kerrlight_common::units::JY_PER_SQUARE_UAS;
 use kerrlight_render::picture::Raster;
 use kerrlight_render::scene::{Rings, Scene};
-use kerrlight_render::transport::Assets;
 
 /// Pixels of the longer side.
 const SIDE: u32 = 64;
@@ -14,14 +14,9 @@ const SIDE: u32 = 64;
 /// its lit pixels exceeds: a sun would leave the rest black.
 pub fn white(subject: &Subject) -> anyhow::Result<f64> {
     let scene = small(&subject.scene);
-    let Assets { sky, stars, meshes, volumes } = &subject.assets;
-    let assets = Assets {
-        sky: sky.clone(),
-        stars: stars.clone(),
-        meshes: meshes.clone(),
-        volumes: volumes.clone(),
-    };
-    let raster = Raster::new(&scene, assets).context("the scene")?;
+    let raster = Raster::new(&scene, subject.assets.clone()).context("the scene")?;
+    // Pictures of gas are in physical units, the page in those of the scene.
+    let unit = if scene.gas.is_some() { JY_PER_SQUARE_UAS } else { 1.0 };
     let keeper = SignalGuard::brief("stopped; nothing is written");
     let picture = raster.render(&|_| !keeper.stopped())?.picture;
     let lit = |name: &str| {
@@ -31,7 +26,7 @@ pub fn white(subject: &Subject) -> anyhow::Result<f64> {
         lit
     };
     if let Some(most) = lit("intensity").last() {
-        return Ok(f64::from(*most));
+        return Ok(f64::from(*most) / unit);
     }
     let sky = ["R", "G", "B"].map(lit).into_iter().find(|values| !values.is_empty());
     Ok(sky.map_or(1.0, |values| f64::from(values[(values.len() - 1) * 99 / 100])))

@@ -113,6 +113,17 @@ impl<N> Velocity<N> {
             }
         }
     }
+
+    /// Itself with `seed` for the perturbations that have none.
+    #[must_use]
+    pub fn seeded(mut self, seed: u64) -> Self {
+        let mut law = &mut self;
+        while let Velocity::Perturbed(by) = law {
+            by.seed.get_or_insert(seed);
+            law = &mut by.of;
+        }
+        self
+    }
 }
 
 impl Velocity {
@@ -175,17 +186,6 @@ impl Velocity {
         }
         if let Velocity::Keplerian { drag } | Velocity::Infall { drag, .. } = law {
             drag.get_or_insert(spin);
-        }
-        self
-    }
-
-    /// Itself with `seed` for the perturbations that have none.
-    #[must_use]
-    pub fn seeded(mut self, seed: u64) -> Self {
-        let mut law = &mut self;
-        while let Velocity::Perturbed(by) = law {
-            by.seed.get_or_insert(seed);
-            law = &mut by.of;
         }
         self
     }

@@ -320,6 +320,8 @@ impl<'a> Drawing<'a> {
         let Problem { instrument, measured, motion, registry, .. } = self.prepared;
         let steps = self.steps;
         let mut file = self.file.clone();
+        // All draws have the flow of the fit: its seed is not theirs.
+        file.motion.velocity = file.motion.velocity.clone().seeded(file.seed);
         file.seed = file.seed.wrapping_add(number);
         let has_prior = file.linear.as_ref().is_some_and(|linear| linear.prior.is_some());
         if file.representation.kind == Kind::LinearGrid && !has_prior {
