@@ -38,7 +38,7 @@ pub struct BandSettings {
     #[schemars(inner(range(min = -10.0, max = 10.0)), extend("unit" = "a factor"))]
     pub rotation_factors: Vec<f64>,
     /// Position angles of the spin, degrees east of north; others than 0 need `stokes = ["Q", "U"]` with equal
-    /// errors.
+    /// errors. `observer.position_angle_deg` is 0.
     #[schemars(inner(range(min = -360.0, max = 360.0)), extend("unit" = "degrees east of north"))]
     pub position_angles_deg: Vec<f64>,
     /// Radii of the band, M.
