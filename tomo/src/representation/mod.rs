@@ -20,7 +20,7 @@ pub use activation::Activation;
 pub use changing::{Allowed, Carrier, Changing, Knots};
 pub use features::{FeatureGrid, FeatureGridSettings};
 pub use grid::{Grid, GridSettings};
-pub use network::{Initialisation, Network, NetworkSettings};
+pub use network::{Network, NetworkSettings};
 pub use registry::{
     BuildError, BuildRepresentation, FindRepresentation, OwnError, OwnSettings, Registry,
 };

@@ -4,7 +4,6 @@
 mod batch;
 mod dense;
 mod encoding;
-mod initialise;
 mod layout;
 mod output;
 mod packed;
@@ -13,7 +12,7 @@ mod settings;
 mod tests;
 mod tile;
 
-pub use settings::{Initialisation, NetworkSettings};
+pub use settings::NetworkSettings;
 
 use super::{BuiltIn, Coordinates, Gradient, Groups, Representation, WeightMatrix, Workspace};
 use crate::Error;
@@ -21,6 +20,8 @@ use batch::{Memory, Way};
 use kerrlight_common::simd::{Float, InstructionSet};
 use layout::{Layer, Layout};
 use output::Cotangents;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 /// A network with positional encoding: `bhnerf` of (x, y, z), `mlp4d` of (t, x, y, z); where emission changes while
 /// matter carries it, `bhnerf` has the time as well.
@@ -105,10 +106,18 @@ impl<T: Float + Default> Representation<T> for Network {
         self.layout.hidden().iter().map(of).collect()
     }
 
+    /// Kernels uniform in ±√(6/inputs) (He et al. 2015), what the BH-NeRF code trains from, layer by layer and row by
+    /// row; biases are zero.
     fn initialise(&self, seed: u64, parameters: &mut [T]) {
         assert!(parameters.len() == self.layout.parameters());
-        let how = self.settings.initialisation;
-        initialise::initialise(&self.layout.layers, how, seed, parameters);
+        let mut random = Pcg64::seed_from_u64(seed);
+        for layer in &self.layout.layers {
+            let all = &mut parameters[layer.offset..layer.offset + layer.size()];
+            let (kernel, biases) = all.split_at_mut(layer.inputs * layer.outputs);
+            let limit = (6.0 / layer.inputs as f64).sqrt();
+            kernel.fill_with(|| T::of(random.random_range(-limit..limit)));
+            biases.fill(T::zero());
+        }
     }
 
     fn eval(

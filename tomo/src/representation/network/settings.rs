@@ -3,17 +3,6 @@
 use super::super::Activation;
 use crate::Error;
 
-/// Distribution of kernels at the start; biases start at zero.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Initialisation {
-    /// Uniform in ±√(6/inputs) (He et al. 2015), what the BH-NeRF code trains from.
-    HeUniform,
-    /// Normal with variance 1/inputs, truncated at two standard deviations (LeCun et al. 1998; the
-    /// default of Flax).
-    LecunNormal,
-}
-
 /// Shape of a fully connected ReLU network with positional encoding and one output.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NetworkSettings {
@@ -41,8 +30,6 @@ pub struct NetworkSettings {
     pub activation: Activation,
     /// See `activation`.
     pub shift: f64,
-    /// Initial parameters.
-    pub initialisation: Initialisation,
 }
 
 impl NetworkSettings {
@@ -61,7 +48,6 @@ impl NetworkSettings {
             time_span: None,
             activation: Activation::Sigmoid,
             shift: -10.0,
-            initialisation: Initialisation::HeUniform,
         }
     }
 

@@ -129,25 +129,22 @@ fn exact_single_precision_is_double_precision_rounded() {
 
 #[test]
 fn exact_kernels_have_the_variance_of_their_scheme() {
-    for (how, factor) in [(Initialisation::HeUniform, 2.0), (Initialisation::LecunNormal, 1.0)] {
-        let settings = NetworkSettings { initialisation: how, ..NetworkSettings::bhnerf() };
-        let network = Network::new(settings).unwrap();
-        let mut parameters = vec![f64::NAN; 55_169];
-        network.initialise(7, &mut parameters);
-        for layer in network.layout.hidden() {
-            let (kernel, bias) = parameters[layer.offset..layer.offset + layer.size()]
-                .split_at(layer.inputs * layer.outputs);
-            let variance = kernel.iter().map(|x| x * x).sum::<f64>() / kernel.len() as f64;
-            let expected = factor / layer.inputs as f64;
-            // Five standard deviations of the mean of squares, at most (of a normal distribution).
-            let spread = 5.0 * (2.0 / kernel.len() as f64).sqrt();
-            assert!((variance / expected - 1.0).abs() < spread, "{variance} {expected}");
-            assert!(bias.iter().all(|x| *x == 0.0));
-        }
-        let mut again = vec![0.0; 55_169];
-        network.initialise(7, &mut again);
-        assert_eq!(parameters, again);
+    let network = Network::new(NetworkSettings::bhnerf()).unwrap();
+    let mut parameters = vec![f64::NAN; 55_169];
+    network.initialise(7, &mut parameters);
+    for layer in network.layout.hidden() {
+        let (kernel, bias) = parameters[layer.offset..layer.offset + layer.size()]
+            .split_at(layer.inputs * layer.outputs);
+        let variance = kernel.iter().map(|x| x * x).sum::<f64>() / kernel.len() as f64;
+        let expected = 2.0 / layer.inputs as f64;
+        // Five standard deviations of the mean of squares, at most (of a normal distribution).
+        let spread = 5.0 * (2.0 / kernel.len() as f64).sqrt();
+        assert!((variance / expected - 1.0).abs() < spread, "{variance} {expected}");
+        assert!(bias.iter().all(|x| *x == 0.0));
     }
+    let mut again = vec![0.0; 55_169];
+    network.initialise(7, &mut again);
+    assert_eq!(parameters, again);
 }
 
 #[test]
