@@ -1,7 +1,5 @@
 //! Data that are not convex in the emission: amplitudes and closure quantities of a small array.
 
-use super::super::convex::Convex;
-use super::super::objective::{Objective, Penalised};
 use super::*;
 use crate::Error;
 use crate::fit::{Scan, ScanTerm};
@@ -73,47 +71,6 @@ fn solve(terms: &[Weighted<'_, f64>], flux: Option<f64>) -> Result<LinearSolutio
     let problem = LinearProblem { upper: 2.0, flux, ..of_images(&model, terms, voxels) };
     let settings = LinearSettings { iterations: 60, rounds: 3, ..LinearSettings::default() };
     problem.solve(&settings, &mut |_| ControlFlow::Continue(()))
-}
-
-/// Slopes of all kinds of data along random directions are those of differences, at a lit field.
-#[test]
-fn exact_slopes_of_data_that_are_not_convex() {
-    let (model, voxels) = (forward_model(), Voxels::cube(6, 5.0, Degree::Linear));
-    let movie = movie(&model, &voxels, &spot(&voxels));
-    for seen in [
-        Observable::Visibilities,
-        Observable::Amplitudes,
-        Observable::Phases,
-        Observable::LogAmplitudes,
-    ] {
-        let term = array(&movie, seen);
-        let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
-        let data = Data::new(&terms, &FRAMES, model.pixels(), FRAMES.len()).unwrap();
-        let operator = operator(&model, voxels, &vec![true; voxels.count()], usize::MAX);
-        let (priors, change) = (&[], Change::NONE);
-        let shape = voxels.shape();
-        let terms = Penalised {
-            priors,
-            shape,
-            gaussian: None,
-            change,
-            prices: &[],
-            quiescent: None,
-            upper: 2.0,
-        };
-        let mut objective = Objective::new(&operator, &data, &terms);
-        let x: Vec<f64> = random(voxels.count(), 1).iter().map(|x| 0.5 + x).collect();
-        let direction = random(voxels.count(), 2);
-        let (mut gradient, h) = (Vec::new(), 1e-6);
-        let mut at = |s: f64| {
-            let moved: Vec<f64> = x.iter().zip(&direction).map(|(x, d)| x + s * d).collect();
-            objective.value_and_gradient(&moved, &mut gradient)
-        };
-        let difference = (at(h) - at(-h)) / (2.0 * h);
-        at(0.0);
-        let slope: f64 = gradient.iter().zip(&direction).map(|(g, d)| g * d).sum();
-        assert!((slope / difference - 1.0).abs() < 1e-6, "{seen:?}: {slope} {difference}");
-    }
 }
 
 /// A dark field has no slope: it is left all the same, and no certificate is claimed.
