@@ -3,11 +3,9 @@
 use super::active::NONE;
 use super::operator::Operator;
 use super::ray_weights::Buffers;
-use super::rows::Held;
 use super::rows::Rows;
 use crate::representation::spline::STENCIL;
 use kerrlight_common::simd::Float;
-use std::borrow::Cow;
 
 impl<T: Float> Rows<T> {
     /// Adds a row of all columns.
@@ -48,25 +46,5 @@ impl<T: Float + Default> Operator<'_, T> {
             rows.push_dense(pixel as u32, row);
         }
         rows
-    }
-
-    /// All rows with all columns: frame by frame, pixel by pixel.
-    pub fn all_rows(&self) -> Vec<Vec<f64>> {
-        let mut all = vec![vec![0.0; self.active.count()]; self.frames.len() * self.pixels];
-        for (frame, held) in self.rows.iter().enumerate() {
-            let rows = match held {
-                Held::Kept(rows) => Cow::Borrowed(rows),
-                Held::Made | Held::Walked => Cow::Owned(self.rows_of(self.frames[frame])),
-            };
-            for (k, pixel) in rows.pixel.iter().enumerate() {
-                let range = rows.starts[k] as usize..rows.starts[k + 1] as usize;
-                let to = &mut all[frame * self.pixels + *pixel as usize];
-                for (column, entry) in rows.columns[range.clone()].iter().zip(&rows.entries[range])
-                {
-                    to[*column as usize] += entry.double();
-                }
-            }
-        }
-        all
     }
 }

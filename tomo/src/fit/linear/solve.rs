@@ -117,13 +117,6 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         Ok(Least { x: operator.active.expand(&found.x), value })
     }
 
-    /// The matrix from voxels to pixels: frame by frame of [`frames`](Self::frames), pixel by pixel, a row of all voxels
-    /// (and knots), in double precision.
-    pub fn rows(&self) -> Vec<Vec<f64>> {
-        let operator = Operator::new(self.walk(), self.all(), self.frames, usize::MAX);
-        operator.all_rows()
-    }
-
     /// The loss of the frames in a field at the nodes (knot after knot), with the parameters of what does not move behind
     /// it where that is recovered; without penalties.
     ///

@@ -54,9 +54,13 @@ impl Simulated {
     }
 
     /// The matrix from voxels to pixels.
-    fn matrix(&self, prior: &GaussianField) -> DMatrix<f64> {
-        let rows = self.with(&self.data, prior, |problem| problem.rows());
-        DMatrix::from_fn(rows.len(), rows[0].len(), |i, k| rows[i][k])
+    fn matrix(&self) -> DMatrix<f64> {
+        let column = |k: usize| {
+            let mut unit = vec![0.0; voxels().count()];
+            unit[k] = 1.0;
+            DVector::from_vec(movie(&self.model, &voxels(), &unit))
+        };
+        DMatrix::from_columns(&(0..voxels().count()).map(column).collect::<Vec<_>>())
     }
 }
 
@@ -79,7 +83,7 @@ fn exact_solutions_are_those_of_the_normal_equations() {
     for roughness in [Roughness::Half, Roughness::FiveHalves] {
         let prior = prior(roughness);
         let simulated = Simulated::new(&prior);
-        let (a, q) = (simulated.matrix(&prior), precision(&prior));
+        let (a, q) = (simulated.matrix(), precision(&prior));
         let bend = a.transpose() * &a / (SIGMA * SIGMA) + &q;
         let noise = normal(simulated.data.len(), 9);
         let data: Vec<f64> = simulated.data.iter().zip(noise).map(|(d, n)| d + SIGMA * n).collect();
@@ -101,7 +105,7 @@ fn exact_solutions_are_those_of_the_normal_equations() {
 fn exact_draws_have_the_covariance_of_the_posterior() {
     let prior = prior(Roughness::Half);
     let simulated = Simulated::new(&prior);
-    let (a, q) = (simulated.matrix(&prior), precision(&prior));
+    let (a, q) = (simulated.matrix(), precision(&prior));
     let covariance = (a.transpose() * &a / (SIGMA * SIGMA) + q).try_inverse().unwrap();
     let best = simulated.solution(&simulated.data, &prior).emission;
     let (draws, n) = (400, prior.count());
