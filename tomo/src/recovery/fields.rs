@@ -103,19 +103,10 @@ pub fn recovered_at(
 ///
 /// # Errors
 /// If the volume is larger than memory, or out of range.
-pub fn true_volume_at(file: &FitFile, truth: &Truth, since: f64) -> Result<Volume, Error> {
+pub fn true_volume(file: &FitFile, truth: &Truth, since: f64) -> Result<Volume, Error> {
     let nodes = Box3::new(file);
     let light = |x: &[f64; 3]| truth.seen_at(*x, since) as f32;
     nodes.volume(nodes.positions().iter().map(light).collect())
-}
-
-/// The truth at the reference time.
-///
-/// # Errors
-/// If the volume is larger than memory, or out of range.
-pub fn true_volume(file: &FitFile, truth: &Truth) -> Result<Volume, Error> {
-    let nodes = Box3::new(file);
-    nodes.volume(nodes.positions().iter().map(|x| truth.at(*x) as f32).collect())
 }
 
 /// Compares the field with the truth.

@@ -19,7 +19,7 @@ mod tests;
 mod words;
 
 pub use evidence::{Compared, DataVerdict, Evidence};
-pub use fields::{carried, compare, recovered, recovered_at, true_volume, true_volume_at};
+pub use fields::{carried, compare, recovered, recovered_at, true_volume};
 pub use found::{Choice, Found, FoundAxis, Searched, Stage};
 pub use problem::Problem;
 pub use progress::{At, Event, Now, Progress, Resumed, Silent};
@@ -120,14 +120,18 @@ pub fn fit_with<R, E: From<Error>>(
     let mut objective = problem.objective(instrument, motion, measured)?;
     let times = setup::emission_times(instrument, motion);
     let (axis, axis_rate) = setup::axis(file)?;
-    let file = &search::weighed_before_steps(file, &mut objective, axis, times, progress)?;
+    // What a linear grid chooses is chosen where it is solved; of others the price of change is part of every step.
+    let file = &match file.representation.kind {
+        Kind::LinearGrid => file.clone(),
+        _ => search::weighed(file, &mut objective, axis, times, progress)?,
+    };
     let representation = setup::representation(file, &problem.registry, times)?;
     let training = setup::training(file, axis_rate, times)?;
     let mut state = State::new(&*representation, axis, &training);
     let mut trainer = Trainer::new(objective, &*representation, training);
     trainer.device = progress.device(file, &trainer)?;
     let truth = measured.truth.as_ref();
-    let true_volume = truth.map(|truth| true_volume(file, truth)).transpose()?;
+    let true_volume = truth.map(|truth| true_volume(file, truth, 0.0)).transpose()?;
     let searched = searched.flatten();
     let mut fit = Fit { file, instrument, motion, measured, true_volume, searched, trainer };
     progress.begins(fit.now(&state));

@@ -5,7 +5,7 @@ use super::progress::{At, Progress};
 use super::{Problem, Stopped};
 use crate::Error;
 use crate::fit::geometry::Geometry;
-use crate::fit::settings::{FitFile, Kind, UnknownGeometry};
+use crate::fit::settings::{FitFile, UnknownGeometry};
 use crate::fit::setup::{self, BandScan, FitData, FoundGeometry, Instrument, RaySampling};
 use crate::fit::{Motion, Objective};
 use kerrlight_render::dynamics::Axis;
@@ -141,21 +141,6 @@ pub(super) fn weighed(
         Choice::Weight(chosen) => settings.setting.put(file.clone(), chosen),
         _ => file.clone(),
     })
-}
-
-/// The same for a representation that is learnt in steps, whose price of change is part of every step. What a linear
-/// grid chooses is chosen where it is solved.
-pub(super) fn weighed_before_steps(
-    file: &FitFile,
-    objective: &mut Objective<f32>,
-    axis: Axis,
-    times: [f64; 2],
-    progress: &mut dyn Progress,
-) -> Result<FitFile, Error> {
-    match file.representation.kind {
-        Kind::LinearGrid => Ok(file.clone()),
-        _ => weighed(file, objective, axis, times, progress),
-    }
 }
 
 /// The settings with what was found in place of priors.

@@ -22,7 +22,7 @@ use kerrlight_render::volume::{Volume, VolumeFile};
 use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, UnknownGeometry};
 use kerrlight_tomo::fit::setup::{GeometryPosterior, RaySampling, Resolution};
 use kerrlight_tomo::recovery::results::{GeometryResults, PerParameter};
-use kerrlight_tomo::recovery::{Problem, ResolvedFit};
+use kerrlight_tomo::recovery::{Problem, ResolvedFit, true_volume};
 use kerrlight_tomo::representation::Registry;
 use predictive::Check;
 use sample::{Drawn, Through};
@@ -191,7 +191,7 @@ fn add_up(
 ) -> anyhow::Result<Answer> {
     let geometry = folder.found::<GeometryResults>(geometry_search::FILE)?;
     let truth = prepared.measured.truth.as_ref();
-    let truth = truth.map(|t| super::results::true_volume(&prepared.settings, t)).transpose()?;
+    let truth = truth.map(|truth| true_volume(&prepared.settings, truth, 0.0)).transpose()?;
     let found = summary::Summary::new(&prepared.settings, geometry.as_deref(), all, truth)?;
     page::write(&found, prepared, path)?;
     let numbers = found.numbers();

@@ -16,7 +16,7 @@ pub mod residuals;
 mod scene;
 pub mod verdict;
 
-pub use kerrlight_tomo::recovery::{recovered, true_volume};
+pub use kerrlight_tomo::recovery::recovered;
 pub use light_curve::TABLE as LIGHT_CURVE;
 pub use numbers::last_step;
 

@@ -4,7 +4,7 @@ use super::Estimate;
 use crate::report::{Axis, LinePlot, Marks, Series};
 use kerrlight_render::volume::{OverTime, Volume};
 use kerrlight_tomo::fit::{State, Trainer};
-use kerrlight_tomo::recovery::{recovered_at, true_volume_at};
+use kerrlight_tomo::recovery::{recovered_at, true_volume};
 
 /// Emission in the region over time.
 pub struct Changes {
@@ -41,7 +41,7 @@ impl Estimate<'_> {
             let volume = recovered_at(self.file, trainer, self.motion, state, since)?;
             found.recovered.push(integral(&volume));
             if let (Some(truth), Some(curve)) = (known, &mut found.truth) {
-                let truth = true_volume_at(self.file, truth, since)?;
+                let truth = true_volume(self.file, truth, since)?;
                 curve.push(integral(&truth));
                 found.closeness.add(&volume, &truth)?;
             }

@@ -7,6 +7,7 @@ use super::state::{Outcome, Progress, State};
 use super::trainer::Trainer;
 use crate::Error;
 use crate::fit::forward::forward_model::{Field, Motion};
+use crate::fit::loss::objective::Buffers;
 use crate::representation::Representation;
 use kerrlight_common::frames::Frames;
 use kerrlight_common::simd::Float;
@@ -93,7 +94,8 @@ impl<T: Float> Trainer<'_, T> {
         let mut movie = vec![T::zero(); frames.len() * self.objective.model.pixels()];
         let mut field = now.field(self.representation);
         field.occupancy = field.occupancy.filter(|_| masked);
-        self.objective.movie(field, frames, &mut self.buffers, &mut movie);
+        let Buffers { batch, workspace, .. } = &mut self.buffers;
+        self.objective.model.movie(field, frames, batch, workspace, &mut movie);
         movie
     }
 

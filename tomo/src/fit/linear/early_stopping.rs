@@ -67,11 +67,11 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         // A prior has something to say of every node.
         if how.rounds == 0 || self.gaussian.is_some() || !data.is_convex() {
             let iterations = if start.is_some() { NEARBY * how.looking } else { how.looking };
-            return self.least_from(start, iterations);
+            return self.least(start, iterations);
         }
         let mut least = match start {
             Some(start) => Least { x: start.to_vec(), value: f64::INFINITY },
-            None => self.least(how.looking)?,
+            None => self.least(None, how.looking)?,
         };
         let most = least.x.iter().fold(0.0f64, |most, x| most.max(*x));
         let mut shines: Vec<bool> = least.x.iter().map(|x| *x > SHINES * most).collect();
@@ -104,7 +104,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         start: Option<&[f64]>,
         iterations: usize,
     ) -> Result<Least, Error> {
-        let first = self.least_from(start, iterations)?;
+        let first = self.least(start, iterations)?;
         let most = first.x.iter().fold(0.0f64, |most, x| most.max(*x));
         let shines = first.x.iter().map(|x| *x > SHINES * most).collect();
         let active = self.active(&self.beside_those(shines));

@@ -2,7 +2,7 @@
 
 use super::active::{Active, NONE};
 use super::data::Data;
-use super::ray_weights::{Buffers, Voxels, Walk};
+use super::ray_weights::{Buffers, Walk};
 use super::rows::{Held, Rows};
 use crate::representation::spline::STENCIL;
 use core::ops::Range;
@@ -262,11 +262,6 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         };
         self.through(x, false, link);
         first.into_inner().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// The grid.
-    pub fn voxels(&self) -> Voxels {
-        self.walk.voxels
     }
 
     /// Sum of squares of each column.

@@ -72,23 +72,15 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         }
     }
 
-    /// Returns the field that some iterations over all nodes reach from a dark field, or from where a prior's density is
-    /// highest, or from the best lit field where data are not convex.
-    ///
-    /// # Errors
-    /// As those of [`solve`](Self::solve).
-    pub fn least(&self, iterations: usize) -> Result<Least, Error> {
-        self.least_from(None, iterations)
-    }
-
-    /// The same from a field at all nodes, if one is given.
+    /// Returns the field that some iterations over all nodes reach from a field at all nodes; if none is given, from a dark
+    /// one, or from where a prior's density is highest, or from the best lit field where data are not convex.
     ///
     /// # Errors
     /// As those of [`solve`](Self::solve).
     ///
     /// # Panics
     /// If the field has another number of values.
-    pub fn least_from(&self, start: Option<&[f64]>, iterations: usize) -> Result<Least, Error> {
+    pub fn least(&self, start: Option<&[f64]>, iterations: usize) -> Result<Least, Error> {
         // Values of many similar problems are compared: each takes all of its iterations.
         let settings = LinearSettings { coarse: None, tolerance: 0.0, ..LinearSettings::default() };
         self.check(&settings)?;

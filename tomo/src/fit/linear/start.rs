@@ -40,7 +40,7 @@ impl<T: Float + Default> Run<'_, '_, '_, T> {
         objective: &mut Objective<'_, '_, T>,
         trials: Trials,
     ) -> Result<Vec<(f64, Vec<f64>)>, Error> {
-        let around = Around::new(&objective.operator.voxels(), self.problem.axis);
+        let around = Around::new(&objective.operator.walk.voxels, self.problem.axis);
         let seen = objective.operator.seen();
         // Closure quantities are not defined in the dark: any lit field is better there.
         let dark = match objective.data.is_scale_free() {

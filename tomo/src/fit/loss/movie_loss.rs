@@ -1,25 +1,13 @@
 //! Losses of whole movies, without a gradient, and their residuals.
 
-use super::objective::{Buffers, Loss, Objective};
+use super::objective::{Loss, Objective};
 use super::terms::FrameTerm;
 use crate::Error;
-use crate::fit::forward::forward_model::Field;
 use crate::fit::verdict::Statistics;
 use kerrlight_common::frames::Frames;
 use kerrlight_common::simd::Float;
 
 impl<T: Float> Objective<T> {
-    /// Images of these frames, one after the other.
-    pub fn movie(
-        &self,
-        field: Field<'_, T>,
-        frames: &[usize],
-        buffers: &mut Buffers<T>,
-        movie: &mut [T],
-    ) {
-        self.model.movie(field, frames, &mut buffers.batch, &mut buffers.workspace, movie);
-    }
-
     /// Returns the statistics of residuals of images of all frames: for each kind of data, in the order of
     /// [`Self::names`].
     ///

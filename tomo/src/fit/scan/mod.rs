@@ -172,7 +172,7 @@ impl<T: Float + Default> Scanner<'_, T> {
             gaussian: None,
             change,
         };
-        let loss = problem.least(effort.iterations)?.value;
+        let loss = problem.least(None, effort.iterations)?.value;
         let solved = self.solved.fetch_add(1, Ordering::Relaxed) + 1;
         // Pattern searches may take more than was expected of them.
         if !(self.watch)(solved, self.expected.max(solved)) {

@@ -139,7 +139,7 @@ fn exact_losses_are_densities_over_data() {
         simulated.with(&simulated.data, &prior, |problem| {
             let problem = LinearProblem { frames, ..*problem };
             let count = (frames.len() * simulated.model.pixels()) as f64;
-            let start = problem.least_from(Some(&x), 0).unwrap();
+            let start = problem.least(Some(&x), 0).unwrap();
             (start.value - problem.misfit(&x).unwrap()) * count
         })
     };

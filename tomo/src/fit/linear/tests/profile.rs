@@ -46,7 +46,7 @@ impl Case {
     }
 
     fn least(&self, omega: [f64; 2]) -> (Vec<f64>, f64) {
-        let Least { x, value } = self.with(omega, |problem| problem.least(20_000)).unwrap();
+        let Least { x, value } = self.with(omega, |problem| problem.least(None, 20_000)).unwrap();
         (x, value)
     }
 }

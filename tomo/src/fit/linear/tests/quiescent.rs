@@ -195,7 +195,7 @@ fn exact_another_box_is_refused() {
     let model = forward_model().beside(other).unwrap();
     let term = ImageTerm::new(vec![0.0; 5 * 81], 81, 1.0).unwrap();
     let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
-    let error = problem(&model, &terms, &[]).least(3).unwrap_err().to_string();
+    let error = problem(&model, &terms, &[]).least(None, 3).unwrap_err().to_string();
     assert!(error.contains("most of the quiescent image = 1 "), "{error}");
 }
 

@@ -19,10 +19,10 @@ fn exact_few_nodes_that_shine_are_as_good_as_all() {
     let term = ImageTerm::new(data, model.pixels(), 0.05).unwrap();
     let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
     let problem = of_images(&model, &terms, voxels);
-    let least = problem.least(4000).unwrap();
+    let least = problem.least(None, 4000).unwrap();
     let how = StopRule { looking: 20, rounds: 4, settling: 1000 };
     let settled = problem.settled(None, how).unwrap();
-    let few = problem.least(20).unwrap();
+    let few = problem.least(None, 20).unwrap();
     // Among 405 pixels, ten iterations that lower χ² by less than a hundredth of what noise does end a round.
     assert!(settled.value < 1.01 * least.value, "{} {}", settled.value, least.value);
     assert!(few.value > 1.05 * least.value, "{} {}", few.value, least.value);
