@@ -40,15 +40,6 @@ impl<T: Float> ForwardModel<T> {
     }
 
     /// The same of a known field e(x, t) of places (M) and times since the reference time (M), whatever moves.
-    pub fn movie_of_events(
-        &self,
-        field: &(dyn Fn([f64; 3], f64) -> f64 + Sync),
-        batch: &mut Batch<T>,
-    ) -> Vec<f64> {
-        collected(|sink| self.images_of_events(field, batch, sink))
-    }
-
-    /// The same, image by image.
     ///
     /// # Errors
     /// Those of `sink`.
@@ -123,7 +114,9 @@ impl<T: Float> ForwardModel<T> {
 }
 
 /// All images in memory.
-fn collected(make: impl FnOnce(&mut Sink<'_, f64>) -> Result<(), Error>) -> Vec<f64> {
+pub(in crate::fit) fn collected(
+    make: impl FnOnce(&mut Sink<'_, f64>) -> Result<(), Error>,
+) -> Vec<f64> {
     let mut movie = Vec::new();
     // Memory refuses nothing.
     let _ = make(&mut |image: &[f64]| {

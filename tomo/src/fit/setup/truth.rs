@@ -4,6 +4,7 @@ use super::glyph::Glyph;
 use super::random_field::RandomField;
 use super::ring::Rings;
 use super::{AXIS, Instrument, Result, known_axis, motion};
+use crate::fit::forward::known_field::collected;
 use crate::fit::settings::{FitError, FitFile, Spot, Tube, Within, refuse};
 use crate::fit::{Batch, ForwardModel};
 use kerrlight_common::frames::{Frames, Sink};
@@ -106,10 +107,7 @@ impl Truth {
     /// Images in Jy per pixel of a forward model with the truth's motion, all frames one after the other.
     pub fn movie_through<T: Float>(&self, model: &mut ForwardModel<T>) -> Vec<f64> {
         model.weigh(self.axis);
-        match self.is_carried() {
-            true => model.movie_of(self.axis, &|x| self.at(x), &mut Batch::default()),
-            false => model.movie_of_events(&|x, t| self.seen_at(x, t), &mut Batch::default()),
-        }
+        collected(|sink| self.images(model, sink))
     }
 
     fn images<T: Float>(&self, model: &ForwardModel<T>, sink: &mut Sink<'_, f64>) -> Result<()> {
