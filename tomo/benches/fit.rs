@@ -14,7 +14,7 @@ use kerrlight_tomo::fit::{
     Batch, BatchSize, Data, ImageTerm, Objective, OccupancyPlan, OccupancySettings, Outcome,
     Region, State, Trainer, Training, Weighted,
 };
-use kerrlight_tomo::optimise::{Adam, AdamState, Polynomial};
+use kerrlight_tomo::optimise::{AdamState, Polynomial};
 use kerrlight_tomo::representation::{
     Gradient, Groups, InstructionSet, Network, NetworkSettings, Representation, Workspace,
 };
@@ -41,7 +41,6 @@ fn training(batch: BatchSize) -> Training {
     let settings = OccupancySettings { cells: 24, threshold: 0.01, memory: 0.8 };
     Training {
         seed: 1,
-        adam: Adam::default(),
         muon: None,
         rate: Polynomial { from: 1e-3, to: 1e-5, steps: 400, power: 1.0 },
         axis_rate: None,
@@ -83,7 +82,7 @@ fn parts(
         network.eval_vjp(&state.now.parameters, at, groups, &mut values, into, &mut workspace);
     });
     let (mut memory, mut parameters) = (AdamState::new(count), state.now.parameters.clone());
-    let adam = least(|| Adam::default().step(1e-9, &gradient, &mut memory, &mut parameters));
+    let adam = least(|| memory.step(1e-9, &gradient, &mut parameters));
     ([gather, through, adam], batch.points())
 }
 

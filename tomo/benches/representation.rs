@@ -11,7 +11,7 @@ mod support;
 
 use core::ops::Range;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use kerrlight_tomo::optimise::{Adam, AdamState};
+use kerrlight_tomo::optimise::AdamState;
 use kerrlight_tomo::representation::{
     Activation, Coordinates, FeatureGrid, FeatureGridSettings, Gradient, Grid, GridSettings,
     Groups, Network, NetworkSettings, Representation, Workspace,
@@ -84,7 +84,7 @@ impl<'a> Run<'a> {
 
     fn step(&mut self) {
         self.vjp();
-        Adam::default().step(1e-5, &self.gradient, &mut self.state, &mut self.parameters);
+        self.state.step(1e-5, &self.gradient, &mut self.parameters);
         self.representation.project(&mut self.parameters);
     }
 

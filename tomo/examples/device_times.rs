@@ -15,7 +15,7 @@ use kerrlight_tomo::fit::{
     Batch, BatchSize, Data, Drawn, ForwardModel, ImageTerm, Objective, Region, State, StepDevice,
     Stretch, Training, Weighted,
 };
-use kerrlight_tomo::optimise::{Adam, Muon, Polynomial};
+use kerrlight_tomo::optimise::{Muon, Polynomial};
 use kerrlight_tomo::representation::{
     Activation, FeatureGrid, FeatureGridSettings, Grid, GridSettings, Network, NetworkSettings,
     Representation,
@@ -141,7 +141,6 @@ fn objective() -> Answer<(Objective<f32>, Axis)> {
 fn training(batch: BatchSize, steps: u64) -> Training {
     Training {
         seed: 1,
-        adam: Adam::default(),
         muon: None,
         rate: Polynomial { from: 1e-3, to: 1e-5, steps, power: 1.0 },
         axis_rate: None,
@@ -171,7 +170,6 @@ fn steps_of(
     let mut fit = GraphicsFit::new(open(adapter)?, &objective, field, &training, None)?;
     let stretch = |steps: usize| Stretch {
         objective: &objective,
-        adam: training.adam,
         axis,
         occupancy: None,
         draws: vec![Drawn::Pixels(pairs.clone()); steps],

@@ -1,6 +1,6 @@
 //! Batches of a size that a workspace has seen allocate nothing.
 
-use kerrlight_tomo::optimise::{Adam, AdamState};
+use kerrlight_tomo::optimise::AdamState;
 use kerrlight_tomo::representation::{
     Activation, Coordinates, CoordinatesMut, FeatureGrid, FeatureGridSettings, Gradient, Grid,
     GridSettings, Groups, Network, NetworkSettings, Representation, Workspace,
@@ -51,7 +51,7 @@ fn allocations(representation: &dyn Representation<f32>) -> usize {
         representation.vjp(&parameters, at, &cotangents, into, &mut workspace);
         let into = Gradient { parameters: &mut gradient, coordinates: None };
         representation.eval_vjp(&parameters, at, groups, &mut values, into, &mut workspace);
-        Adam::default().step(1e-3, &gradient, &mut state, &mut parameters);
+        state.step(1e-3, &gradient, &mut parameters);
         ALLOCATIONS.load(Ordering::Relaxed)
     };
     let first = round();

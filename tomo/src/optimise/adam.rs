@@ -3,23 +3,10 @@
 use kerrlight_common::simd::{Float, InstructionSet, Lanes, Task, dispatch};
 use rayon::prelude::*;
 
-/// Decay rates of the moments and the number that keeps the division safe.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Adam {
-    /// Decay rate β₁ of the mean gradient, 0 to 1.
-    pub beta1: f64,
-    /// Decay rate β₂ of the mean square, 0 to 1.
-    pub beta2: f64,
-    /// Added to the root of the mean square, in units of the gradient.
-    pub epsilon: f64,
-}
-
-impl Default for Adam {
-    /// β₁ = 0.9, β₂ = 0.999, ε = 1e-8, those of the paper and of BH-NeRF.
-    fn default() -> Self {
-        Self { beta1: 0.9, beta2: 0.999, epsilon: 1e-8 }
-    }
-}
+/// Decay rates β₁ of the mean gradient and β₂ of the mean square: those of the paper and of BH-NeRF.
+pub const BETA: [f64; 2] = [0.9, 0.999];
+/// ε, which is added to the root of the mean square, in units of the gradient: that of the paper and of BH-NeRF.
+pub const EPSILON: f64 = 1e-8;
 
 /// All that Adam remembers.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,58 +36,36 @@ impl<T: Float> AdamState<T> {
         self.steps += 1;
         self.steps
     }
+
+    /// One step with learning rate `rate` (in units of the parameters), by all threads.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub fn step(&mut self, rate: f64, gradient: &[T], parameters: &mut [T]) {
+        let steps = self.begin(gradient, parameters);
+        let moments = [&mut self.first[..], &mut self.second[..]];
+        update(rate, gradient, steps, moments, parameters);
+    }
 }
 
 /// Parameters that one thread takes at a time.
 const SHARE: usize = 16_384;
 
-impl Adam {
-    /// One step with learning rate `rate` (in units of the parameters), by all threads.
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    pub fn step<T: Float>(
-        &self,
-        rate: f64,
-        gradient: &[T],
-        state: &mut AdamState<T>,
-        parameters: &mut [T],
-    ) {
-        let steps = state.begin(gradient, parameters);
-        let moments = [&mut state.first[..], &mut state.second[..]];
-        self.update(rate, gradient, steps, moments, parameters);
-    }
-
-    /// Step number `steps`, counted from 1, of parameters with these moments.
-    pub(super) fn update<T: Float>(
-        &self,
-        rate: f64,
-        gradient: &[T],
-        steps: u64,
-        [first, second]: [&mut [T]; 2],
-        parameters: &mut [T],
-    ) {
-        let constants = self.constants(rate, steps);
-        let set = InstructionSet::best();
-        let moments = first.par_chunks_mut(SHARE).zip(second.par_chunks_mut(SHARE));
-        let all = parameters.par_chunks_mut(SHARE).zip(gradient.par_chunks(SHARE)).zip(moments);
-        all.for_each(|((parameters, gradient), (first, second))| {
-            dispatch(set, Update { constants, gradient, first, second, parameters });
-        });
-    }
-
-    fn constants<T: Float>(&self, rate: f64, steps: u64) -> Constants<T> {
-        let power = |beta: f64| beta.powf(steps as f64);
-        Constants {
-            beta: [self.beta1, self.beta2].map(T::of),
-            // In double precision: 1 − 0.999 in single is wrong in the fifth digit.
-            rest: [1.0 - self.beta1, 1.0 - self.beta2].map(T::of),
-            // Moments that begin at 0 are too small by 1 − βᵗ.
-            unbiased: [self.beta1, self.beta2].map(|beta| T::of(1.0 / (1.0 - power(beta)))),
-            rate: T::of(rate),
-            epsilon: T::of(self.epsilon),
-        }
-    }
+/// Step number `steps`, counted from 1, of parameters with these moments.
+pub(super) fn update<T: Float>(
+    rate: f64,
+    gradient: &[T],
+    steps: u64,
+    [first, second]: [&mut [T]; 2],
+    parameters: &mut [T],
+) {
+    let constants = Constants::of(rate, steps);
+    let set = InstructionSet::best();
+    let moments = first.par_chunks_mut(SHARE).zip(second.par_chunks_mut(SHARE));
+    let all = parameters.par_chunks_mut(SHARE).zip(gradient.par_chunks(SHARE)).zip(moments);
+    all.for_each(|((parameters, gradient), (first, second))| {
+        dispatch(set, Update { constants, gradient, first, second, parameters });
+    });
 }
 
 #[derive(Clone, Copy)]
@@ -110,6 +75,21 @@ struct Constants<T> {
     unbiased: [T; 2],
     rate: T,
     epsilon: T,
+}
+
+impl<T: Float> Constants<T> {
+    fn of(rate: f64, steps: u64) -> Self {
+        let power = |beta: f64| beta.powf(steps as f64);
+        Self {
+            beta: BETA.map(T::of),
+            // In double precision: 1 − 0.999 in single is wrong in the fifth digit.
+            rest: BETA.map(|beta| T::of(1.0 - beta)),
+            // Moments that begin at 0 are too small by 1 − βᵗ.
+            unbiased: BETA.map(|beta| T::of(1.0 / (1.0 - power(beta)))),
+            rate: T::of(rate),
+            epsilon: T::of(EPSILON),
+        }
+    }
 }
 
 struct Update<'a, T> {
@@ -146,8 +126,7 @@ impl<T: Float> Task<T> for Update<'_, T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const ADAM: Adam = Adam { beta1: 0.9, beta2: 0.999, epsilon: 1e-8 };
+    use core::ops::Range;
 
     #[test]
     fn exact_steps_of_a_constant_gradient() {
@@ -155,7 +134,7 @@ mod tests {
         let gradient: Vec<f64> = (0..77).map(|k| (f64::from(k) - 38.0) * 1e-7).collect();
         let (mut x, mut state) = (vec![1.0; 77], AdamState::new(77));
         for step in 1..=50 {
-            ADAM.step(0.01, &gradient, &mut state, &mut x);
+            state.step(0.01, &gradient, &mut x);
             for (x, g) in x.iter().zip(&gradient) {
                 let expected = 1.0 - 0.01 * f64::from(step) * g / (g.abs() + 1e-8);
                 assert!((x - expected).abs() < 1e-13, "{step}: {x} {expected}");
@@ -169,7 +148,7 @@ mod tests {
         let mut state = AdamState::new(1);
         for (k, g) in gradients.iter().enumerate() {
             let before = x[0];
-            ADAM.step(0.1, &[*g], &mut state, &mut x);
+            state.step(0.1, &[*g], &mut x);
             let (mut m, mut v) = (0.0, 0.0);
             for (j, g) in gradients[..=k].iter().enumerate() {
                 let age = (k - j) as i32;
@@ -189,9 +168,9 @@ mod tests {
             (0..count).map(|k| ((k * 7 + step * 13) % 101) as f32 - 50.0).collect()
         };
         let run =
-            |threads: usize, steps: core::ops::Range<usize>, x: &mut Vec<f32>, state: &mut _| {
+            |threads: usize, steps: Range<usize>, x: &mut [f32], state: &mut AdamState<f32>| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                pool.install(|| steps.for_each(|step| ADAM.step(1e-3, &gradient(step), state, x)));
+                pool.install(|| steps.for_each(|step| state.step(1e-3, &gradient(step), x)));
             };
         let (mut x, mut state) = (vec![1.0; count], AdamState::new(count));
         run(1, 0..6, &mut x, &mut state);

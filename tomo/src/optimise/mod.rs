@@ -3,13 +3,13 @@
 //! Optimisers. Their state is plain slices and counters that the caller owns: written out and read
 //! back, a run goes on as if it had never stopped, to the last bit.
 
-mod adam;
+pub(crate) mod adam;
 mod lbfgs;
 mod line_search;
 mod muon;
 mod schedule;
 
-pub use adam::{Adam, AdamState};
+pub use adam::AdamState;
 pub use lbfgs::{Lbfgs, LbfgsState, Objective, Step};
 pub use muon::Muon;
 pub use schedule::Polynomial;

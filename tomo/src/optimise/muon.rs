@@ -4,7 +4,7 @@
 //! A mean gradient G = U S Vᵀ has few large singular values. Adam follows these; what the small ones stand for, such as
 //! fine structure, is learnt slowly. Muon steps along U Vᵀ, in which all count alike.
 
-use super::{Adam, AdamState};
+use super::adam::{AdamState, update};
 use crate::representation::WeightMatrix;
 use core::ops::Range;
 use kerrlight_common::matrix::{Shape, multiply};
@@ -18,15 +18,13 @@ pub struct Muon {
     pub beta: f64,
     /// Change of the singular values of a matrix in a step, over the learning rate; that of networks of any width.
     pub scale: f64,
-    /// Rule of all other parameters.
-    pub adam: Adam,
 }
 
 impl Default for Muon {
     /// β = 0.95, that of the source. With a scale of 22 a weight of a layer of 128 units changes by twice the rate (root
     /// mean square), which suits networks of coordinates (docs/measurements/fits.md).
     fn default() -> Self {
-        Self { beta: 0.95, scale: 22.0, adam: Adam::default() }
+        Self { beta: 0.95, scale: 22.0 }
     }
 }
 
@@ -39,7 +37,7 @@ impl Muon {
 
     /// One step with learning rate `rate` (in units of the parameters). The first moments of `state` are the mean
     /// gradient of all parameters, the second ones stay zero where there are matrices. `matrices` lie behind each other,
-    /// in the order of their offsets. Without any this is [`Adam::step`], to the bit.
+    /// in the order of their offsets. Without any this is [`AdamState::step`], to the bit.
     ///
     /// # Panics
     /// If the slices differ in length, or a matrix lies outside of them.
@@ -54,7 +52,7 @@ impl Muon {
         let steps = state.begin(gradient, parameters);
         for of in between(matrices, parameters.len()) {
             let moments = [&mut state.first[of.clone()], &mut state.second[of.clone()]];
-            self.adam.update(rate, &gradient[of.clone()], steps, moments, &mut parameters[of]);
+            update(rate, &gradient[of.clone()], steps, moments, &mut parameters[of]);
         }
         let mean = &mut state.first;
         let directions: Vec<Vec<T>> = matrices

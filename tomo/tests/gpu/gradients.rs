@@ -80,7 +80,6 @@ impl<'a> Both<'a> {
         let now = Progress { parameters: parameters.to_vec(), ..self.now() };
         let stretch = Stretch {
             objective: &self.objective,
-            adam: self.training.adam,
             axis,
             occupancy: self.occupancy.as_ref(),
             draws: vec![self.draw.clone()],

@@ -10,7 +10,7 @@ use kerrlight_tomo::fit::{
     OccupancyPlan, OccupancySettings, Redshift, Region, Sampling, Scan, ScanTerm, SightlineRequest,
     Sightlines, State, Training, Weighted,
 };
-use kerrlight_tomo::optimise::{Adam, Polynomial};
+use kerrlight_tomo::optimise::Polynomial;
 use kerrlight_tomo::representation::{
     Activation, FeatureGrid, FeatureGridSettings, Grid, GridSettings, Network, NetworkSettings,
     Representation,
@@ -188,7 +188,6 @@ pub fn training(batch: BatchSize, masked: bool) -> Training {
     let settings = OccupancySettings { cells: 12, threshold: 0.6, memory: 0.5 };
     Training {
         seed: 11,
-        adam: Adam::default(),
         muon: None,
         rate,
         axis_rate: None,

@@ -2,6 +2,7 @@
 
 use super::bytes::{floats, words};
 use super::kernels::{self, compiled};
+use crate::optimise::adam::{BETA, EPSILON};
 use crate::representation::WeightMatrix;
 use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError};
 
@@ -19,19 +20,6 @@ pub struct Learning {
     positive: bool,
     /// Values on the device, where they are known: parameters and moments.
     held: [Vec<f32>; 3],
-}
-
-/// The numbers of a step.
-#[derive(Clone, Copy, Debug)]
-pub struct Rule {
-    /// Decay rates.
-    pub beta: [f64; 2],
-    /// Added to the root of the mean square.
-    pub epsilon: f64,
-    /// Learning rate.
-    pub rate: f64,
-    /// Steps, this one counted.
-    pub steps: u64,
 }
 
 /// Invocations in a row of the grid, 64 a workgroup.
@@ -84,15 +72,14 @@ impl Learning {
         }
     }
 
-    /// Puts the numbers of the next step there.
+    /// Puts the numbers of the next step there: its learning rate, and how many steps there are with it.
     ///
     /// # Errors
     /// If the device fails.
-    pub fn set(&self, device: &Compute, rule: Rule) -> Result<(), GpuError> {
-        let Rule { beta, epsilon, rate, steps } = rule;
-        let unbiased = beta.map(|beta| 1.0 / (1.0 - beta.powf(steps as f64)));
-        let rest = beta.map(|beta| 1.0 - beta);
-        let numbers = [beta, rest, unbiased, [rate, epsilon]];
+    pub fn set(&self, device: &Compute, rate: f64, steps: u64) -> Result<(), GpuError> {
+        let unbiased = BETA.map(|beta| 1.0 / (1.0 - beta.powf(steps as f64)));
+        let rest = BETA.map(|beta| 1.0 - beta);
+        let numbers = [BETA, rest, unbiased, [rate, EPSILON]];
         let mut all: Vec<u32> =
             numbers.as_flattened().iter().map(|x| (*x as f32).to_bits()).collect();
         all.extend([self.count as u32, ROW, u32::from(self.positive), 0]);

@@ -36,7 +36,7 @@ use super::learning::training::Training;
 use super::loss::objective::{Loss, Objective};
 use crate::Error;
 use crate::representation::Representation;
-use adam::{Learning, Rule};
+use adam::Learning;
 use fall::FallTable;
 use field::Field;
 use kerrlight_geodesic::gpu::{Adapter, Compute, GpuError, Needs};
@@ -222,10 +222,7 @@ impl StepDevice<f32> for GraphicsFit {
         let Self { device, pixels, learning, turning, .. } = &*self;
         let mut pending = Vec::with_capacity(stretch.draws.len());
         for (k, rate) in stretch.rates.iter().enumerate() {
-            let adam = stretch.adam;
-            let (beta, epsilon) = ([adam.beta1, adam.beta2], adam.epsilon);
-            let steps = from.adam.steps + k as u64 + 1;
-            learning.set(device, Rule { beta, epsilon, rate: *rate, steps })?;
+            learning.set(device, *rate, from.adam.steps + k as u64 + 1)?;
             turning.as_ref().map_or(Ok(()), |turning| turning.set(device, *rate))?;
             pending.push(self.loss(stretch, k, true)?);
         }

@@ -8,7 +8,6 @@ use super::state::Progress;
 use crate::Error;
 use crate::fit::forward::occupancy::Occupancy;
 use crate::fit::loss::objective::{Loss, Objective};
-use crate::optimise::Adam;
 use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::Axis;
 
@@ -30,8 +29,6 @@ pub enum Drawn {
 pub struct Stretch<'a, T> {
     /// Forward model, weighed for the axis, and data.
     pub objective: &'a Objective<T>,
-    /// Rule of the steps.
-    pub adam: Adam,
     /// The axis that matter turns about.
     pub axis: Axis,
     /// Outside of it nothing shines.

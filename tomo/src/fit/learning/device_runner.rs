@@ -24,8 +24,7 @@ impl<T: Float> Trainer<'_, T> {
         let draws = (0..count).map(|k| self.drawn(state.now.step + k)).collect();
         let rates = (0..count).map(|k| self.rate(&state.now, k)).collect();
         let (objective, occupancy) = (&self.objective, self.mask(&state.now));
-        let (adam, axis) = (self.training.adam, state.now.axis);
-        let stretch = Stretch { objective, adam, axis, occupancy, draws, rates };
+        let stretch = Stretch { objective, axis: state.now.axis, occupancy, draws, rates };
         let begun = Instant::now();
         let taken = delegate.device.take(&stretch, &state.now)?;
         let each = begun.elapsed().as_secs_f64() / count as f64;

@@ -2,7 +2,7 @@
 
 use super::state::{Outcome, Progress, State, step_back};
 use super::trainer::Trainer;
-use super::training::{BatchSize, Training};
+use super::training::BatchSize;
 use crate::Error;
 use crate::fit::Field;
 use crate::fit::forward::occupancy::Occupancy;
@@ -138,12 +138,11 @@ impl<T: Float> Trainer<'_, T> {
     }
 
     fn learn(&mut self, now: &mut Progress<T>, of_axis: [f64; 3]) {
-        let Training { adam, muon, .. } = &self.training;
         let rate = self.rate(now, 0);
         let (gradient, parameters) = (&self.gradient, &mut now.parameters);
-        match muon {
+        match &self.training.muon {
             Some(muon) => muon.step(rate, gradient, &self.matrices, &mut now.adam, parameters),
-            None => adam.step(rate, gradient, &mut now.adam, parameters),
+            None => now.adam.step(rate, gradient, parameters),
         }
         self.representation.project(&mut now.parameters);
         // The step is counted last: the rates of parameters and axis are those of its number.
@@ -153,11 +152,11 @@ impl<T: Float> Trainer<'_, T> {
 
     /// Turns the axis, if it is learnt.
     pub(in crate::fit) fn turn(&self, now: &mut Progress<T>, of_axis: [f64; 3]) {
-        let Training { adam, axis_rate: Some(axis_rate), .. } = &self.training else { return };
+        let Some(axis_rate) = &self.training.axis_rate else { return };
         let mut moved = now.axis.vector();
         let rate = self.part(now, 0) * axis_rate.rate(now.step);
         // Adam's step leaves the sphere; the axis is the direction in which it ends.
-        adam.step(rate, &of_axis, &mut now.axis_adam, &mut moved);
+        now.axis_adam.step(rate, &of_axis, &mut moved);
         now.axis = Axis::new(moved).unwrap_or(now.axis);
     }
 

@@ -3,7 +3,7 @@
 use crate::fit::forward::occupancy::OccupancySettings;
 use crate::fit::forward::sightlines::Region;
 use crate::fit::loss::change_price::ChangePrice;
-use crate::optimise::{Adam, Muon, Polynomial};
+use crate::optimise::{Muon, Polynomial};
 use crate::representation::Representation;
 use kerrlight_common::simd::Float;
 use schemars::JsonSchema;
@@ -40,9 +40,7 @@ pub struct OccupancyPlan {
 pub struct Training {
     /// Seed of the parameters and of all that is drawn.
     pub seed: u64,
-    /// Rule of the steps.
-    pub adam: Adam,
-    /// Another rule for the weight matrices of networks.
+    /// Rule of the steps of the weight matrices of networks, if it is not Adam's.
     pub muon: Option<Muon>,
     /// First learning rate of Adam and Muon.
     pub rate: Polynomial,

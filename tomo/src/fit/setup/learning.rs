@@ -11,7 +11,7 @@ use crate::fit::settings::{
 use crate::fit::{
     BatchSize, ChangePrice, OccupancyPlan, OccupancySettings, Region, Training, WithStaticImage,
 };
-use crate::optimise::{Adam, Muon, Polynomial};
+use crate::optimise::{Muon, Polynomial};
 use crate::representation::{
     Activation, Carrier, Changing, Degree, FeatureGrid, FeatureGridSettings, Grid, GridSettings,
     Knots, Network, NetworkSettings, OwnSettings, Registry, Representation, Spline,
@@ -182,7 +182,6 @@ pub fn training(
     }
     Ok(Training {
         seed: file.seed,
-        adam: Adam::default(),
         muon,
         rate: rate(file)?,
         axis_rate,

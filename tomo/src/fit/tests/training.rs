@@ -1,14 +1,13 @@
 //! Steps: repeatable, resumable, and safe from divergence.
 
 use super::*;
-use crate::optimise::{Adam, Muon, Polynomial};
+use crate::optimise::{Muon, Polynomial};
 use crate::representation::{Network, NetworkSettings};
 
 pub(super) fn settings() -> Training {
     let rate = Polynomial { from: 3e-2, to: 1e-3, steps: 40, power: 1.0 };
     Training {
         seed: 11,
-        adam: Adam::default(),
         muon: None,
         rate,
         axis_rate: Some(rate),
