@@ -14,7 +14,7 @@ use kerrlight_tomo::fit::{
     Batch, BatchSize, Data, ImageTerm, Objective, OccupancyPlan, OccupancySettings, Outcome,
     Region, State, Trainer, Training, Weighted,
 };
-use kerrlight_tomo::optimise::{AdamState, Polynomial};
+use kerrlight_tomo::optimise::{AdamState, LinearDecay};
 use kerrlight_tomo::representation::{
     Gradient, Groups, InstructionSet, Network, NetworkSettings, Representation, Workspace,
 };
@@ -42,7 +42,7 @@ fn training(batch: BatchSize) -> Training {
     Training {
         seed: 1,
         muon: None,
-        rate: Polynomial { from: 1e-3, to: 1e-5, steps: 400, power: 1.0 },
+        rate: LinearDecay { from: 1e-3, to: 1e-5, steps: 400 },
         axis_rate: None,
         ramp: 0,
         batch,
@@ -51,7 +51,6 @@ fn training(batch: BatchSize) -> Training {
         change: None,
         region: REGION,
         keep_every: 50,
-        divergence: 1e3,
     }
 }
 

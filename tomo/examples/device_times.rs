@@ -15,7 +15,7 @@ use kerrlight_tomo::fit::{
     Batch, BatchSize, Data, Drawn, ForwardModel, ImageTerm, Objective, Region, State, StepDevice,
     Stretch, Training, Weighted,
 };
-use kerrlight_tomo::optimise::{Muon, Polynomial};
+use kerrlight_tomo::optimise::{LinearDecay, Muon};
 use kerrlight_tomo::representation::{
     Activation, FeatureGrid, FeatureGridSettings, Grid, GridSettings, Network, NetworkSettings,
     Representation,
@@ -142,7 +142,7 @@ fn training(batch: BatchSize, steps: u64) -> Training {
     Training {
         seed: 1,
         muon: None,
-        rate: Polynomial { from: 1e-3, to: 1e-5, steps, power: 1.0 },
+        rate: LinearDecay { from: 1e-3, to: 1e-5, steps },
         axis_rate: None,
         ramp: 0,
         batch,
@@ -150,7 +150,6 @@ fn training(batch: BatchSize, steps: u64) -> Training {
         change: None,
         region: REGION,
         keep_every: 50,
-        divergence: 1e3,
     }
 }
 

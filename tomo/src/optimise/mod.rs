@@ -12,4 +12,4 @@ mod schedule;
 pub use adam::AdamState;
 pub use lbfgs::{Lbfgs, LbfgsState, Objective, Step};
 pub use muon::Muon;
-pub use schedule::Polynomial;
+pub use schedule::LinearDecay;

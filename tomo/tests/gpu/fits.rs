@@ -8,7 +8,7 @@ use kerrlight_tomo::fit::{
     BatchSize, ChangePrice, DeviceRunner, Outcome, State, StepDevice, Stretch, Taken, Trainer,
     Training, checkpoint,
 };
-use kerrlight_tomo::optimise::{Muon, Polynomial};
+use kerrlight_tomo::optimise::{LinearDecay, Muon};
 use kerrlight_tomo::representation::{Activation, Allowed, Knots, Representation};
 
 /// A fit with its data, on the device or not.
@@ -260,7 +260,7 @@ fn exact_after_a_lost_device_the_processor_goes_on() {
 #[test]
 fn exact_a_divergence_is_stepped_back_from() {
     let small = problem::small();
-    let absurd = Polynomial { from: 1e30, to: 1e30, steps: 40, power: 1.0 };
+    let absurd = LinearDecay { from: 1e30, to: 1e30, steps: 40 };
     let training = Training { rate: absurd, ramp: 0, ..training(BatchSize::Pixels(30), false) };
     let fit = Fit { representation: &small, training, kind: Kind::Images };
     let Some(graphics) = fit.graphics() else { return };

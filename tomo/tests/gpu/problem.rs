@@ -10,7 +10,7 @@ use kerrlight_tomo::fit::{
     OccupancyPlan, OccupancySettings, Redshift, Region, Sampling, Scan, ScanTerm, SightlineRequest,
     Sightlines, State, Training, Weighted,
 };
-use kerrlight_tomo::optimise::Polynomial;
+use kerrlight_tomo::optimise::LinearDecay;
 use kerrlight_tomo::representation::{
     Activation, FeatureGrid, FeatureGridSettings, Grid, GridSettings, Network, NetworkSettings,
     Representation,
@@ -184,7 +184,7 @@ fn scans(name: &str) -> Weighted<dyn FrameTerm<f32>> {
 }
 
 pub fn training(batch: BatchSize, masked: bool) -> Training {
-    let rate = Polynomial { from: 3e-2, to: 1e-3, steps: 40, power: 1.0 };
+    let rate = LinearDecay { from: 3e-2, to: 1e-3, steps: 40 };
     let settings = OccupancySettings { cells: 12, threshold: 0.6, memory: 0.5 };
     Training {
         seed: 11,
@@ -197,7 +197,6 @@ pub fn training(batch: BatchSize, masked: bool) -> Training {
         change: None,
         region: REGION,
         keep_every: 8,
-        divergence: 1e3,
     }
 }
 

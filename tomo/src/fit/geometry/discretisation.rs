@@ -2,7 +2,7 @@
 //! and what the χ² that they leave may.
 
 use super::covariance::covariance;
-use super::gauss_newton::{Bowl, Polish};
+use super::gauss_newton::Bowl;
 use super::problem::{Estimate, GeometryProblem};
 use super::quadratic_form::in_own_units;
 use super::{Free, Geometry};
@@ -104,7 +104,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     /// As those of [`polish`](Self::polish).
     pub fn standing(&self, geometry: Geometry) -> Result<Standing, Error> {
         let best = self.solve(geometry)?;
-        let bowl = self.bowl(&best, Polish::default().following)?;
+        let bowl = self.bowl(&best)?;
         let excess = self.excess(self.scale * self.left(&best)?);
         Ok(Standing { best, bowl, excess })
     }
@@ -130,7 +130,7 @@ impl Standing {
         // As far from the end as the other volume: slopes that are left over from there cancel.
         let there = finer.solve(self.best.geometry)?;
         let excess = finer.excess(finer.scale * finer.left(&there)?);
-        let bowl = finer.bowl(&there, Polish::default().following)?;
+        let bowl = finer.bowl(&there)?;
         let left_by =
             |bends| covariance(finer.free, &self.best.geometry, bends, 1.0).filter(is_finite);
         let both = left_by(&bowl.bends).zip(left_by(&self.bowl.bends));

@@ -29,21 +29,10 @@ pub struct Polished {
     pub further: Option<Geometry>,
 }
 
-/// Settings of the steps.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Polish {
-    /// Steps, at most.
-    pub steps: usize,
-    /// Conjugate gradients by which the volume follows the geometry, at most.
-    pub following: usize,
-}
-
-impl Default for Polish {
-    fn default() -> Self {
-        Self { steps: 12, following: 300 }
-    }
-}
-
+/// Steps, at most.
+const STEPS: usize = 12;
+/// Conjugate gradients by which the volume follows the geometry, at most.
+const FOLLOWING: usize = 300;
 /// Half the distance of a difference, in units of [`Parameter::scale`](super::Parameter::scale).
 const WIDTH: f64 = 0.1;
 /// Parts of a step that are tried.
@@ -73,15 +62,15 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     ///
     /// # Errors
     /// If a number is out of its range, or χ² is not finite.
-    pub fn polish(&self, start: &Estimate, how: &Polish) -> Result<Polished, Error> {
+    pub fn polish(&self, start: &Estimate) -> Result<Polished, Error> {
         // The start may be of other pixels or solved for a shorter time; slopes hold about a volume
         // that is the best one of this problem.
         let mut best = self.solve_from(start.geometry, &start.x)?;
-        let mut bowl = self.bowl(&best, how.following)?;
-        for _ in 0..how.steps {
+        let mut bowl = self.bowl(&best)?;
+        for _ in 0..STEPS {
             let Some(lower) = self.descend(&best, &bowl)? else { break };
             best = lower;
-            bowl = self.bowl(&best, how.following)?;
+            bowl = self.bowl(&best)?;
         }
         let covariance = self.covariance(&best.geometry, &bowl);
         let further = bowl.step().map(|(step, _)| self.moved(&best.geometry, step.as_slice()));
@@ -158,13 +147,13 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     }
 
     /// Slope and second derivatives at a geometry with its best volume.
-    pub(super) fn bowl(&self, at: &Estimate, following: usize) -> Result<Bowl, Error> {
+    pub(super) fn bowl(&self, at: &Estimate) -> Result<Bowl, Error> {
         let forward: ForwardModel<T> = self.model.forward(&at.geometry)?;
         let n = self.free.len();
         let mut moved = self.image_differences(at, &DMatrix::from_diagonal_element(n, n, WIDTH))?;
         moved.iter_mut().flatten().for_each(|x| *x *= T::of(1.0 / WIDTH));
         let Profile { slopes, bends, responses } =
-            self.linear(&forward).profile(&at.x, &moved, following)?;
+            self.linear(&forward).profile(&at.x, &moved, FOLLOWING)?;
         // Profiles are those of χ², beside a prior those of its mean over the data.
         let half = 0.5 * self.scale * self.unit();
         let mut bowl = Bowl {
@@ -192,9 +181,8 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     ) -> Result<DMatrix<f64>, Error> {
         let forward: ForwardModel<T> = self.model.forward(&at.geometry)?;
         let differences = self.image_differences(at, steps)?;
-        let following = Polish::default().following;
         let Profile { bends, .. } =
-            self.linear(&forward).profile(&at.x, &differences, following)?;
+            self.linear(&forward).profile(&at.x, &differences, FOLLOWING)?;
         let n = steps.ncols();
         Ok(DMatrix::from_row_slice(n, n, &bends) * (0.5 * self.scale * self.unit()))
     }

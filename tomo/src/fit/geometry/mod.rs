@@ -20,7 +20,7 @@ mod tests;
 
 pub use cma_es::{Exploration, Explored, Sample, TrialWatch};
 pub use discretisation::{ModelError, ModelErrors, Refined, Refinement, Standing};
-pub use gauss_newton::{Polish, Polished};
+pub use gauss_newton::Polished;
 pub use model::{GeometryModel, Law};
 pub use neighbours::Surroundings;
 pub use prior::Prior;

@@ -246,7 +246,7 @@ fn exact_steps_lead_to_the_best_geometry() {
     let problem = GeometryProblem { known: truth, effort, ..of_hot_spot(&model, &free, &terms) };
     let away = truth.with(Parameter::Inclination, 1.13).with(Parameter::PositionAngle, 0.6);
     let start = problem.solve(away).unwrap();
-    let found = problem.polish(&start, &Polish::default()).unwrap();
+    let found = problem.polish(&start).unwrap();
     assert!(found.best.value < start.value);
     let further = found.further.unwrap();
     for free in &free {

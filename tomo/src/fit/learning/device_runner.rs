@@ -3,7 +3,7 @@
 use super::device::{DeviceRunner, Drawn, Stretch, Taken};
 use super::state::{Outcome, State, step_back};
 use super::trainer::Trainer;
-use super::training::{BatchSize, COMPARED};
+use super::training::{BatchSize, COMPARED, DIVERGENCE};
 use crate::Error;
 use kerrlight_common::simd::Float;
 use std::time::Instant;
@@ -67,7 +67,7 @@ impl<T: Float> Trainer<'_, T> {
         let finite = of_axis.iter().all(|slope| slope.is_finite());
         for (loss, step) in losses.iter().zip(begin..) {
             let calm = state.good.as_ref().map_or(f64::INFINITY, |good| good.loss);
-            if !loss.total.is_finite() || !finite || loss.total > self.training.divergence * calm {
+            if !loss.total.is_finite() || !finite || loss.total > DIVERGENCE * calm {
                 return Ok(step_back(state, loss.total, step)?);
             }
             state.now.loss = loss.total;

@@ -2,7 +2,7 @@
 
 use super::state::{Outcome, Progress, State, step_back};
 use super::trainer::Trainer;
-use super::training::BatchSize;
+use super::training::{BatchSize, DIVERGENCE};
 use crate::Error;
 use crate::fit::Field;
 use crate::fit::forward::occupancy::Occupancy;
@@ -44,7 +44,7 @@ impl<T: Float> Trainer<'_, T> {
         // Before a state is kept no loss is too large, unless it is no number.
         let calm = state.good.as_ref().map_or(f64::INFINITY, |good| good.loss);
         let finite = loss.total.is_finite() && of_axis.iter().all(|slope| slope.is_finite());
-        if !finite || loss.total > self.training.divergence * calm {
+        if !finite || loss.total > DIVERGENCE * calm {
             let step = now.step;
             return Ok(step_back(state, loss.total, step)?);
         }

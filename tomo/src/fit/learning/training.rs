@@ -3,7 +3,7 @@
 use crate::fit::forward::occupancy::OccupancySettings;
 use crate::fit::forward::sightlines::Region;
 use crate::fit::loss::change_price::ChangePrice;
-use crate::optimise::{Muon, Polynomial};
+use crate::optimise::{LinearDecay, Muon};
 use crate::representation::Representation;
 use kerrlight_common::simd::Float;
 use schemars::JsonSchema;
@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 
 /// Steps from one comparison of a fit with all of its data to the next.
 pub const COMPARED: u64 = 25;
+
+/// Factor by which a loss that diverges exceeds that of the kept state.
+pub(super) const DIVERGENCE: f64 = 1e3;
 
 /// Data of a step: rays, or whole frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -43,9 +46,9 @@ pub struct Training {
     /// Rule of the steps of the weight matrices of networks, if it is not Adam's.
     pub muon: Option<Muon>,
     /// First learning rate of Adam and Muon.
-    pub rate: Polynomial,
+    pub rate: LinearDecay,
     /// Rates of the axis; without them it is held.
-    pub axis_rate: Option<Polynomial>,
+    pub axis_rate: Option<LinearDecay>,
     /// Steps over which the rate grows from 0.
     pub ramp: u64,
     /// Data of a step.
@@ -58,8 +61,6 @@ pub struct Training {
     pub region: Region,
     /// Steps from one good state that is kept to the next.
     pub keep_every: u64,
-    /// A loss larger than that of the kept state by this factor is a divergence.
-    pub divergence: f64,
 }
 
 impl Training {

@@ -142,10 +142,8 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             regulariser.checked()?;
             check("prior weight", *weight, weight.is_finite() && *weight >= 0.0, "0 or above")?;
         }
-        let LinearSettings { threshold, tolerance, admission, .. } = *settings;
-        check("threshold", threshold, (0.0..1.0).contains(&threshold), "0 to 1")?;
+        let tolerance = settings.tolerance;
         check("tolerance", tolerance, (0.0..1.0).contains(&tolerance), "0 to 1")?;
-        check("admission", admission, (0.0..1.0).contains(&admission), "0 to 1")?;
         check("rounds", settings.rounds as f64, settings.rounds > 0, "1 or more")?;
         if let Some(Coarse { nodes, stride, .. }) = settings.coarse {
             check("coarse nodes", nodes as f64, nodes >= 2, "2 or more")?;

@@ -28,6 +28,13 @@ pub(super) const LIT: Coarse = Coarse { nodes: 32, stride: 1, iterations: 20 };
 const MANY: Trials = Trials { spots: Spots { circles: 12, on_each: 16 }, best: 4, iterations: 0 };
 pub(super) const FEW: Trials =
     Trials { spots: Spots { circles: 8, on_each: 12 }, best: 2, iterations: 0 };
+/// Nodes count at first where the coarse solution exceeds this part of its maximum, or where one not farther than
+/// `DILATION` nodes along each axis does.
+const THRESHOLD: f64 = 0.02;
+const DILATION: usize = 2;
+/// Nodes are admitted whose slope is below minus this part of the largest one where nothing shines, and that violate the
+/// conditions for a minimum more than any that counts already.
+const ADMISSION: f64 = 1e-4;
 /// Iterations of the coarse problem from a lit field, for one from a dark field.
 const PATIENCE: usize = 3;
 
@@ -162,9 +169,9 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         let x = refined(&x)?;
         // Parameters of a quiescent image have another unit: they do not say what is bright.
         let fields = &x[..x.len() - operator.active.beside];
-        let least = self.settings.threshold * fields.iter().fold(0.0f64, |most, x| most.max(*x));
+        let least = THRESHOLD * fields.iter().fold(0.0f64, |most, x| most.max(*x));
         let bright: Vec<bool> = fields.iter().map(|x| *x > least).collect();
-        let mut is_active = dilated(bright, fine.nodes, self.settings.dilation);
+        let mut is_active = dilated(bright, fine.nodes, DILATION);
         is_active.resize(x.len(), true);
         let x = x.iter().zip(&is_active).map(|(x, active)| if *active { *x } else { 0.0 });
         Ok(Some((x.collect(), is_active)))
@@ -245,7 +252,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         let slope = if convex { dark_slope } else { self.at_lit[1] };
         // As long as those that count violate the conditions, others need not satisfy them any better.
         let inside = Certificate::bounds(&inner, &operator.active.gather(&gradient), upper).1;
-        let least = -inside.max(settings.admission * slope);
+        let least = -inside.max(ADMISSION * slope);
         let outside = |k: &usize| !is_active[*k] && gradient[*k] < least;
         let admitted: Vec<bool> = (0..x.len()).map(|k| outside(&k)).collect();
         // A descent that ran out of iterations goes on in another round, with new nodes or without.

@@ -16,11 +16,6 @@ pub struct Coarse {
 pub struct LinearSettings {
     /// The coarse problem whose solution says where to begin; all nodes of the grid count at once, without one.
     pub coarse: Option<Coarse>,
-    /// Nodes count at first where the coarse solution exceeds this part of its maximum, or a node not farther than
-    /// `dilation` along each axis has it so.
-    pub threshold: f64,
-    /// Width, in nodes of the grid.
-    pub dilation: usize,
     /// Times that nodes may be admitted again.
     pub rounds: usize,
     /// Iterations in each round.
@@ -30,9 +25,6 @@ pub struct LinearSettings {
     /// A round ends, too, where ten of them lower the function by less than this part of what noise
     /// changes it by, √(2/data) of it.
     pub settled: f64,
-    /// Nodes are admitted whose slope is below minus this part of the largest one where nothing shines, and
-    /// that violate the conditions for a minimum more than any that counts already.
-    pub admission: f64,
     /// Bytes of the sparse matrix; frames beyond are computed anew in each iteration.
     pub memory: usize,
 }
@@ -41,13 +33,10 @@ impl Default for LinearSettings {
     fn default() -> Self {
         Self {
             coarse: Some(Coarse { nodes: 32, stride: 8, iterations: 20 }),
-            threshold: 0.02,
-            dilation: 2,
             rounds: 8,
             iterations: 80,
             tolerance: 1e-4,
             settled: 0.0,
-            admission: 1e-4,
             memory: 768 << 20,
         }
     }

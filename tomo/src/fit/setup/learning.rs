@@ -11,7 +11,7 @@ use crate::fit::settings::{
 use crate::fit::{
     BatchSize, ChangePrice, OccupancyPlan, OccupancySettings, Region, Training, WithStaticImage,
 };
-use crate::optimise::{Muon, Polynomial};
+use crate::optimise::{LinearDecay, Muon};
 use crate::representation::{
     Activation, Carrier, Changing, Degree, FeatureGrid, FeatureGridSettings, Grid, GridSettings,
     Knots, Network, NetworkSettings, OwnSettings, Registry, Representation, Spline,
@@ -166,7 +166,7 @@ fn own(name: &str, file: &FitFile, registry: &Registry) -> Result<Box<dyn Repres
 /// If a number is out of range, or settings contradict each other.
 pub fn training(
     file: &FitFile,
-    axis_rate: Option<Polynomial>,
+    axis_rate: Option<LinearDecay>,
     times: [f64; 2],
 ) -> Result<Training> {
     let chosen = &file.training;
@@ -191,7 +191,6 @@ pub fn training(
         change: price(file, times)?,
         region: file.region.limits(),
         keep_every: 50,
-        divergence: 1e3,
     })
 }
 
@@ -218,9 +217,9 @@ pub fn caution(file: &FitFile) -> Option<&'static str> {
 }
 
 /// Learning rate over the steps; those of voxels that are solved for have no rate.
-fn rate(file: &FitFile) -> Result<Polynomial> {
+fn rate(file: &FitFile) -> Result<LinearDecay> {
     let [from, to] = file.representation.rates().map_or([1.0, 1.0], |(_, rates)| rates);
-    let rate = Polynomial { from, to, steps: file.training.steps, power: 1.0 };
+    let rate = LinearDecay { from, to, steps: file.training.steps };
     rate.checked().within("training")
 }
 

@@ -70,7 +70,7 @@ use super::settings::{
 };
 use super::settings::{WidthOf, Within};
 use super::{Motion, Regulariser};
-use crate::optimise::Polynomial;
+use crate::optimise::LinearDecay;
 use kerrlight_common::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
 use kerrlight_geodesic::{Inclination, Observer};
 use kerrlight_render::dynamics::{Axis, Injection};
@@ -216,7 +216,7 @@ pub fn known_axis(file: &FitFile) -> Result<Option<Axis>> {
 ///
 /// # Errors
 /// If the axis is said to be known and is missing, or a rate is out of range.
-pub fn axis(file: &FitFile) -> Result<(Axis, Option<Polynomial>)> {
+pub fn axis(file: &FitFile) -> Result<(Axis, Option<LinearDecay>)> {
     match &file.axis {
         AxisSearch::Known {} => {
             let missing = || {
@@ -229,14 +229,14 @@ pub fn axis(file: &FitFile) -> Result<(Axis, Option<Polynomial>)> {
         }
         AxisSearch::From { start, rate, last_rate } => {
             let steps = file.training.steps;
-            let rate = Polynomial { from: *rate, to: *last_rate, steps, power: 1.0 };
+            let rate = LinearDecay { from: *rate, to: *last_rate, steps };
             let rate = rate.checked().within("axis.from")?;
             Ok((Axis::new(*start).within("axis.from.start")?, Some(rate)))
         }
         AxisSearch::Scan(AxisScan { rate, last_rate, .. }) => {
             linear(file)?;
             let (from, to, steps) = (*rate, *last_rate, file.training.steps);
-            let rate = Polynomial { from, to, steps, power: 1.0 };
+            let rate = LinearDecay { from, to, steps };
             // A rate of 0 holds the axis that the scan finds.
             let rate = (from != 0.0).then(|| rate.checked()).transpose().within("axis.scan")?;
             // Until the scan has found a better one.

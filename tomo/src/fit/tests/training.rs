@@ -1,11 +1,11 @@
 //! Steps: repeatable, resumable, and safe from divergence.
 
 use super::*;
-use crate::optimise::{Muon, Polynomial};
+use crate::optimise::{LinearDecay, Muon};
 use crate::representation::{Network, NetworkSettings};
 
 pub(super) fn settings() -> Training {
-    let rate = Polynomial { from: 3e-2, to: 1e-3, steps: 40, power: 1.0 };
+    let rate = LinearDecay { from: 3e-2, to: 1e-3, steps: 40 };
     Training {
         seed: 11,
         muon: None,
@@ -21,7 +21,6 @@ pub(super) fn settings() -> Training {
         change: None,
         region: Region { r_min: 3.0, r_max: 6.0, z_width: 4.0 },
         keep_every: 8,
-        divergence: 1e3,
     }
 }
 
@@ -80,7 +79,7 @@ fn exact_orthogonal_steps_lower_the_loss_of_whole_frames() {
         batch: BatchSize::Frames(4),
         muon: Some(Muon::default()),
         occupancy: None,
-        rate: Polynomial { from: 3e-3, to: 0.0, steps: 40, power: 1.0 },
+        rate: LinearDecay { from: 3e-3, to: 0.0, steps: 40 },
         ..settings()
     };
     let mut state = start(&training);
@@ -112,7 +111,7 @@ fn exact_the_loss_falls_and_the_mask_saves_work() {
 
 #[test]
 fn exact_a_divergence_is_stepped_back_from() {
-    let absurd = Polynomial { from: 1e30, to: 1e30, steps: 40, power: 1.0 };
+    let absurd = LinearDecay { from: 1e30, to: 1e30, steps: 40 };
     let training =
         Training { rate: absurd, ramp: 0, axis_rate: None, occupancy: None, ..settings() };
     let network = network();

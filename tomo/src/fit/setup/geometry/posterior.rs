@@ -4,7 +4,7 @@ use super::detail::Sure;
 use super::search_data::{LATTICES, SearchData};
 use crate::fit::geometry::{
     Effort, Envelope, Estimate, Free, Geometry, GeometryModel, GeometryProblem, ModelErrors,
-    Polish, Polished, Spread, bounded,
+    Polished, Spread, bounded,
 };
 use crate::fit::settings::{FitFile, SearchView, UnknownGeometry};
 use crate::fit::setup::{FitData, Result};
@@ -23,7 +23,7 @@ pub(super) fn polished(
     problem: &GeometryProblem<'_, f32>,
     start: &Estimate,
 ) -> Result<(Polished, f64)> {
-    let polished = problem.polish(start, &Polish::default())?;
+    let polished = problem.polish(start)?;
     let reduced = problem.scale * problem.reduced(polished.best.chi2);
     Ok((polished, reduced))
 }
