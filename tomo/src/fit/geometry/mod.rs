@@ -30,17 +30,19 @@ pub use uncertainty::Spread;
 
 use crate::Error;
 use core::f64::consts::{PI, TAU};
-use serde::de::Error as _;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 
-/// A parameter of the geometry.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+/// A parameter of the geometry; its number is its place in [`Geometry`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Parameter {
     /// a, M; negative where matter that turns right-handed about the axis is retrograde.
     Spin,
     /// Angle from the spin axis to the observer, radians.
+    #[serde(rename = "inclination_deg")]
     Inclination,
     /// Position angle of the spin axis on the sky, radians east of north (anticlockwise on images with north up).
+    #[serde(rename = "position_angle_deg")]
     PositionAngle,
     /// ξ of [`Law::Infall`]: specific angular momentum over that of circular geodesics, 0 to 1.
     Xi,
@@ -48,20 +50,6 @@ pub enum Parameter {
     BetaR,
     /// β_φ of the same: the same of the angular velocity.
     BetaPhi,
-}
-
-impl Serialize for Parameter {
-    fn serialize<S: Serializer>(&self, writer: S) -> Result<S::Ok, S::Error> {
-        writer.serialize_str(self.name())
-    }
-}
-
-impl<'de> Deserialize<'de> for Parameter {
-    fn deserialize<D: Deserializer<'de>>(reader: D) -> Result<Self, D::Error> {
-        let name = String::deserialize(reader)?;
-        let known = Parameter::ALL.into_iter().find(|parameter| parameter.name() == name);
-        known.ok_or_else(|| D::Error::custom(format!("{name:?} is no parameter of the geometry")))
-    }
 }
 
 /// Number of parameters.
@@ -80,18 +68,6 @@ impl Parameter {
 
     /// Those of [`Law::Infall`] alone.
     pub const FLOW: [Parameter; 3] = [Parameter::Xi, Parameter::BetaR, Parameter::BetaPhi];
-
-    /// Its place in [`Geometry`].
-    pub fn index(self) -> usize {
-        match self {
-            Parameter::Spin => 0,
-            Parameter::Inclination => 1,
-            Parameter::PositionAngle => 2,
-            Parameter::Xi => 3,
-            Parameter::BetaR => 4,
-            Parameter::BetaPhi => 5,
-        }
-    }
 
     /// Its words in a sentence, and its unit, degrees for angles.
     pub fn label(self) -> (&'static str, &'static str) {
@@ -174,12 +150,12 @@ impl Geometry {
 
     /// Returns the value of a parameter.
     pub fn get(&self, parameter: Parameter) -> f64 {
-        self.0[parameter.index()]
+        self.0[parameter as usize]
     }
 
     /// The same with another value of a parameter.
     pub fn with(mut self, parameter: Parameter, value: f64) -> Self {
-        self.0[parameter.index()] = value;
+        self.0[parameter as usize] = value;
         self
     }
 
