@@ -13,7 +13,7 @@ mod training;
 mod transport;
 
 use crate::representation::{
-    Activation, Coordinates, Gradient, Grid, GridSettings, Groups, Representation, Workspace,
+    Activation, Coordinates, Gradient, Grid, GridSettings, Representation, Workspace,
 };
 pub(super) use blobs::Blobs;
 use kerrlight_common::simd::Float;

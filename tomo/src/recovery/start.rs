@@ -6,7 +6,7 @@ use super::search::weighed;
 use super::{Fit, Stopped};
 use crate::Error;
 use crate::fit::linear::{Ending, LinearProgress, LinearSolution};
-use crate::fit::scan::{AxisLoss, AxisProblem, AxisSettings, Effort, refine_axis, scan_axis};
+use crate::fit::scan::{AxisLoss, AxisProblem, AxisSettings, refine_axis, scan_axis};
 use crate::fit::settings::{AxisScan as AxisScanSettings, AxisSearch, FitFile, Kind, Start};
 use crate::fit::setup::{self, CoarseView, FitData, GridSpec, SolvedLeakage, WarmStart};
 use crate::fit::{Batch, Field, ForwardModel, Motion, State, Trainer};
@@ -14,15 +14,6 @@ use crate::representation::{Registry, Workspace};
 use core::ops::ControlFlow;
 use kerrlight_render::dynamics::Axis;
 use std::sync::{Mutex, PoisonError};
-
-/// First step of the refinement: half of what lattice points of 200 are apart by, and its halvings.
-const STEP: f64 = 0.06;
-const HALVINGS: usize = 3;
-
-/// Iterations of the refinement's grids: with few, a wrong axis is as good as the right one.
-fn fine(nodes: usize) -> Effort {
-    Effort { nodes, iterations: 40 }
-}
 
 /// The loss over the whole sphere of axes, and the best one.
 fn scan(
@@ -46,9 +37,8 @@ fn scan(
     let scan = view.search(motion, frames, whole)?.ok_or_else(stopped)?;
     let refined = refine.map(|nodes| -> Result<AxisLoss, Error> {
         let view = CoarseView::new(file, measured, file.screen.pixels)?;
-        let near = |problem: &AxisProblem<'_, f32>| {
-            refine_axis(problem, scan.best.axis, STEP, fine(nodes), HALVINGS, &watch)
-        };
+        let near =
+            |problem: &AxisProblem<'_, f32>| refine_axis(problem, scan.best.axis, nodes, &watch);
         view.search(motion, frames, near)?.ok_or_else(stopped)
     });
     Ok(FoundAxis { refined: refined.transpose()?, scan })

@@ -6,6 +6,7 @@
 
 use super::covariance::covariance;
 use super::problem::{Estimate, Free, GeometryProblem, bounded, crosses_pole};
+use super::quadratic_form::in_own_units;
 use super::{Geometry, Parameter};
 use crate::Error;
 use crate::fit::linear::{Profile, Voxels};
@@ -142,8 +143,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         let inverse = covariance(self.free, geometry, &bowl.bends, 1.0)
             // Callers ask for finite numbers to learn whether there is a covariance.
             .unwrap_or_else(|| DMatrix::from_diagonal_element(n, n, f64::INFINITY));
-        let scale = |k: usize| self.free[k].parameter.scale();
-        (0..n * n).map(|k| inverse[(k / n, k % n)] * scale(k / n) * scale(k % n)).collect()
+        in_own_units(self.free, &inverse)
     }
 
     /// Slope and second derivatives at a geometry with its best volume.

@@ -52,12 +52,11 @@ impl Surroundings<'_> {
         let Self { polished, reach, scatter, seen, .. } = self;
         // Where all lattices together are no bowl, the axes of the first one alone may be.
         let form = fitted(seen, problem.free.len()).unwrap_or_else(|| reach.form());
-        let trials = seen.iter().map(|seen| seen.values.len()).sum();
         let about = polished.best.geometry;
         let (columns, scatter) = (&reach.columns, scatter.as_ref());
         let found = problem.middle(about, &form, columns, scatter, inflation, reach.is_wide);
         let ripple = form.ripple;
-        found.map(|(geometry, covariance)| Envelope { geometry, covariance, ripple, trials })
+        found.map(|(geometry, covariance)| Envelope { geometry, covariance, ripple })
     }
 }
 

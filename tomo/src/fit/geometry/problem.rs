@@ -240,12 +240,9 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
 
     /// Number of data, each times the factor on its χ².
     pub fn data(&self) -> f64 {
-        let count = |term: &Weighted<'_, T>| -> usize {
-            self.frames.iter().map(|frame| term.term.degrees_of_freedom(*frame)).sum()
-        };
         // Beside a prior weights are bare factors; elsewhere they hold the number of data already.
         let of = |term: &Weighted<'_, T>| match self.gaussian {
-            Some(_) => term.weight * count(term) as f64,
+            Some(_) => term.weight * term.count(self.frames) as f64,
             None => term.weight,
         };
         self.terms.iter().map(of).sum()

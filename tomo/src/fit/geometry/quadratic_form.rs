@@ -23,8 +23,6 @@ pub struct Envelope {
     pub covariance: Vec<f64>,
     /// Standard deviation of the ripples, in units of the value.
     pub ripple: f64,
-    /// Geometries that were looked at.
-    pub trials: usize,
 }
 
 /// A part of a step that is not worth taking.

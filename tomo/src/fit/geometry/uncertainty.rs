@@ -17,8 +17,6 @@ pub struct Spread {
     pub correlation: Vec<f64>,
     /// Standard deviation of the values about the form: the ripples of χ²/2.
     pub ripple: f64,
-    /// Geometries that the form was fitted to.
-    pub trials: usize,
     /// Part of `sigma` that the model makes itself.
     pub own: ModelErrors,
 }
@@ -122,7 +120,6 @@ impl Spread {
             open: (0..n).map(|k| free[k].is_open(sigma(k) * unit(k))).collect(),
             correlation: correlation.collect(),
             ripple: form.ripple,
-            trials: taken.len(),
             own: ModelErrors::default(),
         })
     }
@@ -199,7 +196,6 @@ mod tests {
             open: vec![false, false],
             correlation: vec![1.0, 0.5, 0.5, 1.0],
             ripple: 0.0,
-            trials: 1,
             own: ModelErrors::default(),
         };
         let names = free.map(|free| free.parameter);

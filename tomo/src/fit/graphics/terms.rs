@@ -46,10 +46,4 @@ impl Objective<f32> {
         }
         model.pixel().iter().map(|pixel| of_image[*pixel as usize]).collect()
     }
-
-    /// Makes the loss of its terms.
-    pub(super) fn add_terms(&self, loss: &mut Loss) {
-        let weights = self.terms().map(|(_, weight)| weight);
-        loss.total = loss.terms.iter().zip(weights).map(|(term, weight)| term * weight).sum();
-    }
 }

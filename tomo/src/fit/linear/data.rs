@@ -13,6 +13,13 @@ pub struct Weighted<'a, T: Float> {
     pub term: &'a dyn FrameTerm<T>,
 }
 
+impl<T: Float> Weighted<'_, T> {
+    /// Real data in some frames.
+    pub(in crate::fit) fn count(&self, frames: &[usize]) -> usize {
+        frames.iter().map(|frame| self.term.degrees_of_freedom(*frame)).sum()
+    }
+}
+
 /// Terms over some frames: Σ weight · χ²/(number of real data in those frames).
 pub(super) struct Data<'a, T: Float> {
     terms: Vec<Weighted<'a, T>>,
@@ -42,10 +49,8 @@ impl<'a, T: Float> Data<'a, T> {
                 return range("weight of the data", *weight, "0 or above");
             }
         }
-        let count =
-            |term: &dyn FrameTerm<T>| frames.iter().map(|f| term.degrees_of_freedom(*f)).sum();
         let scaled = |data: &Weighted<'a, T>| -> Option<Weighted<'a, T>> {
-            let count: usize = count(data.term);
+            let count = data.count(frames);
             let weight = data.weight / count as f64;
             (count > 0 && weight > 0.0).then_some(Weighted { weight, term: data.term })
         };
@@ -53,15 +58,14 @@ impl<'a, T: Float> Data<'a, T> {
         if terms.is_empty() {
             return range("data in the frames", 0.0, "1 or more");
         }
-        let count = terms.iter().map(|data| count(data.term)).sum();
+        let count = terms.iter().map(|data| data.count(frames)).sum();
         Ok(Self { terms, count })
     }
 
     /// The same terms over the number of all data: Σ weight · χ²/data, in which a datum counts as its error says.
     pub fn together(mut self, frames: &[usize]) -> Self {
-        for Weighted { weight, term } in &mut self.terms {
-            let own: usize = frames.iter().map(|frame| term.degrees_of_freedom(*frame)).sum();
-            *weight *= own as f64 / self.count as f64;
+        for data in &mut self.terms {
+            data.weight *= data.count(frames) as f64 / self.count as f64;
         }
         self
     }

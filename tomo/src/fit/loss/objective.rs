@@ -26,6 +26,14 @@ pub struct Data<T> {
     pub others: Vec<Weighted<dyn FrameTerm<T>>>,
 }
 
+impl<T: Float> Data<T> {
+    /// All of them with their weights, the image first.
+    pub(in crate::fit) fn terms(&self) -> impl Iterator<Item = (&dyn FrameTerm<T>, f64)> {
+        let image = self.image.iter().map(|w| (&*w.term as &dyn FrameTerm<T>, w.weight));
+        image.chain(self.others.iter().map(|w| (&*w.term, w.weight)))
+    }
+}
+
 /// The loss of a selection, scaled to that of all data.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Loss {
@@ -95,8 +103,7 @@ pub struct Objective<T> {
 impl<T: Float> Objective<T> {
     /// Names of the kinds of data, in the order of [`Loss::terms`].
     pub fn names(&self) -> Vec<&str> {
-        let image = self.data.image.iter().map(|image| FrameTerm::<T>::name(&*image.term));
-        image.chain(self.data.others.iter().map(|other| other.term.name())).collect()
+        self.terms().map(|(term, _)| term.name()).collect()
     }
 
     /// Frames of which there are any data.
@@ -107,8 +114,7 @@ impl<T: Float> Objective<T> {
     }
 
     pub(in crate::fit) fn terms(&self) -> impl Iterator<Item = (&dyn FrameTerm<T>, f64)> {
-        let image = self.data.image.iter().map(|w| (&*w.term as &dyn FrameTerm<T>, w.weight));
-        image.chain(self.data.others.iter().map(|w| (&*w.term, w.weight)))
+        self.data.terms()
     }
 
     /// Real data of each kind in a typical frame times `frames`: what χ² is divided by.
@@ -232,9 +238,14 @@ impl<T: Float> Objective<T> {
             // All terms share the image: their slopes add up, and go back through the field once.
             self.back(field, gradients, buffers);
         }
+        self.add_terms(&mut loss);
+        loss
+    }
+
+    /// Makes the loss of its terms.
+    pub(in crate::fit) fn add_terms(&self, loss: &mut Loss) {
         let weights = self.terms().map(|(_, weight)| weight);
         loss.total = loss.terms.iter().zip(weights).map(|(term, weight)| term * weight).sum();
-        loss
     }
 
     /// One frame into `buffers.image`.

@@ -266,28 +266,33 @@ fn told_apart(map: &[AxisLoss]) -> Result<(), Error> {
     Err(LinearError::Alike { axes: map.len(), loss: least }.into())
 }
 
-/// The axis of least loss near one that is nearly right, by steps that are halved `halvings` times; none if the
-/// watch wanted no more. A finer grid and more pixels than those of the scan tell axes apart that it could not.
+/// First step of the refinement of an axis, rad: half of what lattice points of 200 are apart by.
+const STEP: f64 = 0.06;
+/// Iterations of its grids: with few, a wrong axis is as good as the right one.
+const ITERATIONS: usize = 40;
+
+/// The axis of least loss near one that is nearly right, on grids of so many nodes along each axis; none if the watch wanted
+/// no more. A finer grid and more pixels than those of the scan tell axes apart that it could not.
 ///
 /// # Errors
 /// If a number is out of its range, or data do not fit the rays.
 pub fn refine_axis(
     problem: &AxisProblem<'_, f32>,
     from: Axis,
-    step: f64,
-    effort: Effort,
-    halvings: usize,
+    nodes: usize,
     watch: &ScanWatch<'_>,
 ) -> Result<Option<AxisLoss>, Error> {
-    let settings = AxisSettings { fine: effort, halvings, ..AxisSettings::default() }.checked()?;
+    let fine = Effort { nodes, iterations: ITERATIONS };
+    let AxisSettings { fine: effort, halvings, .. } =
+        AxisSettings { fine, ..AxisSettings::default() }.checked()?;
     let scanner = Scanner {
         problem,
         watch,
         solved: AtomicUsize::new(0),
-        expected: 1 + 8 * (1 + settings.halvings),
+        expected: 1 + 8 * (1 + halvings),
         cancelled: AtomicBool::new(false),
     };
-    Refinement { scanner: &scanner, effort, halvings }.run(from, step)
+    Refinement { scanner: &scanner, effort, halvings }.run(from, STEP)
 }
 
 /// The best points that are not near better ones; one of the hemisphere opposite to the best is among them.

@@ -73,7 +73,7 @@ pub enum Negative {
     Dark,
 }
 
-fn cubic() -> Degree {
+pub(super) fn cubic() -> Degree {
     Degree::Cubic
 }
 

@@ -1,5 +1,6 @@
 //! Settings of the recovery.
 
+use super::gaussian::cubic;
 use super::{FieldKind, PriorOfVoxels};
 use crate::fit::BatchSize;
 use crate::representation::Degree;
@@ -158,9 +159,6 @@ pub struct AxisScan {
     pub last_rate: f64,
 }
 
-fn cubic() -> Degree {
-    Degree::Cubic
-}
 fn rounds() -> usize {
     4
 }

@@ -6,7 +6,7 @@ use crate::fit::linear::{
     Voxels, Watch, Weighted,
 };
 use crate::fit::settings::{FieldKind, FitFile, Kind, Linear, Start, Within};
-use crate::fit::{Data, FrameTerm, Objective};
+use crate::fit::{Data, Objective};
 use kerrlight_render::dynamics::Axis;
 
 /// Nodes along an axis from which on a coarser grid is solved first.
@@ -27,9 +27,7 @@ const GAIN: f64 = 0.1;
 
 /// All terms of the data, the image first.
 pub(super) fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
-    let image = data.image.iter().map(|w| (w.weight, &*w.term as &dyn FrameTerm<f32>));
-    let others = data.others.iter().map(|w| (w.weight, &*w.term));
-    image.chain(others).map(|(weight, term)| Weighted { weight, term }).collect()
+    data.terms().map(|(term, weight)| Weighted { weight, term }).collect()
 }
 
 /// Voxels and frames of a linear problem.

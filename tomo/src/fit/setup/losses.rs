@@ -218,4 +218,4 @@ impl FitData {
 type ScanData<T> = Box<dyn DataTerm<T> + Send>;
 
 /// Exponentials of a frame up to this many bytes are kept.
-const MEMORY: usize = 8 << 20;
+pub(super) const MEMORY: usize = 8 << 20;

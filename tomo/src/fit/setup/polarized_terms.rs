@@ -1,5 +1,6 @@
 //! Polarised visibilities as the terms of a loss.
 
+use super::losses::MEMORY;
 use super::{FitData, Result};
 use crate::fit::Scan;
 use crate::fit::settings::{Loss, LossKind};
@@ -7,9 +8,6 @@ use kerrlight_vlbi::data_terms::{DataTerm, PolarizedTerm, RatioTerm};
 use kerrlight_vlbi::operator::{Float, Method, Operator, Transform};
 use kerrlight_vlbi::polarimetry::MODELLED;
 use num_complex::Complex;
-
-/// Exponentials of a frame up to this many bytes are kept.
-const MEMORY: usize = 8 << 20;
 
 impl FitData {
     /// The products of a frame with what takes its images to their visibilities; none where nothing was measured.

@@ -86,19 +86,4 @@ impl Representation<f64> for Blobs {
             }
         }
     }
-
-    fn eval_vjp(
-        &self,
-        p: &[f64],
-        at: Coordinates<'_, f64>,
-        groups: Groups<'_, f64>,
-        values: &mut [f64],
-        gradient: Gradient<'_, f64>,
-        workspace: &mut Workspace,
-    ) {
-        self.eval(p, at, values, workspace);
-        let mut cotangents = vec![0.0; values.len()];
-        (groups.link)(0..groups.starts.len() - 1, values, &mut cotangents);
-        self.vjp(p, at, &cotangents, gradient, workspace);
-    }
 }

@@ -53,10 +53,6 @@ pub fn view(law: PolarizationLaw, screen: &[Vec<f64>; 2], degrees: f64) -> Polar
     }
 }
 
-pub fn evpa(stokes: &Stokes) -> f64 {
-    stokes.evpa()
-}
-
 /// The difference of two position angles.
 pub fn apart(a: f64, b: f64) -> f64 {
     let d = (a - b) / PI;

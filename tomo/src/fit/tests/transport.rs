@@ -1,6 +1,6 @@
 //! Polarised light of a fit's nodes against parallel transport that is integrated step by step.
 
-use super::stokes::{apart, evpa, law, traced, view};
+use super::stokes::{apart, law, traced, view};
 use crate::fit::Sightlines;
 use kerrlight_geodesic::vector::cross;
 use kerrlight_geodesic::{Dual, Kerr, Scalar};
@@ -137,7 +137,7 @@ fn exact_position_angles_are_those_of_parallel_transport() {
             let miss = (end[4] - s).hypot(end[5]).hypot(end[6] - c);
             assert!(miss < 1e-6, "the ray misses the observer by {miss}");
             let expected = (-f[1]).atan2(-c * f[0] + s * f[2]);
-            let found = evpa(&factors[node]);
+            let found = factors[node].evpa();
             assert!(apart(found, expected).abs() < 1e-6, "a = {spin}: {found} {expected}");
             compared += 1;
         }

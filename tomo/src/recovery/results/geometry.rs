@@ -171,7 +171,6 @@ impl GeometryResults {
             open: free.iter().map(open).collect::<Option<_>>()?,
             correlation,
             ripple: 0.0,
-            trials: 0,
             own: ModelErrors::default(),
         })
     }

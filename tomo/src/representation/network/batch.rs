@@ -39,6 +39,7 @@ pub enum Way<'a, T> {
 }
 
 /// Memory kept from batch to batch.
+#[derive(Default)]
 pub struct Memory<T> {
     packed: Packed<T>,
     tiles: Mutex<Vec<Tile<T>>>,
@@ -47,19 +48,12 @@ pub struct Memory<T> {
 }
 
 /// Activations of a batch that went forward, for its way back.
+#[derive(Default)]
 struct Recording<T> {
     /// Points of the batch, until it is used up.
     points: Option<usize>,
     /// Activations of the first tiles of each chunk.
     tiles: Vec<Vec<Activations<T>>>,
-}
-
-impl<T: Float + Default> Default for Memory<T> {
-    fn default() -> Self {
-        let recording = Recording { points: None, tiles: Vec::new() };
-        let (packed, tiles, partial) = (Packed::default(), Mutex::default(), Vec::new());
-        Self { packed, tiles, partial, recording }
-    }
 }
 
 impl<T: Float + Default> Recording<T> {

@@ -83,15 +83,4 @@ impl Matern {
     pub fn kappa(&self) -> f64 {
         (2.0 * self.roughness.nu()).sqrt() / self.correlation_length
     }
-
-    /// Covariance of two points this far apart (M), emission squared: σ² 2^(1−ν)/Γ(ν) (κ r)^ν K_ν(κ r), which is
-    /// elementary for these ν.
-    pub fn covariance(&self, distance: f64) -> f64 {
-        let x = self.kappa() * distance;
-        let polynomial = match self.roughness {
-            Roughness::Half => 1.0,
-            Roughness::FiveHalves => 1.0 + x + x * x / 3.0,
-        };
-        self.amplitude * self.amplitude * polynomial * (-x).exp()
-    }
 }

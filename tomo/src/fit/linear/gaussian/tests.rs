@@ -40,7 +40,8 @@ fn worst(roughness: Roughness, nodes: usize) -> f64 {
         let squares = steps.iter().map(|step| (step * far * step * far) as f64);
         let distance = squares.sum::<f64>().sqrt() * field.shape.spacing[0];
         let found = all[(x * nodes + y) * nodes + z];
-        ((found - law.covariance(distance)) / law.amplitude.powi(2)).abs()
+        let expected = roughness.correlation(distance / law.correlation_length);
+        (found / law.amplitude.powi(2) - expected).abs()
     };
     let ways = [[1, 0, 0], [0, 1, 1], [1, 1, 1], [2, 0, 1]];
     let all = ways.iter().flat_map(|steps| (1..=nodes / 8).map(|far| off(*steps, far)));

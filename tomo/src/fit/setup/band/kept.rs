@@ -58,11 +58,7 @@ fn geometry(next: &mut impl Iterator<Item = f64>) -> Option<BandGeometry> {
 fn of_band(band: &Band) -> [f64; 10] {
     let Band { radius, width, height, length, power, mean, background } = *band;
     let Background { constant, variation, minutes, roughness } = background;
-    let smooth = match roughness {
-        Roughness::Half => 0.5,
-        Roughness::FiveHalves => 2.5,
-    };
-    [radius, width, height, length, power, mean, constant, variation, minutes, smooth]
+    [radius, width, height, length, power, mean, constant, variation, minutes, roughness.nu()]
 }
 
 fn band(next: &mut impl Iterator<Item = f64>) -> Option<Band> {

@@ -56,9 +56,8 @@ pub(super) fn surely(
         geometry: polished.best.geometry,
         covariance: polished.covariance.iter().map(|x| x * inflation).collect(),
         ripple: 0.0,
-        trials: 1,
     });
-    let Envelope { geometry, covariance, ripple, trials } = envelope;
+    let Envelope { geometry, covariance, ripple } = envelope;
     let whole: Vec<f64> = (0..n).map(|k| covariance[k * n + k].sqrt()).collect();
     let correlation = (0..n * n).map(|k| covariance[k] / (whole[k / n] * whole[k % n]));
     let correlation = correlation.collect();
@@ -67,7 +66,7 @@ pub(super) fn surely(
     let sigma: Vec<f64> = sigma.collect();
     let open = problem.free.iter().zip(&sigma).map(|(free, sigma)| free.is_open(*sigma)).collect();
     let own = ModelErrors::default();
-    let spread = Spread { geometry, sigma, open, correlation, ripple, trials, own };
+    let spread = Spread { geometry, sigma, open, correlation, ripple, own };
     Ok(Sure { geometry, spread: Some(spread), reduced_chi2 })
 }
 

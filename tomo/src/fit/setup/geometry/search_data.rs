@@ -202,6 +202,5 @@ fn gaussian(prior: &PriorOfVoxels, voxels: &Voxels) -> Result<GaussianField> {
 
 /// Data with their weight times their number in some frames.
 pub(super) fn counted<'a>(term: Weighted<'a, f32>, frames: &[usize]) -> Weighted<'a, f32> {
-    let data: usize = frames.iter().map(|frame| term.term.degrees_of_freedom(*frame)).sum();
-    Weighted { weight: term.weight * data as f64, ..term }
+    Weighted { weight: term.weight * term.count(frames) as f64, ..term }
 }
