@@ -141,24 +141,36 @@ impl Occupancy {
 
     /// Marks cells that are bright enough, and their neighbours.
     pub(in crate::fit) fn mark(&mut self) {
-        let n = self.settings.cells;
         let peak = self.brightness.iter().fold(0.0f32, |peak, b| peak.max(*b));
         // As long as all is dark this is 0 and every cell counts: without any, nothing would be
         // evaluated, and nothing learnt.
         let least = (f64::from(peak) * self.settings.threshold) as f32;
-        let mut bright: Vec<bool> = self.brightness.iter().map(|b| *b >= least).collect();
-        // One axis after the other: three passes reach all 26 neighbours.
-        for stride in [1, n, n * n] {
+        let bright = self.brightness.iter().map(|b| *b >= least).collect();
+        self.occupied = dilated(bright, [self.settings.cells; 3], 1);
+    }
+}
+
+/// Marks what is not farther than this many cells or nodes along each axis, and knots in time.
+pub(in crate::fit) fn dilated(
+    mut marked: Vec<bool>,
+    [nx, ny, nz]: [usize; 3],
+    steps: usize,
+) -> Vec<bool> {
+    let count = marked.len();
+    let knots = count / (nx * ny * nz);
+    // One axis after the other: three passes of a step reach all 26 neighbours.
+    for (stride, n) in [(1, nz), (nz, ny), (ny * nz, nx), (nx * ny * nz, knots)] {
+        for _ in 0..steps {
             let spread = |k: usize| {
                 let place = k / stride % n;
-                bright[k]
-                    || (place > 0 && bright[k - stride])
-                    || (place + 1 < n && bright[k + stride])
+                marked[k]
+                    || (place > 0 && marked[k - stride])
+                    || (place + 1 < n && marked[k + stride])
             };
-            bright = (0..bright.len()).map(spread).collect();
+            marked = (0..count).map(spread).collect();
         }
-        self.occupied = bright;
     }
+    marked
 }
 
 /// Times at which a field is looked at: all of them at first, then [`LATER`] random ones, and the reference time where there

@@ -3,7 +3,6 @@
 use super::certificate::Certificate;
 use super::data::Data;
 use super::descent::{Descended, Ending};
-use super::nodes::dilated;
 use super::objective::{Objective, Penalised};
 use super::operator::Operator;
 use super::problem::LinearProblem;
@@ -11,6 +10,7 @@ use super::run::Run;
 use super::settings::LinearSettings;
 use super::solution::{Least, LinearProgress};
 use crate::Error;
+use crate::fit::forward::occupancy::dilated;
 use core::ops::ControlFlow;
 use kerrlight_common::simd::Float;
 

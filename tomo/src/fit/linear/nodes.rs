@@ -28,21 +28,3 @@ pub fn refined(from: &Voxels, x: &[f64], to: &Voxels) -> Result<Vec<f64>, Error>
     from.field()?.eval(x, Coordinates::xyz(&a, &b, &c), &mut values, &mut Workspace::new());
     Ok(values)
 }
-
-/// Marks what is not farther than this many nodes along each axis, and knots in time.
-pub(super) fn dilated(mut marked: Vec<bool>, [nx, ny, nz]: [usize; 3], steps: usize) -> Vec<bool> {
-    let count = marked.len();
-    let knots = count / (nx * ny * nz);
-    for (stride, n) in [(1, nz), (nz, ny), (ny * nz, nx), (nx * ny * nz, knots)] {
-        for _ in 0..steps {
-            let spread = |k: usize| {
-                let place = k / stride % n;
-                marked[k]
-                    || (place > 0 && marked[k - stride])
-                    || (place + 1 < n && marked[k + stride])
-            };
-            marked = (0..count).map(spread).collect();
-        }
-    }
-    marked
-}

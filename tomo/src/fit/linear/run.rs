@@ -5,7 +5,7 @@ use super::data::Data;
 use super::descent::{Descended, Descent, Each, Ending, Stop};
 use super::error::LinearError;
 use super::initial_fields::{InitialField, Spots, Trials};
-use super::nodes::{dilated, refined};
+use super::nodes::refined;
 use super::objective::{Objective, Penalised};
 use super::operator::Operator;
 use super::problem::LinearProblem;
@@ -14,6 +14,7 @@ use super::scaled::Scaled;
 use super::settings::{Coarse, LinearSettings};
 use super::solution::{LinearProgress, LinearSolution, Watch};
 use crate::Error;
+use crate::fit::forward::occupancy::dilated;
 use kerrlight_common::simd::Float;
 
 /// Values at the nodes, and which of them count.
