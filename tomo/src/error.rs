@@ -85,6 +85,16 @@ impl Error {
         Self::Render(RenderError::out_of_range(field, value, allowed))
     }
 
+    /// Refuses `value` of `field` unless it is `ok`, with the allowed range in words.
+    pub(crate) fn check(
+        field: &'static str,
+        value: f64,
+        ok: bool,
+        allowed: &'static str,
+    ) -> Result<(), Self> {
+        if ok { Ok(()) } else { Err(Self::out_of_range(field, value, allowed)) }
+    }
+
     /// The key or argument at fault, where it is a single one; a dotted path in scenes and settings.
     pub fn field(&self) -> Option<&str> {
         self.parts().0

@@ -20,16 +20,9 @@ impl LinearDecay {
     /// Names the number that is not.
     pub fn checked(self) -> Result<Self, Error> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
-        let whole = self.steps as f64;
-        for (field, value, ok, allowed) in [
-            ("from", self.from, positive(self.from), "above 0"),
-            ("to", self.to, self.to.is_finite() && self.to >= 0.0, "0 or above"),
-            ("steps", whole, self.steps > 0, "1 or more"),
-        ] {
-            if !ok {
-                return Err(Error::out_of_range(field, value, allowed));
-            }
-        }
+        Error::check("from", self.from, positive(self.from), "above 0")?;
+        Error::check("to", self.to, self.to.is_finite() && self.to >= 0.0, "0 or above")?;
+        Error::check("steps", self.steps as f64, self.steps > 0, "1 or more")?;
         Ok(self)
     }
 

@@ -47,15 +47,11 @@ impl Background {
     /// Itself, if its numbers are in their ranges.
     pub(super) fn checked(self) -> Result<Self, Error> {
         let ok = |x: f64| x >= 0.0 && x.is_finite();
-        for (field, value) in [("constant", self.constant), ("variation", self.variation)] {
-            if !ok(value) {
-                return Err(Error::out_of_range(field, value, "0 or above"));
-            }
-        }
-        match self.minutes > 0.0 && self.minutes.is_finite() {
-            true => Ok(self),
-            false => Err(Error::out_of_range("minutes", self.minutes, "above 0")),
-        }
+        Error::check("constant", self.constant, ok(self.constant), "0 or above")?;
+        Error::check("variation", self.variation, ok(self.variation), "0 or above")?;
+        let lasts = self.minutes > 0.0 && self.minutes.is_finite();
+        Error::check("minutes", self.minutes, lasts, "above 0")?;
+        Ok(self)
     }
 
     /// One that is drawn at some times (minutes), from numbers of a normal distribution: as many.

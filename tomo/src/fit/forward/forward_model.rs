@@ -291,10 +291,8 @@ pub struct Field<'a, T> {
 
 fn check(motion: &Motion, redshift: Option<Redshift>) -> Result<(), Error> {
     motion.velocity.clone().checked()?;
-    let finite = |field, value: f64| {
-        let allowed = "a finite number";
-        if value.is_finite() { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
-    };
+    let finite =
+        |field, value: f64| Error::check(field, value, value.is_finite(), "a finite number");
     finite("reference time", motion.reference)?;
     motion.injection.map_or(Ok(()), |injection| finite("injection time", injection.time))?;
     redshift.map_or(Ok(()), |shift| finite("redshift power", shift.power))?;

@@ -30,15 +30,9 @@ impl Region {
     /// Names the number that is not.
     pub fn checked(self) -> Result<Self, Error> {
         let Region { r_min, r_max, z_width } = self;
-        for (field, value, ok, allowed) in [
-            ("r_min", r_min, r_min.is_finite() && r_min >= 0.0, "0 or above"),
-            ("r_max", r_max, r_max.is_finite() && r_max > r_min, "above r_min"),
-            ("z_width", z_width, z_width > 0.0, "above 0"),
-        ] {
-            if !ok {
-                return Err(Error::out_of_range(field, value, allowed));
-            }
-        }
+        Error::check("r_min", r_min, r_min.is_finite() && r_min >= 0.0, "0 or above")?;
+        Error::check("r_max", r_max, r_max.is_finite() && r_max > r_min, "above r_min")?;
+        Error::check("z_width", z_width, z_width > 0.0, "above 0")?;
         Ok(self)
     }
 

@@ -37,9 +37,7 @@ impl Change {
     /// Names the number that is not.
     pub fn checked(self) -> Result<Self, Error> {
         let Knots { count, spacing, .. } = self.knots;
-        let check = |field, value: f64, ok, allowed| {
-            if ok { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
-        };
+        let check = Error::check;
         check("knots", count as f64, count > 0, "1 or more")?;
         check("spacing of knots", spacing, spacing > 0.0 && spacing.is_finite(), "above 0")?;
         let weight = self.weight;

@@ -126,9 +126,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
 
     pub(super) fn check(&self, settings: &LinearSettings) -> Result<(), Error> {
         let LinearProblem { upper, flux, .. } = *self;
-        let check = |field, value: f64, ok, allowed| {
-            if ok { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
-        };
+        let check = Error::check;
         self.voxels.field()?;
         self.change.checked()?;
         self.gaussian.map_or(Ok(()), |gaussian| self.check_prior(gaussian.count()))?;

@@ -45,9 +45,7 @@ impl Quiescent {
     /// # Errors
     /// Names the number that is not.
     pub fn checked(self) -> Result<Self, Error> {
-        let check = |field, value: f64, ok, allowed| {
-            if ok { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
-        };
+        let check = Error::check;
         let positive = |x: f64| x > 0.0 && x.is_finite();
         check("quiescent pixels", self.pixels as f64, self.pixels > 0, "1 or more")?;
         check("quiescent upper", self.upper, positive(self.upper), "above 0")?;

@@ -110,9 +110,8 @@ pub fn lattice(directions: usize) -> Vec<Axis> {
 
 impl AxisSettings {
     fn checked(self) -> Result<Self, Error> {
-        let check = |field, value: usize, ok, allowed| {
-            if ok { Ok(()) } else { Err(Error::out_of_range(field, value as f64, allowed)) }
-        };
+        let check =
+            |field, value: usize, ok, allowed| Error::check(field, value as f64, ok, allowed);
         check("directions", self.directions, self.directions >= 8, "8 or more")?;
         check("candidates", self.candidates, self.candidates >= 2, "2 or more")?;
         for Effort { nodes, iterations } in [self.coarse, self.fine] {

@@ -36,22 +36,13 @@ impl Glyph {
         let GlyphShape { letter, center, height, thickness, softness, amplitude } = *shape;
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let up = across(center, axis);
-        for (field, value, ok, allowed) in [
-            ("height", height, positive(height), "above 0"),
-            ("thickness", thickness, positive(thickness), "above 0"),
-            (
-                "softness",
-                softness,
-                positive(softness) && softness <= height,
-                "above 0, at most height",
-            ),
-            ("amplitude", amplitude, amplitude >= 0.0 && amplitude.is_finite(), "0 or above"),
-            ("distance of center from the axis", 0.0, up.is_some(), "above 0"),
-        ] {
-            if !ok {
-                return Err(Error::out_of_range(field, value, allowed));
-            }
-        }
+        let check = Error::check;
+        check("height", height, positive(height), "above 0")?;
+        check("thickness", thickness, positive(thickness), "above 0")?;
+        let is_soft = positive(softness) && softness <= height;
+        check("softness", softness, is_soft, "above 0, at most height")?;
+        check("amplitude", amplitude, amplitude >= 0.0 && amplitude.is_finite(), "0 or above")?;
+        check("distance of center from the axis", 0.0, up.is_some(), "above 0")?;
         let no_letter = Error::out_of_range(
             "letter",
             f64::from(u32::from(letter)),

@@ -70,9 +70,7 @@ impl FeatureGrid {
     /// # Errors
     /// If a number is out of its range.
     pub fn new(settings: FeatureGridSettings) -> Result<Self, Error> {
-        let check = |field, value, ok, allowed| {
-            if ok { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
-        };
+        let check = Error::check;
         let FeatureGridSettings { coarsest, levels, low, high, .. } = &settings;
         check("levels", *levels as f64, (1..=6).contains(levels), "1 to 6")?;
         let finest = coarsest.saturating_mul(1 << (levels - 1));

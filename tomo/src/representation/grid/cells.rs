@@ -25,12 +25,8 @@ pub struct Geometry<T> {
 /// Checks that a box has finite corners, the second above the first.
 pub fn check_box(low: [f64; 3], high: [f64; 3]) -> Result<(), Error> {
     for (low, high) in low.into_iter().zip(high) {
-        if !low.is_finite() {
-            return Err(Error::out_of_range("low", low, "a finite number"));
-        }
-        if !(high.is_finite() && high > low) {
-            return Err(Error::out_of_range("high", high, "above low"));
-        }
+        Error::check("low", low, low.is_finite(), "a finite number")?;
+        Error::check("high", high, high.is_finite() && high > low, "above low")?;
     }
     Ok(())
 }

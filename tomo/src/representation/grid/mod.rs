@@ -50,9 +50,7 @@ impl Grid {
     /// # Errors
     /// If a number is out of its range.
     pub fn new(settings: GridSettings) -> Result<Self, Error> {
-        let check = |field, value, ok, allowed| {
-            if ok { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
-        };
+        let check = Error::check;
         for nodes in settings.nodes {
             check("nodes", nodes as f64, (2..=2048).contains(&nodes), "2 to 2048 along each axis")?;
         }

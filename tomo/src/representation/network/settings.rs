@@ -75,6 +75,7 @@ impl NetworkSettings {
     }
 
     pub(super) fn check(&self) -> Result<(), Error> {
+        let check = Error::check;
         let whole = |field, value: usize, low, high, allowed| {
             let ok = (low..=high).contains(&value);
             check(field, value as f64, ok, allowed)
@@ -93,8 +94,4 @@ impl NetworkSettings {
         check("time_span", span, positive(span), "above 0")?;
         check("shift", self.shift, self.shift.is_finite(), "a finite number")
     }
-}
-
-fn check(field: &'static str, value: f64, ok: bool, allowed: &'static str) -> Result<(), Error> {
-    if ok { Ok(()) } else { Err(Error::out_of_range(field, value, allowed)) }
 }

@@ -52,19 +52,16 @@ impl Spline {
         degree: Degree,
     ) -> Result<Self, Error> {
         for count in nodes {
-            if !(degree.taps()..=2048).contains(&count) {
-                let allowed = match degree {
-                    Degree::Linear => "2 to 2048 along each axis",
-                    Degree::Quadratic => "3 to 2048 along each axis",
-                    Degree::Cubic => "4 to 2048 along each axis",
-                };
-                return Err(Error::out_of_range("nodes", count as f64, allowed));
-            }
+            let allowed = match degree {
+                Degree::Linear => "2 to 2048 along each axis",
+                Degree::Quadratic => "3 to 2048 along each axis",
+                Degree::Cubic => "4 to 2048 along each axis",
+            };
+            let ok = (degree.taps()..=2048).contains(&count);
+            Error::check("nodes", count as f64, ok, allowed)?;
         }
         let total: usize = nodes.iter().product();
-        if total > 1 << 30 {
-            return Err(Error::out_of_range("nodes", total as f64, "2^30 in all"));
-        }
+        Error::check("nodes", total as f64, total <= 1 << 30, "2^30 in all")?;
         super::grid::cells::check_box(low, high)?;
         let spacing = |k: usize| (high[k] - low[k]) / (nodes[k] - 1) as f64;
         let per_length = [0, 1, 2].map(|k| 1.0 / spacing(k));

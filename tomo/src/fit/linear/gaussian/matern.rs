@@ -62,20 +62,10 @@ impl Matern {
     /// Names the number that is not.
     pub fn checked(self) -> Result<Self, Error> {
         let positive = |x: f64| x > 0.0 && x.is_finite();
-        for (field, value, ok, allowed) in [
-            ("mean", self.mean, self.mean.is_finite(), "a finite number"),
-            ("amplitude", self.amplitude, positive(self.amplitude), "above 0"),
-            (
-                "correlation_length",
-                self.correlation_length,
-                positive(self.correlation_length),
-                "M above 0",
-            ),
-        ] {
-            if !ok {
-                return Err(Error::out_of_range(field, value, allowed));
-            }
-        }
+        let Self { mean, amplitude, correlation_length: length, .. } = self;
+        Error::check("mean", mean, mean.is_finite(), "a finite number")?;
+        Error::check("amplitude", amplitude, positive(amplitude), "above 0")?;
+        Error::check("correlation_length", length, positive(length), "M above 0")?;
         Ok(self)
     }
 
