@@ -28,6 +28,14 @@ impl<'a, T> Coordinates<'a, T> {
         Self { columns: [t, x, y, z], dimension: 4 }
     }
 
+    /// Points in space, and in time where the dimension is 4.
+    ///
+    /// # Panics
+    /// If the columns are of different length.
+    pub fn of(dimension: usize, t: &'a [T], [x, y, z]: [&'a [T]; 3]) -> Self {
+        if dimension == 4 { Self::txyz(t, x, y, z) } else { Self::xyz(x, y, z) }
+    }
+
     /// The columns, as many as there are dimensions.
     pub fn columns(&self) -> &[&'a [T]] {
         &self.columns[..self.dimension]
@@ -82,6 +90,14 @@ impl<'a, T> CoordinatesMut<'a, T> {
     pub fn txyz(t: &'a mut [T], x: &'a mut [T], y: &'a mut [T], z: &'a mut [T]) -> Self {
         assert!(t.len() == x.len() && x.len() == y.len() && y.len() == z.len());
         Self { columns: [t, x, y, z], dimension: 4 }
+    }
+
+    /// Takes points in space, and in time where the dimension is 4.
+    ///
+    /// # Panics
+    /// If the columns are of different length.
+    pub fn of(dimension: usize, t: &'a mut [T], [x, y, z]: [&'a mut [T]; 3]) -> Self {
+        if dimension == 4 { Self::txyz(t, x, y, z) } else { Self::xyz(x, y, z) }
     }
 
     /// The columns, as many as there are dimensions.

@@ -111,7 +111,7 @@ impl<'a> Run<'a> {
 
 fn coordinates(columns: &[Vec<f32>; 4], dimension: usize) -> Coordinates<'_, f32> {
     let [x, y, z, t] = columns;
-    if dimension == 4 { Coordinates::txyz(t, x, y, z) } else { Coordinates::xyz(x, y, z) }
+    Coordinates::of(dimension, t, [x, y, z])
 }
 
 /// A name, what it names, and its operations a point.

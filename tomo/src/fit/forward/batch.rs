@@ -200,10 +200,7 @@ impl<T: Float> Batch<T> {
     ) -> Coordinates<'a, T> {
         let carried = representation.is_carried();
         let [x, y, z] = if carried { &columns.pulled } else { &columns.position };
-        match representation.dimension() {
-            4 => Coordinates::txyz(&columns.time, x, y, z),
-            _ => Coordinates::xyz(x, y, z),
-        }
+        Coordinates::of(representation.dimension(), &columns.time, [x, y, z])
     }
 }
 

@@ -109,10 +109,7 @@ impl Occupancy {
         self.brightness.iter_mut().for_each(|b| *b = (f64::from(*b) * memory) as f32);
         for time in looks(times, is_new, &mut random) {
             let time = vec![T::of(time); x.len()];
-            let at = match representation.dimension() {
-                4 => Coordinates::txyz(&time, x, y, z),
-                _ => Coordinates::xyz(x, y, z),
-            };
+            let at = Coordinates::of(representation.dimension(), &time, [x, y, z]);
             representation.eval(parameters, at, &mut values, workspace);
             let pairs = self.brightness.iter_mut().zip(&values);
             pairs.for_each(|(b, value)| *b = b.max(value.double() as f32));

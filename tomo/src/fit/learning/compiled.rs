@@ -107,16 +107,13 @@ impl<T: Float> Trainer<'_, T> {
         points: [&[T]; 3],
     ) -> Vec<T> {
         let matter = motion.matter(now.axis, time, points);
-        let [x, y, z] = match self.representation.is_carried() {
+        let points = match self.representation.is_carried() {
             true => [0, 1, 2].map(|c| matter[c].as_slice()),
             false => points,
         };
-        let times = vec![T::of(time); x.len()];
-        let at = match self.representation.dimension() {
-            4 => Coordinates::txyz(&times, x, y, z),
-            _ => Coordinates::xyz(x, y, z),
-        };
-        let mut values = vec![T::zero(); x.len()];
+        let times = vec![T::of(time); points[0].len()];
+        let at = Coordinates::of(self.representation.dimension(), &times, points);
+        let mut values = vec![T::zero(); times.len()];
         let workspace = self.buffers.workspace();
         self.representation.eval(&now.parameters, at, &mut values, workspace);
         values

@@ -83,10 +83,7 @@ impl<T: Float> Buffers<T> {
         [x, y, z]: [&[T]; 3],
     ) -> Vec<T> {
         let (time, mut values) = (vec![T::zero(); x.len()], vec![T::zero(); x.len()]);
-        let at = match representation.dimension() {
-            4 => Coordinates::txyz(&time, x, y, z),
-            _ => Coordinates::xyz(x, y, z),
-        };
+        let at = Coordinates::of(representation.dimension(), &time, [x, y, z]);
         representation.eval(parameters, at, &mut values, &mut self.workspace);
         values
     }
@@ -317,10 +314,7 @@ fn wanted<T: Float>(
         column.resize(points, T::zero());
     }
     let [x, y, z, t] = columns;
-    Some(match dimension {
-        4 => CoordinatesMut::txyz(t, x, y, z),
-        _ => CoordinatesMut::xyz(x, y, z),
-    })
+    Some(CoordinatesMut::of(dimension, t, [x, y, z]))
 }
 
 /// Adds the gradient of the axis by way of the points; a field of events has none.

@@ -179,10 +179,7 @@ impl Draw {
     /// The points as a representation takes them.
     fn at(&self, representation: &dyn Representation<f32>) -> Coordinates<'_, f32> {
         let [time, x, y, z] = &self.columns;
-        match representation.dimension() {
-            4 => Coordinates::txyz(time, x, y, z),
-            _ => Coordinates::xyz(x, y, z),
-        }
+        Coordinates::of(representation.dimension(), time, [x, y, z])
     }
 
     /// Adds the gradient of the mean square difference.
