@@ -13,7 +13,7 @@ use kerrlight_vlbi::polarimetry::LeakageTable;
 /// Position of a fit in its work.
 #[derive(Clone, Copy)]
 #[non_exhaustive]
-pub enum At<'a> {
+pub enum At {
     /// The search for the geometry.
     Geometry {
         /// Number of the search, from 0.
@@ -32,7 +32,7 @@ pub enum At<'a> {
     /// Axes that were compared, of about so many.
     Axis(usize, usize),
     /// The linear problem.
-    Linear(&'a LinearProgress<'a>),
+    Linear(LinearProgress),
     /// Steps that were taken.
     Step(u64),
 }
@@ -78,7 +78,7 @@ pub type Resumed = (State<f32>, Option<LeakageTable>);
 /// nothing unless it is overridden.
 pub trait Progress: Send {
     /// Told how far the fit has come; `false` stops it.
-    fn goes_on(&mut self, _: At<'_>) -> bool {
+    fn goes_on(&mut self, _: At) -> bool {
         true
     }
 

@@ -98,9 +98,9 @@ fn solve_linear(
     let told = Mutex::new(&mut *progress);
     let tell = |event: Event<'_>| told.lock().unwrap_or_else(PoisonError::into_inner).found(event);
     let images = || -> Result<Vec<f32>, Error> {
-        let mut watch = |now: &LinearProgress<'_>| {
+        let mut watch = |now: &LinearProgress| {
             let mut progress = told.lock().unwrap_or_else(PoisonError::into_inner);
-            match progress.goes_on(At::Linear(now)) {
+            match progress.goes_on(At::Linear(*now)) {
                 true => ControlFlow::Continue(()),
                 false => ControlFlow::Break(()),
             }

@@ -31,7 +31,7 @@ struct Stopping {
 }
 
 impl Progress for Stopping {
-    fn goes_on(&mut self, at: At<'_>) -> bool {
+    fn goes_on(&mut self, at: At) -> bool {
         !matches!(at, At::Step(step) if step >= self.after)
     }
 

@@ -119,7 +119,7 @@ fn begin(
         Start::Linear { nodes, stride, steps, .. } => (nodes, stride, steps),
         _ => return Ok(true),
     };
-    let mut watch = |now: &LinearProgress<'_>| {
+    let mut watch = |now: &LinearProgress| {
         told(&format!("linear grid, round {}, loss {:.4e}", now.round, now.value));
         if keeper.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };

@@ -47,7 +47,7 @@ fn asked_for(RaySampling { per_side, ring, panels, .. }: RaySampling) -> String 
 }
 
 /// Names what goes on.
-fn name(at: At<'_>) -> &'static str {
+fn name(at: At) -> &'static str {
     match at {
         At::Geometry { .. } => "geometry",
         At::Band(_) => "band",
@@ -78,7 +78,7 @@ impl<'a> Kept<'a> {
     }
 
     /// Returns the guard that stops work of this kind.
-    fn keeper(&self, at: At<'_>) -> SignalGuard {
+    fn keeper(&self, at: At) -> SignalGuard {
         match at {
             At::Step(_) => {
                 SignalGuard::saving("stopping after this step; a second signal quits at once")
@@ -93,7 +93,7 @@ impl<'a> Kept<'a> {
         }
     }
 
-    fn bar(&self, at: At<'_>) -> ProgressBar {
+    fn bar(&self, at: At) -> ProgressBar {
         let settings = &self.problem.settings;
         match at {
             At::Geometry { .. } => {
@@ -116,7 +116,7 @@ impl<'a> Kept<'a> {
         }
     }
 
-    fn shows(&self, at: At<'_>, bar: &ProgressBar) {
+    fn shows(&self, at: At, bar: &ProgressBar) {
         let settings = &self.problem.settings;
         match at {
             At::Geometry { search, of, trials, least } => {
@@ -250,7 +250,7 @@ impl<'a> Kept<'a> {
 }
 
 impl Progress for Kept<'_> {
-    fn goes_on(&mut self, at: At<'_>) -> bool {
+    fn goes_on(&mut self, at: At) -> bool {
         let (keeper, bar) = match self.work.take() {
             Some((keeper, Some((kind, bar)))) if kind == name(at) => (keeper, bar),
             // Work that was announced has its guard already; its bar begins now.

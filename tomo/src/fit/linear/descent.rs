@@ -48,8 +48,8 @@ impl RecentValues {
     }
 }
 
-/// Told the value and the numbers after each iteration.
-pub(super) type Each<'a> = dyn FnMut(f64, &[f64]) -> ControlFlow<()> + 'a;
+/// Told the value after each iteration.
+pub(super) type Each<'a> = dyn FnMut(f64) -> ControlFlow<()> + 'a;
 
 /// Result of a descent.
 pub(super) struct Descended {
@@ -100,11 +100,6 @@ impl<'a, 'b> Descent<'a, 'b> {
         Parts { free, leaving }
     }
 
-    fn tell(&mut self) -> ControlFlow<()> {
-        let x = self.problem.to(&self.y);
-        (self.each)(self.value, &x)
-    }
-
     fn look(&mut self) {
         self.value = self.problem.value_and_gradient(&self.y, &mut self.gradient);
     }
@@ -143,7 +138,7 @@ impl<'a, 'b> Descent<'a, 'b> {
                 continue;
             }
             pairs.push(difference(&self.y, &y), difference(&self.gradient, &gradient));
-            if self.tell().is_break() {
+            if (self.each)(self.value).is_break() {
                 return Ending::Cancelled;
             }
         }

@@ -111,7 +111,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let settings = settling();
         // Prices change from round to round, nodes do not: the matrix is made once.
         let operator = Operator::new(self.walk(), active, self.frames, settings.memory);
-        let mut watch = |_: &LinearProgress<'_>| ControlFlow::Continue(());
+        let mut watch = |_: &LinearProgress| ControlFlow::Continue(());
         let mut run = Run::new(self, &settings, &mut watch);
         let mut inner = operator.active.gather(&first.x);
         let mut value = first.value;
@@ -145,7 +145,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         iterations: usize,
     ) -> Result<Round, Error> {
         let settings = settling();
-        let mut watch = |_: &LinearProgress<'_>| ControlFlow::Continue(());
+        let mut watch = |_: &LinearProgress| ControlFlow::Continue(());
         let mut run = Run::new(self, &settings, &mut watch);
         let active = self.active(is_active);
         let operator = Operator::new(self.walk(), active, self.frames, settings.memory);

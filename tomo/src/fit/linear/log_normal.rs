@@ -178,23 +178,12 @@ impl<T: Float + Default> Posterior<'_, '_, T> {
                 Step::Taken { value, .. } => place.value = value,
                 Step::NoDescent | Step::NotFinite => return Ending::Rounding,
             }
-            if self.tell(place, watch).is_break() {
+            let (evaluations, nodes) = (self.objective.evaluations, place.white.len());
+            let now = LinearProgress { round: 1, evaluations, value: place.value, nodes };
+            if watch(&now).is_break() {
                 return Ending::Cancelled;
             }
         }
         Ending::Exhausted
-    }
-
-    fn tell(&self, place: &Place, watch: &mut Watch<'_>) -> core::ops::ControlFlow<()> {
-        let (operator, x) = (self.objective.operator, self.emission(&place.white));
-        watch(&LinearProgress {
-            round: 1,
-            evaluations: self.objective.evaluations,
-            value: place.value,
-            nodes: x.len(),
-            entries: operator.entries(),
-            active: &operator.active,
-            x: &x,
-        })
     }
 }

@@ -122,18 +122,10 @@ impl<'a, T: Float + Default> Operator<'a, T> {
 
     /// Bytes of the rows that are kept.
     pub fn bytes(&self) -> usize {
-        self.kept().map(Rows::bytes).sum()
-    }
-
-    /// Entries of the rows that are kept.
-    pub fn entries(&self) -> usize {
-        self.kept().map(|rows| rows.entries.len()).sum()
-    }
-
-    fn kept(&self) -> impl Iterator<Item = &Rows<T>> {
-        self.rows.iter().filter_map(|held| match held {
-            Held::Kept(rows) => Some(rows),
-            Held::Made | Held::Walked => None,
-        })
+        let of = |held: &Held<T>| match held {
+            Held::Kept(rows) => rows.bytes(),
+            Held::Made | Held::Walked => 0,
+        };
+        self.rows.iter().map(of).sum()
     }
 }

@@ -116,14 +116,13 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         x: &[f64],
         iterations: usize,
     ) -> Descended {
-        let (active, entries) = (&objective.operator.active, objective.operator.entries());
+        let nodes = objective.operator.active.count();
         let (round, before) = (self.round, self.evaluations);
         let mut iteration = 0;
         let watch = &mut *self.watch;
-        let mut each = |value: f64, x: &[f64]| {
+        let mut each = |value: f64| {
             iteration += 1;
-            let (evaluations, nodes) = (before + iteration, active.count());
-            watch(&LinearProgress { round, evaluations, value, nodes, entries, active, x })
+            watch(&LinearProgress { round, evaluations: before + iteration, value, nodes })
         };
         let each: &mut Each<'_> = &mut each;
         let LinearSettings { tolerance, settled, .. } = *self.settings;

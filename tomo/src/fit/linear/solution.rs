@@ -1,13 +1,13 @@
 //! Progress and result of a solution.
 
-use super::active::Active;
 use super::certificate::{Certificate, Stationarity};
 use super::descent::Ending;
 use core::ops::ControlFlow;
 use kerrlight_common::simd::Float;
 
 /// State of a solution while iterations go on.
-pub struct LinearProgress<'a> {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinearProgress {
     /// 0: the coarse problem.
     pub round: usize,
     /// Values, gradients and products so far.
@@ -16,19 +16,6 @@ pub struct LinearProgress<'a> {
     pub value: f64,
     /// Nodes that count.
     pub nodes: usize,
-    /// Entries of the sparse matrix.
-    pub entries: usize,
-    pub(super) active: &'a Active,
-    pub(super) x: &'a [f64],
-}
-
-impl LinearProgress<'_> {
-    /// Emission at all nodes of the grid (of the coarse one, in round 0), knot after knot.
-    pub fn emission(&self) -> Vec<f64> {
-        let mut all = self.active.expand(self.x);
-        all.truncate(all.len() - self.active.beside);
-        all
-    }
 }
 
 /// A solution.
@@ -71,4 +58,4 @@ pub struct Least {
 }
 
 /// Told how it goes, says whether to go on.
-pub type Watch<'a> = dyn FnMut(&LinearProgress<'_>) -> ControlFlow<()> + 'a;
+pub type Watch<'a> = dyn FnMut(&LinearProgress) -> ControlFlow<()> + 'a;

@@ -88,7 +88,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let operator = Operator::new(self.walk(), self.all(), self.frames, settings.memory);
         let terms = self.penalised(&data);
         let mut objective = Objective::new(&operator, &data, &terms);
-        let mut watch = |_: &LinearProgress<'_>| ControlFlow::Continue(());
+        let mut watch = |_: &LinearProgress| ControlFlow::Continue(());
         let mut run = Run::new(self, &settings, &mut watch);
         if start.is_none() && !data.is_convex() {
             let lit = run.lit(&mut objective, Trials { iterations, ..FEW })?;

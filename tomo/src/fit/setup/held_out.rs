@@ -74,7 +74,7 @@ pub fn hold_out(
                 continue;
             }
             let file = held_out.setting.put(file.clone(), held.value);
-            let mut told = |_: &LinearProgress<'_>| match watch(k, fold) {
+            let mut told = |_: &LinearProgress| match watch(k, fold) {
                 true => ControlFlow::Continue(()),
                 false => ControlFlow::Break(()),
             };

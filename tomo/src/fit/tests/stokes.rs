@@ -308,7 +308,7 @@ fn exact_fluxes_are_sums_of_images() {
         tolerance: 0.0,
         ..LinearSettings::default()
     };
-    let mut watch = |_: &LinearProgress<'_>| core::ops::ControlFlow::Continue(());
+    let mut watch = |_: &LinearProgress| core::ops::ControlFlow::Continue(());
     let found = problem.solve(&settings, &mut watch).unwrap();
     let certificate = found.certificate.unwrap();
     assert!(certificate.value < 1e-6 * certificate.dark, "{certificate:?}");

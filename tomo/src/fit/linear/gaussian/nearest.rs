@@ -29,7 +29,7 @@ impl GaussianField {
         let start: Vec<f64> = draw.iter().map(|x| x.clamp(0.0, upper)).collect();
         let about = self.clone().about(draw);
         let mut problem = &about;
-        let mut each = |_: f64, _: &[f64]| ControlFlow::Continue(());
+        let mut each = |_: f64| ControlFlow::Continue(());
         let descent = Descent::new(Scaled::new(&mut problem, upper), &start, &mut each);
         descent.run(ENOUGH).x
     }
