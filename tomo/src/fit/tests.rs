@@ -152,12 +152,11 @@ impl Case<'_> {
         self.objective.model.weigh(axis);
         let representation = self.representation;
         let field = Field { representation, parameters, axis, occupancy: None };
-        let pairs = pairs(&self.objective.model);
-        let selection =
-            if self.pixels { Selection::Pixels(&pairs) } else { Selection::Frames(&[0, 1, 3, 2]) };
-        self.objective
-            .value_and_gradient(field, selection, gradients, &mut Buffers::default())
-            .total
+        let drawn = match self.pixels {
+            true => Drawn::Pixels(pairs(&self.objective.model)),
+            false => Drawn::Frames(vec![0, 1, 3, 2]),
+        };
+        self.objective.value_and_gradient(field, &drawn, gradients, &mut Buffers::default()).total
     }
 
     fn value(&mut self, parameters: &[f64], axis: Axis) -> f64 {

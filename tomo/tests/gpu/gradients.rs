@@ -5,8 +5,8 @@ use super::problem::{self, Kind, axis, objective, start, training};
 use kerrlight_render::dynamics::Axis;
 use kerrlight_tomo::fit::graphics::GraphicsFit;
 use kerrlight_tomo::fit::{
-    BatchSize, Buffers, Drawn, Field, Gradients, Loss, Objective, Occupancy, Progress, Selection,
-    StepDevice, Stretch, Training,
+    BatchSize, Buffers, Drawn, Field, Gradients, Loss, Objective, Occupancy, Progress, StepDevice,
+    Stretch, Training,
 };
 use kerrlight_tomo::representation::{Activation, Representation, Workspace};
 
@@ -62,12 +62,8 @@ impl<'a> Both<'a> {
         let learns = self.training.learns_axis(representation);
         let gradients =
             Gradients { parameters: &mut gradient, axis: learns.then_some(&mut of_axis) };
-        let selection = match &self.draw {
-            Drawn::Pixels(pairs) => Selection::Pixels(pairs),
-            Drawn::Frames(frames) => Selection::Frames(frames),
-        };
         let buffers = &mut Buffers::default();
-        let loss = self.objective.value_and_gradient(field, selection, gradients, buffers);
+        let loss = self.objective.value_and_gradient(field, &self.draw, gradients, buffers);
         (loss, gradient, of_axis)
     }
 

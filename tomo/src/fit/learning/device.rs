@@ -8,6 +8,7 @@ use super::state::Progress;
 use crate::Error;
 use crate::fit::forward::occupancy::Occupancy;
 use crate::fit::loss::objective::{Loss, Objective};
+use crate::fit::loss::selection::Drawn;
 use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::Axis;
 
@@ -15,15 +16,6 @@ use kerrlight_render::dynamics::Axis;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct DeviceError(pub String);
-
-/// Data of a step.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Drawn {
-    /// (ray, frame) pairs of images.
-    Pixels(Vec<(u32, u32)>),
-    /// Whole frames, of all data.
-    Frames(Vec<usize>),
-}
 
 /// Some steps in a row, of which the settings are the same.
 pub struct Stretch<'a, T> {

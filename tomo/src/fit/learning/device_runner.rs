@@ -1,9 +1,9 @@
 //! Stretches of steps that a device takes, and what is done with what they lead to.
 
-use super::device::{DeviceRunner, Drawn, Stretch, Taken};
+use super::device::{DeviceRunner, Stretch, Taken};
 use super::state::{Outcome, State, step_back};
 use super::trainer::Trainer;
-use super::training::{BatchSize, COMPARED, DIVERGENCE};
+use super::training::{COMPARED, DIVERGENCE};
 use crate::Error;
 use kerrlight_common::simd::Float;
 use std::time::Instant;
@@ -50,14 +50,6 @@ impl<T: Float> Trainer<'_, T> {
         let most = delegate.pace.min(delegate.device.most() as u64);
         // A step that takes longer than half a second is a stretch of its own.
         count.min(delegate.end.saturating_sub(step)).min(most).max(1)
-    }
-
-    fn drawn(&mut self, step: u64) -> Drawn {
-        self.choose(step);
-        match self.training.batch {
-            BatchSize::Pixels(_) => Drawn::Pixels(self.pairs.clone()),
-            BatchSize::Frames(_) | BatchSize::All => Drawn::Frames(self.frames.clone()),
-        }
     }
 
     /// Judges the losses as single steps do, and moves on.

@@ -7,7 +7,7 @@ use crate::Error;
 use crate::fit::Field;
 use crate::fit::forward::occupancy::Occupancy;
 use crate::fit::loss::objective::{Gradients, Loss};
-use crate::fit::loss::selection::Selection;
+use crate::fit::loss::selection::Drawn;
 use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::Axis;
 use rand::seq::index;
@@ -102,38 +102,33 @@ impl<T: Float> Trainer<'_, T> {
     }
 
     fn of_data(&mut self, field: Field<'_, T>, step: u64, of_axis: &mut [f64; 3]) -> Loss {
-        self.choose(step);
+        let drawn = self.drawn(step);
         let learnt = self.training.learns_axis(self.representation);
-        let Self { objective, training, buffers, gradient, pairs, frames, .. } = self;
-        let selection = match training.batch {
-            BatchSize::Pixels(_) => Selection::Pixels(pairs),
-            BatchSize::Frames(_) | BatchSize::All => Selection::Frames(frames),
-        };
+        let Self { objective, buffers, gradient, .. } = self;
         let gradients = Gradients { parameters: gradient, axis: learnt.then_some(of_axis) };
-        objective.value_and_gradient(field, selection, gradients, buffers)
+        objective.value_and_gradient(field, &drawn, gradients, buffers)
     }
 
     /// Draws the pairs or frames of a step.
-    pub(in crate::fit) fn choose(&mut self, step: u64) {
+    pub(in crate::fit) fn drawn(&self, step: u64) -> Drawn {
         // Of seed and step alone: a fit that is resumed, or goes back, draws the same.
         let mut random = Pcg64::seed_from_u64(mix(self.training.seed, step, 0));
-        let Self { objective, training, observed, pairs, frames, .. } = self;
-        match training.batch {
+        let observed = &self.observed;
+        match self.training.batch {
             BatchSize::Pixels(count) => {
-                let rays = objective.model.rays();
-                pairs.clear();
-                pairs.extend((0..count).map(|_| {
+                let rays = self.objective.model.rays();
+                let pair = |_| {
                     let frame = observed[random.random_range(0..observed.len())];
                     (random.random_range(0..rays) as u32, frame as u32)
-                }));
+                };
+                Drawn::Pixels((0..count).map(pair).collect())
             }
             BatchSize::Frames(count) => {
                 let count = count.min(observed.len());
                 let chosen = index::sample(&mut random, observed.len(), count);
-                frames.clear();
-                frames.extend(chosen.into_iter().map(|k| observed[k]));
+                Drawn::Frames(chosen.into_iter().map(|k| observed[k]).collect())
             }
-            BatchSize::All => frames.clone_from(observed),
+            BatchSize::All => Drawn::Frames(observed.clone()),
         }
     }
 

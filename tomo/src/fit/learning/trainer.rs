@@ -23,8 +23,6 @@ pub struct Trainer<'a, T> {
     pub(in crate::fit) gradient: Vec<T>,
     /// Parameters that are matrices.
     pub(in crate::fit) matrices: Vec<WeightMatrix>,
-    pub(in crate::fit) pairs: Vec<(u32, u32)>,
-    pub(in crate::fit) frames: Vec<usize>,
 }
 
 impl<'a, T: Float> Trainer<'a, T> {
@@ -46,8 +44,6 @@ impl<'a, T: Float> Trainer<'a, T> {
             changes: ChangeBuffers::default(),
             gradient,
             matrices: representation.matrices(),
-            pairs: Vec::new(),
-            frames: Vec::new(),
         }
     }
 }

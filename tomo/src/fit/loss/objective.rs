@@ -1,6 +1,6 @@
 //! The loss of a field of emission, and its gradient with respect to parameters and axis.
 
-use super::selection::Selection;
+use super::selection::Drawn;
 use super::terms::{FrameTerm, ImageTerm};
 use crate::fit::forward::batch::Batch;
 use crate::fit::forward::forward_model::{Field, ForwardModel};
@@ -34,7 +34,7 @@ impl<T: Float> Data<T> {
     }
 }
 
-/// The loss of a selection, scaled to that of all data.
+/// The loss of the data of a step, scaled to that of all data.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Loss {
     /// Σ weight · χ²/data, and penalties of the representation.
@@ -123,11 +123,11 @@ impl<T: Float> Objective<T> {
         (all as f64 / observed as f64 * frames as f64).max(1.0)
     }
 
-    /// The loss of a selection; adds its gradient. [`ForwardModel::weigh`] comes first.
+    /// The loss of the data of a step; adds its gradient. [`ForwardModel::weigh`] comes first.
     pub fn value_and_gradient(
         &self,
         field: Field<'_, T>,
-        selection: Selection<'_>,
+        drawn: &Drawn,
         mut gradients: Gradients<'_, T>,
         buffers: &mut Buffers<T>,
     ) -> Loss {
@@ -135,9 +135,9 @@ impl<T: Float> Objective<T> {
             buffers.of_weights.clear();
             buffers.of_weights.resize(self.model.points(), 0.0);
         }
-        let loss = match selection {
-            Selection::Pixels(pairs) => self.pixels(field, pairs, &mut gradients, buffers),
-            Selection::Frames(all) => self.frames(field, all, &mut gradients, buffers),
+        let loss = match drawn {
+            Drawn::Pixels(pairs) => self.pixels(field, pairs, &mut gradients, buffers),
+            Drawn::Frames(all) => self.frames(field, all, &mut gradients, buffers),
         };
         if let Some(axis) = gradients.axis
             && self.model.is_shifted()

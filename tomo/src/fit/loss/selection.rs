@@ -1,10 +1,10 @@
-//! Selection of the data of a step.
+//! Data of a step.
 
-/// Part of the data that a step looks at.
-#[derive(Clone, Copy, Debug)]
-pub enum Selection<'a> {
+/// Data of a step.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Drawn {
     /// (ray, frame) pairs of images.
-    Pixels(&'a [(u32, u32)]),
+    Pixels(Vec<(u32, u32)>),
     /// Whole frames, of all data.
-    Frames(&'a [usize]),
+    Frames(Vec<usize>),
 }

@@ -328,8 +328,8 @@ fn exact_gradients_of_polarised_fluxes() {
     let loss = |parameters: &[f64], gradient: &mut [f64]| {
         let field = Field { representation: &grid, parameters, axis, occupancy: None };
         let gradients = Gradients { parameters: gradient, axis: None };
-        let selection = Selection::Frames(&[0, 1, 2]);
-        objective.value_and_gradient(field, selection, gradients, &mut Buffers::default()).total
+        let drawn = Drawn::Frames(vec![0, 1, 2]);
+        objective.value_and_gradient(field, &drawn, gradients, &mut Buffers::default()).total
     };
     let mut gradient = vec![0.0; 125];
     loss(&parameters, &mut gradient);
