@@ -74,20 +74,31 @@ impl Spread {
         (excess > 0.0).then_some(ModelError { source: ModelError::UNEXPLAINED, covariance })
     }
 
+    /// Takes a covariance, row by row in the parameters' own units.
+    pub(in crate::fit) fn of_covariance(
+        free: &[Free],
+        geometry: Geometry,
+        covariance: &[f64],
+        ripple: f64,
+    ) -> Self {
+        let n = free.len();
+        let whole: Vec<f64> = (0..n).map(|k| covariance[k * n + k].sqrt()).collect();
+        let correlation = (0..n * n).map(|k| covariance[k] / (whole[k / n] * whole[k % n]));
+        let correlation = correlation.collect();
+        // No parameter is less known than before the data.
+        let sigma = free.iter().zip(whole).map(|(free, x)| x.min(free.prior.deviation()));
+        let sigma: Vec<f64> = sigma.collect();
+        let open = free.iter().zip(&sigma).map(|(free, sigma)| free.is_open(*sigma)).collect();
+        Self { geometry, sigma, open, correlation, ripple, own: ModelErrors::default() }
+    }
+
     /// Adds errors of this covariance, row by row in the parameters' own units.
     fn widened(&self, free: &[Free], more: &[f64]) -> Self {
         let n = free.len();
-        let covariance = |a: usize, b: usize| {
-            self.correlation[a * n + b] * self.sigma[a] * self.sigma[b] + more[a * n + b]
-        };
-        let whole: Vec<f64> = (0..n).map(|k| covariance(k, k).sqrt()).collect();
-        let correlation =
-            (0..n * n).map(|k| covariance(k / n, k % n) / (whole[k / n] * whole[k % n])).collect();
-        // No parameter is less known than before the data.
-        let sigma: Vec<f64> =
-            free.iter().zip(&whole).map(|(free, x)| x.min(free.prior.deviation())).collect();
-        let open = free.iter().zip(&sigma).map(|(free, sigma)| free.is_open(*sigma)).collect();
-        Self { sigma, open, correlation, ..self.clone() }
+        let own = |k: usize| self.correlation[k] * self.sigma[k / n] * self.sigma[k % n];
+        let covariance: Vec<f64> = (0..n * n).map(|k| own(k) + more[k]).collect();
+        let wide = Self::of_covariance(free, self.geometry, &covariance, self.ripple);
+        Self { own: self.own.clone(), ..wide }
     }
 
     fn through(free: &[Free], best: &Sample, taken: &[Sample], reduced_chi2: f64) -> Option<Self> {

@@ -3,8 +3,8 @@
 use super::detail::Sure;
 use super::search_data::{LATTICES, SearchData};
 use crate::fit::geometry::{
-    Effort, Envelope, Estimate, Free, Geometry, GeometryModel, GeometryProblem, ModelErrors,
-    Polished, Spread, bounded,
+    Effort, Envelope, Estimate, Free, Geometry, GeometryModel, GeometryProblem, Polished, Spread,
+    bounded,
 };
 use crate::fit::settings::{FitFile, SearchView, UnknownGeometry};
 use crate::fit::setup::{FitData, Result};
@@ -46,7 +46,6 @@ pub(super) fn surely(
     polished: &Polished,
     reduced_chi2: f64,
 ) -> Result<Sure> {
-    let n = problem.free.len();
     if polished.covariance.iter().any(|x| !x.is_finite()) {
         return Ok(Sure { geometry: polished.best.geometry, spread: None, reduced_chi2 });
     }
@@ -58,15 +57,7 @@ pub(super) fn surely(
         ripple: 0.0,
     });
     let Envelope { geometry, covariance, ripple } = envelope;
-    let whole: Vec<f64> = (0..n).map(|k| covariance[k * n + k].sqrt()).collect();
-    let correlation = (0..n * n).map(|k| covariance[k] / (whole[k / n] * whole[k % n]));
-    let correlation = correlation.collect();
-    // Nobody knows less than before the data.
-    let sigma = problem.free.iter().zip(whole).map(|(free, x)| x.min(free.prior.deviation()));
-    let sigma: Vec<f64> = sigma.collect();
-    let open = problem.free.iter().zip(&sigma).map(|(free, sigma)| free.is_open(*sigma)).collect();
-    let own = ModelErrors::default();
-    let spread = Spread { geometry, sigma, open, correlation, ripple, own };
+    let spread = Spread::of_covariance(problem.free, geometry, &covariance, ripple);
     Ok(Sure { geometry, spread: Some(spread), reduced_chi2 })
 }
 
