@@ -39,7 +39,7 @@ pub type TakeSteps = Box<
             &Objective<f32>,
             &dyn Representation<f32>,
             &Training,
-        ) -> anyhow::Result<Box<dyn StepDevice<f32>>>
+        ) -> anyhow::Result<Box<dyn StepDevice>>
         + Send,
 >;
 

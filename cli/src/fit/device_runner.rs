@@ -12,7 +12,7 @@ pub fn delegate(
     file: &FitFile,
     trainer: &Trainer<'_, f32>,
     folder: &Folder,
-) -> anyhow::Result<DeviceRunner<f32>> {
+) -> anyhow::Result<DeviceRunner> {
     let taken = take(&trainer.objective, trainer.representation, &trainer.training);
     let device = taken
         .map_err(|error| anyhow!("{}; {}", crate::plain::reasons(&error), elsewhere(folder)))?;

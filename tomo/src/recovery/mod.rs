@@ -173,7 +173,7 @@ impl<'t> Fit<'_, 't> {
     /// If residuals are not finite, or everything is dark where dark is no result.
     pub fn seen(&mut self, state: &State<f32>) -> Result<Frames<f32>, Error> {
         let frames: Vec<usize> = (0..self.measured.times.len()).collect();
-        let seen = self.trainer.images(&state.now, &frames, true)?;
+        let seen = self.trainer.images(&state.now, &frames)?;
         self.check(&frames, &seen)?;
         Ok(seen)
     }

@@ -118,11 +118,7 @@ pub trait Progress: Send {
     ///
     /// # Errors
     /// If there is one, and it cannot.
-    fn device(
-        &mut self,
-        _: &FitFile,
-        _: &Trainer<'_, f32>,
-    ) -> Result<Option<DeviceRunner<f32>>, Error> {
+    fn device(&mut self, _: &FitFile, _: &Trainer<'_, f32>) -> Result<Option<DeviceRunner>, Error> {
         Ok(None)
     }
 

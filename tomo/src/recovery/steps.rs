@@ -65,7 +65,7 @@ impl Fit<'_, '_> {
             return Ok(false);
         }
         let frames: Vec<usize> = (0..measured.times.len()).collect();
-        let seen = self.trainer.images(&state.now, &frames, true)?;
+        let seen = self.trainer.images(&state.now, &frames)?;
         let movie = self.pictured(state, &seen)?;
         let judged = self.judged(state, &seen, &movie)?;
         let explains = judged.verdict.outcome != Outcome::Unexplained;
@@ -107,7 +107,7 @@ fn diverged(trainer: &mut Trainer<'_, f32>, state: &State<f32>, error: &Error) -
     if let Some(fault) = trainer.objective.fault() {
         return Error::Failed(fault.to_owned());
     }
-    let movie = trainer.images(&state.now, &frames, true).ok();
+    let movie = trainer.images(&state.now, &frames).ok();
     let found = movie.and_then(|movie| trainer.objective.not_finite(&frames, &movie).ok());
     let named = found.flatten().map(named);
     let why = named.map_or(String::new(), |named| format!(": {named}"));

@@ -211,7 +211,7 @@ struct Fragile {
     left: usize,
 }
 
-impl StepDevice<f32> for Fragile {
+impl StepDevice for Fragile {
     fn name(&self) -> &str {
         self.fit.name()
     }
@@ -223,9 +223,9 @@ impl StepDevice<f32> for Fragile {
     }
     fn take(
         &mut self,
-        stretch: &Stretch<'_, f32>,
+        stretch: &Stretch<'_>,
         from: &kerrlight_tomo::fit::Progress<f32>,
-    ) -> Result<Taken<f32>, Error> {
+    ) -> Result<Taken, Error> {
         if self.left == 0 {
             self.fit.device().lose();
         }

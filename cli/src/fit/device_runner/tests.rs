@@ -13,7 +13,7 @@ struct Unplugged {
     left: usize,
 }
 
-impl StepDevice<f32> for Unplugged {
+impl StepDevice for Unplugged {
     fn name(&self) -> &str {
         "a card"
     }
@@ -23,11 +23,7 @@ impl StepDevice<f32> for Unplugged {
     fn most(&self) -> usize {
         1
     }
-    fn take(
-        &mut self,
-        stretch: &Stretch<'_, f32>,
-        from: &Progress<f32>,
-    ) -> Result<Taken<f32>, Error> {
+    fn take(&mut self, stretch: &Stretch<'_>, from: &Progress<f32>) -> Result<Taken, Error> {
         if self.left == 0 {
             return Err(DeviceError("the graphics device was lost: unplugged".to_owned()).into());
         }

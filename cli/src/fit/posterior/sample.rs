@@ -68,7 +68,7 @@ pub fn draw(
         return Ok(None);
     }
     let frames: Vec<usize> = (0..measured.times.len()).collect();
-    let movie = trainer.images(&state.now, &frames, true)?;
+    let movie = trainer.images(&state.now, &frames)?;
     let chi2 = trainer.objective.loss_of(&frames, &movie)?.terms;
     let volume = super::super::results::recovered(file, &mut trainer, &state)?;
     let predicted = predicted(through, &movie)?;

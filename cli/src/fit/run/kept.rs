@@ -301,7 +301,7 @@ impl Progress for Kept<'_> {
         &mut self,
         file: &FitFile,
         trainer: &Trainer<'_, f32>,
-    ) -> Result<Option<DeviceRunner<f32>>, Error> {
+    ) -> Result<Option<DeviceRunner>, Error> {
         let device = self.device.take();
         let delegate = |device| device_runner::delegate(device, file, trainer, self.folder);
         device.map(delegate).transpose().map_err(kept)

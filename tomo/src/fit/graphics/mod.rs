@@ -150,7 +150,7 @@ impl GraphicsFit {
     /// If the device fails.
     pub fn gradient(
         &mut self,
-        stretch: &Stretch<'_, f32>,
+        stretch: &Stretch<'_>,
         from: &Progress<f32>,
     ) -> Result<(Loss, Vec<f32>, [f64; 3]), Error> {
         self.load(stretch, from)?;
@@ -175,7 +175,7 @@ impl GraphicsFit {
     }
 
     /// Puts what a stretch starts from there.
-    fn load(&mut self, stretch: &Stretch<'_, f32>, from: &Progress<f32>) -> Result<(), GpuError> {
+    fn load(&mut self, stretch: &Stretch<'_>, from: &Progress<f32>) -> Result<(), GpuError> {
         let Self { device, pixels, visibilities, learning, events, .. } = self;
         let model = &stretch.objective.model;
         // An axis that is learnt changes the weights of nodes; nothing else of them changes.
@@ -197,7 +197,7 @@ impl GraphicsFit {
     }
 }
 
-impl StepDevice<f32> for GraphicsFit {
+impl StepDevice for GraphicsFit {
     fn name(&self) -> &str {
         self.device.name()
     }
@@ -211,11 +211,7 @@ impl StepDevice<f32> for GraphicsFit {
         if self.pixels.axis.is_some() { 1 } else { STEPS }
     }
 
-    fn take(
-        &mut self,
-        stretch: &Stretch<'_, f32>,
-        from: &Progress<f32>,
-    ) -> Result<Taken<f32>, Error> {
+    fn take(&mut self, stretch: &Stretch<'_>, from: &Progress<f32>) -> Result<Taken, Error> {
         self.load(stretch, from)?;
         // If a step fails, nobody knows what the device holds.
         self.learning.hold([&[]; 3]);

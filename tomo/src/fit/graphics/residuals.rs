@@ -14,7 +14,7 @@ impl GraphicsFit {
     /// Has the device find loss and gradient of step number `k` of a stretch, and take the step if it `learns`.
     pub(super) fn loss(
         &self,
-        stretch: &Stretch<'_, f32>,
+        stretch: &Stretch<'_>,
         k: usize,
         learns: bool,
     ) -> Result<Pending, GpuError> {
@@ -44,7 +44,7 @@ impl GraphicsFit {
     /// Some pairs, whole frames if there are data but images, whose residuals are made on the device.
     fn pairs(
         &self,
-        stretch: &Stretch<'_, f32>,
+        stretch: &Stretch<'_>,
         pairs: &[(u32, u32)],
         slope: f32,
         record: usize,
@@ -71,7 +71,7 @@ impl GraphicsFit {
     /// Whole frames, whose residuals are made on the device.
     fn frames(
         &self,
-        stretch: &Stretch<'_, f32>,
+        stretch: &Stretch<'_>,
         frames: &[usize],
         record: usize,
         learns: bool,
@@ -103,7 +103,7 @@ impl GraphicsFit {
     /// Whole frames, of which this processor makes what data say of their images.
     fn shared_frames(
         &self,
-        stretch: &Stretch<'_, f32>,
+        stretch: &Stretch<'_>,
         frames: &[usize],
         record: usize,
         learns: bool,
@@ -153,7 +153,7 @@ impl GraphicsFit {
     /// Puts pairs there; the most points that they can have.
     fn set(
         &self,
-        stretch: &Stretch<'_, f32>,
+        stretch: &Stretch<'_>,
         pairs: &[(u32, u32)],
         datum: &dyn Fn(u32, u32) -> f32,
         slope: f32,
@@ -184,7 +184,7 @@ impl GraphicsFit {
     }
 }
 
-fn pairs_of(stretch: &Stretch<'_, f32>, frames: &[usize]) -> Vec<(u32, u32)> {
+fn pairs_of(stretch: &Stretch<'_>, frames: &[usize]) -> Vec<(u32, u32)> {
     let rays = stretch.objective.model.rays() as u32;
     frames.iter().flat_map(|frame| (0..rays).map(|ray| (ray, *frame as u32))).collect()
 }

@@ -9,7 +9,6 @@ use crate::Error;
 use crate::fit::forward::occupancy::Occupancy;
 use crate::fit::loss::objective::{Loss, Objective};
 use crate::fit::loss::selection::Drawn;
-use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::Axis;
 
 /// Failure of a device to take the steps of a fit: it failed, or it does not do what settings ask for.
@@ -18,9 +17,9 @@ use kerrlight_render::dynamics::Axis;
 pub struct DeviceError(pub String);
 
 /// Some steps in a row, of which the settings are the same.
-pub struct Stretch<'a, T> {
+pub struct Stretch<'a> {
     /// Forward model, weighed for the axis, and data.
-    pub objective: &'a Objective<T>,
+    pub objective: &'a Objective<f32>,
     /// The axis that matter turns about.
     pub axis: Axis,
     /// Outside of it nothing shines.
@@ -33,11 +32,11 @@ pub struct Stretch<'a, T> {
 
 /// Result of a stretch of steps.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Taken<T> {
+pub struct Taken {
     /// Parameters after the last step.
-    pub parameters: Vec<T>,
+    pub parameters: Vec<f32>,
     /// Adam's two moments after it.
-    pub moments: [Vec<T>; 2],
+    pub moments: [Vec<f32>; 2],
     /// Loss of each step, before it was taken.
     pub losses: Vec<Loss>,
     /// Slope of the last loss along the sphere of axes, if the axis is learnt.
@@ -45,7 +44,7 @@ pub struct Taken<T> {
 }
 
 /// Takes steps in place of this processor.
-pub trait StepDevice<T>: Send {
+pub trait StepDevice: Send {
     /// Its name.
     fn name(&self) -> &str;
 
@@ -59,21 +58,21 @@ pub trait StepDevice<T>: Send {
     ///
     /// # Errors
     /// If the device fails; the steps are not taken then.
-    fn take(&mut self, stretch: &Stretch<'_, T>, from: &Progress<T>) -> Result<Taken<T>, Error>;
+    fn take(&mut self, stretch: &Stretch<'_>, from: &Progress<f32>) -> Result<Taken, Error>;
 }
 
 /// A device with the steps that somebody wants to look at.
-pub struct DeviceRunner<T> {
-    pub(in crate::fit) device: Box<dyn StepDevice<T>>,
+pub struct DeviceRunner {
+    pub(in crate::fit) device: Box<dyn StepDevice>,
     pub(in crate::fit) pause: u64,
     pub(in crate::fit) end: u64,
     /// Steps of a stretch of about half a second.
     pub(in crate::fit) pace: u64,
 }
 
-impl<T: Float> DeviceRunner<T> {
+impl DeviceRunner {
     /// A stretch ends at multiples of `pause` steps and at `end`.
-    pub fn new(device: Box<dyn StepDevice<T>>, pause: u64, end: u64) -> Self {
+    pub fn new(device: Box<dyn StepDevice>, pause: u64, end: u64) -> Self {
         // The first stretch is one step, which tells how many fit into the next.
         Self { device, pause: pause.max(1), end, pace: 1 }
     }

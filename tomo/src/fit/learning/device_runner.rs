@@ -5,18 +5,17 @@ use super::state::{Outcome, State, step_back};
 use super::trainer::Trainer;
 use super::training::{COMPARED, DIVERGENCE};
 use crate::Error;
-use kerrlight_common::simd::Float;
 use std::time::Instant;
 
 /// Time after which a stretch should be over, so that signals are heard.
 const SECONDS: f64 = 0.5;
 
-impl<T: Float> Trainer<'_, T> {
+impl Trainer<'_, f32> {
     /// Steps up to the next one at which anything is done beside them.
     pub(in crate::fit) fn delegated(
         &mut self,
-        delegate: &mut DeviceRunner<T>,
-        state: &mut State<T>,
+        delegate: &mut DeviceRunner,
+        state: &mut State<f32>,
     ) -> Result<Outcome, Error> {
         self.refresh(&mut state.now);
         self.objective.model.weigh(state.now.axis);
@@ -33,7 +32,7 @@ impl<T: Float> Trainer<'_, T> {
     }
 
     /// Returns the number of steps to take at once.
-    fn stretch(&self, delegate: &DeviceRunner<T>, step: u64) -> u64 {
+    fn stretch(&self, delegate: &DeviceRunner, step: u64) -> u64 {
         let to_multiple = |of: u64| of - step % of;
         // Where a state is looked at, kept or compared with all data, it has to be here: a device
         // gives it back at the end of a stretch alone.
@@ -53,7 +52,7 @@ impl<T: Float> Trainer<'_, T> {
     }
 
     /// Judges the losses as single steps do, and moves on.
-    fn moved(&self, taken: Taken<T>, state: &mut State<T>) -> Result<Outcome, Error> {
+    fn moved(&self, taken: Taken, state: &mut State<f32>) -> Result<Outcome, Error> {
         let Taken { parameters, moments: [first, second], losses, of_axis } = taken;
         let begin = state.now.step;
         let finite = of_axis.iter().all(|slope| slope.is_finite());

@@ -27,8 +27,13 @@ pub struct Place<'a, T> {
     pub step: u64,
 }
 
-impl<T: Float> Trainer<'_, T> {
-    pub(in crate::fit) fn advance(&mut self, state: &mut State<T>) -> Result<Outcome, Error> {
+// In single precision, that of programs: what is generic is compiled anew in every program that uses it.
+impl Trainer<'_, f32> {
+    /// One step. It depends on the state and the settings alone: not on threads, and not on what this trainer did before.
+    ///
+    /// # Errors
+    /// If the loss keeps diverging.
+    pub fn step(&mut self, state: &mut State<f32>) -> Result<Outcome, Error> {
         // Taken out while it reads this trainer, and put back even if it fails.
         if let Some(mut delegate) = self.device.take() {
             let outcome = self.delegated(&mut delegate, state);
@@ -57,7 +62,7 @@ impl<T: Float> Trainer<'_, T> {
         Ok(Outcome::Done(loss))
     }
 
-    pub(in crate::fit) fn refresh(&mut self, now: &mut Progress<T>) {
+    pub(in crate::fit) fn refresh(&mut self, now: &mut Progress<f32>) {
         let Some(plan) = self.training.occupancy else { return };
         let Some(mask) = &mut now.occupancy else { return };
         if now.step >= plan.warm_up && (now.step - plan.warm_up).is_multiple_of(plan.every.max(1)) {
@@ -69,11 +74,48 @@ impl<T: Float> Trainer<'_, T> {
     }
 
     /// The mask, once it is used.
-    pub(in crate::fit) fn mask<'b>(&self, now: &'b Progress<T>) -> Option<&'b Occupancy> {
+    pub(in crate::fit) fn mask<'b>(&self, now: &'b Progress<f32>) -> Option<&'b Occupancy> {
         let masked = self.training.occupancy.is_some_and(|plan| now.step >= plan.warm_up);
         now.occupancy.as_ref().filter(|_| masked)
     }
 
+    fn learn(&mut self, now: &mut Progress<f32>, of_axis: [f64; 3]) {
+        let rate = self.rate(now, 0);
+        let (gradient, parameters) = (&self.gradient, &mut now.parameters);
+        match &self.training.muon {
+            Some(muon) => muon.step(rate, gradient, &self.matrices, &mut now.adam, parameters),
+            None => now.adam.step(rate, gradient, parameters),
+        }
+        self.representation.project(&mut now.parameters);
+        // The step is counted last: the rates of parameters and axis are those of its number.
+        self.turn(now, of_axis);
+        now.step += 1;
+    }
+
+    /// Turns the axis, if it is learnt.
+    pub(in crate::fit) fn turn(&self, now: &mut Progress<f32>, of_axis: [f64; 3]) {
+        let Some(axis_rate) = &self.training.axis_rate else { return };
+        let mut moved = now.axis.vector();
+        let rate = self.part(now, 0) * axis_rate.rate(now.step);
+        // Adam's step leaves the sphere; the axis is the direction in which it ends.
+        now.axis_adam.step(rate, &of_axis, &mut moved);
+        now.axis = Axis::new(moved).unwrap_or(now.axis);
+    }
+
+    /// Part of the rates that step number `ahead` from here takes.
+    fn part(&self, now: &Progress<f32>, ahead: u64) -> f64 {
+        let step = now.step + ahead;
+        // The first step moves already, and without a ramp at the full rate.
+        ((step + 1) as f64 / (self.training.ramp + 1) as f64).min(1.0) * now.caution
+    }
+
+    /// Learning rate of the parameters at step number `ahead` from here.
+    pub(in crate::fit) fn rate(&self, now: &Progress<f32>, ahead: u64) -> f64 {
+        self.part(now, ahead) * self.training.rate.rate(now.step + ahead)
+    }
+}
+
+impl<T: Float> Trainer<'_, T> {
     /// The loss of the part of the data that a step looks at, with what change costs. The gradient with respect to the
     /// parameters is [`gradient`](Self::gradient) then; that of the axis is added, if it is learnt.
     pub fn loss(&mut self, place: Place<'_, T>, of_axis: &mut [f64; 3]) -> Loss {
@@ -130,41 +172,6 @@ impl<T: Float> Trainer<'_, T> {
             }
             BatchSize::All => Drawn::Frames(observed.clone()),
         }
-    }
-
-    fn learn(&mut self, now: &mut Progress<T>, of_axis: [f64; 3]) {
-        let rate = self.rate(now, 0);
-        let (gradient, parameters) = (&self.gradient, &mut now.parameters);
-        match &self.training.muon {
-            Some(muon) => muon.step(rate, gradient, &self.matrices, &mut now.adam, parameters),
-            None => now.adam.step(rate, gradient, parameters),
-        }
-        self.representation.project(&mut now.parameters);
-        // The step is counted last: the rates of parameters and axis are those of its number.
-        self.turn(now, of_axis);
-        now.step += 1;
-    }
-
-    /// Turns the axis, if it is learnt.
-    pub(in crate::fit) fn turn(&self, now: &mut Progress<T>, of_axis: [f64; 3]) {
-        let Some(axis_rate) = &self.training.axis_rate else { return };
-        let mut moved = now.axis.vector();
-        let rate = self.part(now, 0) * axis_rate.rate(now.step);
-        // Adam's step leaves the sphere; the axis is the direction in which it ends.
-        now.axis_adam.step(rate, &of_axis, &mut moved);
-        now.axis = Axis::new(moved).unwrap_or(now.axis);
-    }
-
-    /// Part of the rates that step number `ahead` from here takes.
-    fn part(&self, now: &Progress<T>, ahead: u64) -> f64 {
-        let step = now.step + ahead;
-        // The first step moves already, and without a ramp at the full rate.
-        ((step + 1) as f64 / (self.training.ramp + 1) as f64).min(1.0) * now.caution
-    }
-
-    /// Learning rate of the parameters at step number `ahead` from here.
-    pub(in crate::fit) fn rate(&self, now: &Progress<T>, ahead: u64) -> f64 {
-        self.part(now, ahead) * self.training.rate.rate(now.step + ahead)
     }
 }
 

@@ -16,7 +16,7 @@ pub struct Trainer<'a, T> {
     /// Training of the fit.
     pub training: Training,
     /// A device that takes the steps in place of this processor, if there is one.
-    pub device: Option<DeviceRunner<T>>,
+    pub device: Option<DeviceRunner>,
     pub(in crate::fit) observed: Vec<usize>,
     pub(in crate::fit) buffers: Buffers<T>,
     pub(in crate::fit) changes: ChangeBuffers<T>,

@@ -75,15 +75,17 @@ impl<T> Buffers<T> {
 }
 
 impl<T: Float> Buffers<T> {
-    /// Emission at points (x, y, z) at the reference time.
+    /// Emission at points (x, y, z) at a time, M since the reference time.
     pub fn emission(
         &mut self,
         representation: &dyn Representation<T>,
         parameters: &[T],
-        [x, y, z]: [&[T]; 3],
+        time: f64,
+        points: [&[T]; 3],
     ) -> Vec<T> {
-        let (time, mut values) = (vec![T::zero(); x.len()], vec![T::zero(); x.len()]);
-        let at = Coordinates::of(representation.dimension(), &time, [x, y, z]);
+        let times = vec![T::of(time); points[0].len()];
+        let mut values = vec![T::zero(); times.len()];
+        let at = Coordinates::of(representation.dimension(), &times, points);
         representation.eval(parameters, at, &mut values, &mut self.workspace);
         values
     }
