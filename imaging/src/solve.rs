@@ -1,7 +1,7 @@
 //! One minimum.
 
 use crate::problem::ImageProblem;
-use kerrlight_tomo::optimise::{Lbfgs, LbfgsState, Step};
+use kerrlight_tomo::optimise::Lbfgs;
 
 /// An image that no step improves, or that iterations have ended at.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,6 +18,8 @@ pub struct Solution {
     pub has_converged: bool,
 }
 
+/// Pairs of steps and gradient differences that L-BFGS keeps.
+const MEMORY: usize = 10;
 /// Iterations over which the loss has to fall by [`FALL`] of itself to go on.
 const SPAN: usize = 20;
 const FALL: f64 = 1e-4;
@@ -74,30 +76,27 @@ pub fn solve(
 
 /// The same of a function that returns its value and overwrites its gradient.
 pub(super) fn minimum(
-    mut objective: &mut dyn FnMut(&[f64], &mut [f64]) -> f64,
+    objective: &mut dyn FnMut(&[f64], &mut [f64]) -> f64,
     start: &[f64],
     iterations: usize,
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Option<Minimum> {
-    let lbfgs = Lbfgs::default();
     let mut parameters = start.to_vec();
-    let mut state = LbfgsState::new(parameters.len(), lbfgs.memory);
+    let mut lbfgs = Lbfgs::new(parameters.len(), MEMORY);
     let mut losses: Vec<f64> = Vec::new();
     let mut has_settled = false;
     while losses.len() < iterations && !has_settled {
         if !go_on() {
             return None;
         }
-        match lbfgs.step(&mut objective, &mut state, &mut parameters) {
-            Step::Taken { value, .. } => losses.push(value),
-            Step::NoDescent | Step::NotFinite => break,
-        }
+        let Some(value) = lbfgs.step(objective, &mut parameters) else { break };
+        losses.push(value);
         let before = losses.len().checked_sub(SPAN + 1).map(|k| losses[k]);
         has_settled =
             before.is_some_and(|before| before - losses[losses.len() - 1] < FALL * before);
     }
-    let loss = state.value.unwrap_or(f64::NAN);
-    let slope: f64 = state.numbers[..parameters.len()].iter().map(|g| g.abs()).sum();
+    let loss = lbfgs.value.unwrap_or(f64::NAN);
+    let slope: f64 = lbfgs.gradient.iter().map(|g| g.abs()).sum();
     let has_converged = slope <= FLAT * loss;
     Some(Minimum { parameters, loss, iterations: losses.len(), has_converged })
 }

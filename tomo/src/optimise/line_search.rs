@@ -8,86 +8,76 @@ pub struct Point {
     pub slope: f64,
 }
 
-/// Conditions on a step, and how long to look for it.
-#[derive(Clone, Copy, Debug)]
-pub struct Wolfe {
-    /// Part of the linear decrease that is enough.
-    pub decrease: f64,
-    /// Part of the first slope that may be left.
-    pub curvature: f64,
-    pub evaluations: usize,
+/// Part of the linear decrease that is enough: this and the next number are those for quasi-Newton steps (Nocedal & Wright
+/// 2006, section 3.1).
+const DECREASE: f64 = 1e-4;
+/// Part of the first slope that may be left.
+const CURVATURE: f64 = 0.9;
+/// Evaluations that a step may take.
+const EVALUATIONS: usize = 20;
+
+fn decreases(start: Point, at: Point) -> bool {
+    at.value <= start.value + DECREASE * at.length * start.slope
 }
 
-impl Wolfe {
-    fn decreases(&self, start: Point, at: Point) -> bool {
-        at.value <= start.value + self.decrease * at.length * start.slope
-    }
+fn flat(start: Point, at: Point) -> bool {
+    at.slope.abs() <= CURVATURE * start.slope.abs()
+}
 
-    fn flat(&self, start: Point, at: Point) -> bool {
-        at.slope.abs() <= self.curvature * start.slope.abs()
+/// Searches from `start` (length 0, negative slope), trying `first` first. The last point that was
+/// evaluated is the one returned.
+pub fn search(start: Point, first: f64, mut evaluate: impl FnMut(f64) -> Point) -> Option<Point> {
+    let (mut before, mut length) = (start, first);
+    for used in 1..=EVALUATIONS {
+        let at = evaluate(length);
+        let left = EVALUATIONS - used;
+        // The loss is not defined so far out: back towards a point where it is.
+        if !at.value.is_finite() || !at.slope.is_finite() {
+            length = 0.5 * (before.length + at.length);
+            continue;
+        }
+        if !decreases(start, at) || (used > 1 && at.value >= before.value) {
+            return zoom(start, before, at, left, evaluate);
+        }
+        if flat(start, at) {
+            return Some(at);
+        }
+        if at.slope >= 0.0 {
+            // Beyond a minimum, and lower than the point before: the better end comes first.
+            return zoom(start, at, before, left, evaluate);
+        }
+        (before, length) = (at, 2.5 * at.length);
     }
+    None
+}
 
-    /// Searches from `start` (length 0, negative slope), trying `first` first. The last point that was
-    /// evaluated is the one returned.
-    pub fn search(
-        &self,
-        start: Point,
-        first: f64,
-        mut evaluate: impl FnMut(f64) -> Point,
-    ) -> Option<Point> {
-        let (mut before, mut length) = (start, first);
-        for used in 1..=self.evaluations {
-            let at = evaluate(length);
-            let left = self.evaluations - used;
-            // The loss is not defined so far out: back towards a point where it is.
-            if !at.value.is_finite() || !at.slope.is_finite() {
-                length = 0.5 * (before.length + at.length);
-                continue;
-            }
-            if !self.decreases(start, at) || (used > 1 && at.value >= before.value) {
-                return self.zoom(start, before, at, left, evaluate);
-            }
-            if self.flat(start, at) {
+/// Searches between `low`, the better end, and `high`.
+fn zoom(
+    start: Point,
+    mut low: Point,
+    mut high: Point,
+    evaluations: usize,
+    mut evaluate: impl FnMut(f64) -> Point,
+) -> Option<Point> {
+    for _ in 0..evaluations {
+        let at = evaluate(between(low, high));
+        // A loss that is not a number decreases nothing, and becomes the far end.
+        if !decreases(start, at) || at.value >= low.value {
+            high = at;
+        } else {
+            if flat(start, at) {
                 return Some(at);
             }
-            if at.slope >= 0.0 {
-                // Beyond a minimum, and lower than the point before: the better end comes first.
-                return self.zoom(start, at, before, left, evaluate);
+            if at.slope * (high.length - low.length) >= 0.0 {
+                high = low;
             }
-            (before, length) = (at, 2.5 * at.length);
+            low = at;
         }
-        None
     }
-
-    /// Searches between `low`, the better end, and `high`.
-    fn zoom(
-        &self,
-        start: Point,
-        mut low: Point,
-        mut high: Point,
-        evaluations: usize,
-        mut evaluate: impl FnMut(f64) -> Point,
-    ) -> Option<Point> {
-        for _ in 0..evaluations {
-            let at = evaluate(between(low, high));
-            // A loss that is not a number decreases nothing, and becomes the far end.
-            if !self.decreases(start, at) || at.value >= low.value {
-                high = at;
-            } else {
-                if self.flat(start, at) {
-                    return Some(at);
-                }
-                if at.slope * (high.length - low.length) >= 0.0 {
-                    high = low;
-                }
-                low = at;
-            }
-        }
-        // Enough of a decrease will do. It is evaluated again, since the caller takes the gradient
-        // of the last point.
-        let last = evaluate(low.length);
-        (low.length > 0.0 && self.decreases(start, last)).then_some(last)
-    }
+    // Enough of a decrease will do. It is evaluated again, since the caller takes the gradient
+    // of the last point.
+    let last = evaluate(low.length);
+    (low.length > 0.0 && decreases(start, last)).then_some(last)
 }
 
 /// Minimum of the cubic through both ends, kept a tenth away from them.

@@ -10,6 +10,6 @@ mod muon;
 mod schedule;
 
 pub use adam::AdamState;
-pub use lbfgs::{Lbfgs, LbfgsState, Objective, Step};
+pub use lbfgs::{Lbfgs, Objective};
 pub use muon::Muon;
 pub use schedule::LinearDecay;

@@ -12,7 +12,7 @@ use super::ray_weights::Voxels;
 use super::{Ending, LinearProblem, LinearProgress, LinearSettings, LinearSolution};
 use super::{Stationarity, Watch};
 use crate::Error;
-use crate::optimise::{Lbfgs, LbfgsState, Step};
+use crate::optimise::Lbfgs;
 use kerrlight_common::simd::Float;
 
 /// A field on the nodes of a grid whose logarithm is Gaussian, with density exp(−|z − center|²/2).
@@ -87,28 +87,25 @@ impl<T: Float + Default> Posterior<'_, '_, T> {
     }
 }
 
-const STEPS: Lbfgs = Lbfgs { memory: 16, evaluations: 20 };
+/// Pairs of steps and gradient differences that are kept.
+const MEMORY: usize = 16;
 
 /// State of a descent.
 struct Place {
     white: Vec<f64>,
-    state: LbfgsState<f64>,
+    steps: Lbfgs,
     value: f64,
 }
 
 impl Place {
     /// The largest number of the gradient.
     fn slope(&self) -> f64 {
-        self.gradient().iter().fold(0.0f64, |most, g| most.max(g.abs()))
+        self.steps.gradient.iter().fold(0.0f64, |most, g| most.max(g.abs()))
     }
 
     /// The length of the gradient.
     fn violation(&self) -> f64 {
-        self.gradient().iter().map(|g| g * g).sum::<f64>().sqrt()
-    }
-
-    fn gradient(&self) -> &[f64] {
-        &self.state.numbers[..self.white.len()]
+        self.steps.gradient.iter().map(|g| g * g).sum::<f64>().sqrt()
     }
 }
 
@@ -133,13 +130,13 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let objective = Objective::new(&operator, &data, &terms);
         let mut posterior = Posterior { objective, prior, upper: self.upper };
         let count = prior.count();
-        let state = LbfgsState::new(count, STEPS.memory);
-        let mut place = Place { white: vec![0.0; count], state, value: f64::NAN };
-        place.value = posterior.value_and_gradient(&place.white, &mut place.state.numbers[..count]);
+        let steps = Lbfgs::new(count, MEMORY);
+        let mut place = Place { white: vec![0.0; count], steps, value: f64::NAN };
+        place.value = posterior.value_and_gradient(&place.white, &mut place.steps.gradient);
         let (start, start_slope) = (place.value, place.slope());
         posterior.objective.finite(start, &posterior.emission(&place.white))?;
-        // The gradient is in the state already: the first step need not evaluate it again.
-        place.state.value = Some(start);
+        // With its gradient it is known: the first step need not evaluate them again.
+        place.steps.value = Some(start);
         let ending = posterior.descend(&mut place, settings, watch);
         let emission = posterior.emission(&place.white);
         let value = posterior.objective.finite(place.value, &emission)?;
@@ -174,10 +171,10 @@ impl<T: Float + Default> Posterior<'_, '_, T> {
             }
             let mut of =
                 |white: &[f64], gradient: &mut [f64]| self.value_and_gradient(white, gradient);
-            match STEPS.step(&mut of, &mut place.state, &mut place.white) {
-                Step::Taken { value, .. } => place.value = value,
-                Step::NoDescent | Step::NotFinite => return Ending::Rounding,
-            }
+            let Some(value) = place.steps.step(&mut of, &mut place.white) else {
+                return Ending::Rounding;
+            };
+            place.value = value;
             let (evaluations, nodes) = (self.objective.evaluations, place.white.len());
             let now = LinearProgress { round: 1, evaluations, value: place.value, nodes };
             if watch(&now).is_break() {
