@@ -3,7 +3,7 @@
 use super::change::{self, change};
 use super::quiescent::{self, quiescent};
 use super::{Result, axis, linear, motion, polarized};
-use crate::fit::linear::Change;
+use crate::fit::linear::{Change, Voxels};
 use crate::fit::settings;
 use crate::fit::settings::{
     FieldKind, FitError, FitFile, Kind, LossKind, Occupancy, Optimiser, Start, Within, refuse,
@@ -14,7 +14,7 @@ use crate::fit::{
 use crate::optimise::{LinearDecay, Muon};
 use crate::representation::{
     Activation, Carrier, Changing, Degree, FeatureGrid, FeatureGridSettings, Grid, GridSettings,
-    Knots, Network, NetworkSettings, OwnSettings, Registry, Representation, Spline,
+    Knots, Network, NetworkSettings, OwnSettings, Registry, Representation,
 };
 use kerrlight_common::memory;
 
@@ -105,7 +105,7 @@ pub(super) fn of_matter(
         }
         Kind::LinearGrid if degree(file) != Degree::Linear => {
             let nodes = chosen.linear_grid.nodes;
-            Box::new(Spline::cube(nodes, r, degree(file)).within("representation")?)
+            Box::new(Voxels::cube(nodes, r, degree(file)).field().within("representation")?)
         }
         Kind::Grid | Kind::LinearGrid => {
             Box::new(Grid::new(chosen_grid(chosen, r)).within("representation")?)

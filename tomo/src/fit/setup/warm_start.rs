@@ -1,7 +1,7 @@
 //! A start of a representation from the solution of a linear problem.
 
 use super::{Result, linear};
-use crate::fit::linear::LinearSolution;
+use crate::fit::linear::{LinearSolution, Voxels};
 use crate::fit::settings::{FitFile, Kind, refuse};
 use crate::fit::{Region, State};
 use crate::optimise::{AdamState, Muon};
@@ -63,7 +63,8 @@ pub fn warm_start(
     let own = state.now.parameters.len() - quiescent.len();
     state.now.parameters[own..].copy_from_slice(quiescent);
     let (r, region) = (file.region.r_max, file.region.limits());
-    let solution = Solution::of(given, Spline::cube(given.nodes, r, linear(file)?.degree)?)?;
+    let voxels = Voxels::cube(given.nodes, r, linear(file)?.degree);
+    let solution = Solution::of(given, voxels.field()?)?;
     if file.representation.kind == Kind::Grid {
         read_off(file, &solution, &mut state.now.parameters[..own]);
         return Ok(WarmStarted { steps: 0, relative_error: 0.0 });

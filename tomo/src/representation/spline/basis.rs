@@ -44,8 +44,8 @@ impl Degree {
 
     /// Distance of the first node from the middle of a grid of `nodes` along an axis, for a field of half-width 1.
     pub(crate) fn reach(self, nodes: usize) -> f64 {
-        // Of all cells, `margin` at each end are dark.
-        let all = (nodes - 1) as f64;
+        // Of all cells, `margin` at each end are dark; so few nodes as leave no other are refused by `Spline::new`.
+        let all = nodes as f64 - 1.0;
         all / (all - 2.0 * self.margin())
     }
 

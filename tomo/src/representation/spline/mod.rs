@@ -69,19 +69,6 @@ impl Spline {
         Ok(Self { nodes, degree, first, per_length })
     }
 
-    /// Nodes of a cube about the hole that reaches `half_width` (M) to each side.
-    ///
-    /// # Errors
-    /// If a number is out of its range.
-    pub fn cube(nodes: usize, half_width: f64, degree: Degree) -> Result<Self, Error> {
-        // So few nodes leave no lit cell to scale by: `new` refuses them.
-        if nodes < degree.taps() {
-            return Self::new([nodes; 3], [-1.0; 3], [1.0; 3], degree);
-        }
-        let reach = half_width * degree.reach(nodes);
-        Self::new([nodes; 3], [-reach; 3], [reach; 3], degree)
-    }
-
     /// The value at a point, M.
     pub(crate) fn at<T: Float>(&self, parameters: &[T], [x, y, z]: [T; 3]) -> T {
         self.value(parameters, &Coordinates::xyz(&[x], &[y], &[z]), 0)

@@ -1,4 +1,5 @@
 use super::*;
+use crate::fit::linear::Voxels;
 use crate::representation::conformance::{Subject, check};
 
 const LOW: [f64; 3] = [-5.0, -4.0, -3.5];
@@ -80,7 +81,7 @@ fn exact_squares_are_kept_with_their_shift() {
 #[test]
 fn exact_cubes_cover_their_half_width() {
     for degree in [Degree::Linear, Degree::Quadratic, Degree::Cubic] {
-        let field = Spline::cube(12, 3.0, degree).unwrap();
+        let field = Voxels::cube(12, 3.0, degree).field().unwrap();
         let (edge, beyond) = ([2.9999, -2.9999], [3.0001, -3.0001]);
         let mut values = [0.0f64; 2];
         let ones = vec![1.0; 1728];
@@ -99,7 +100,7 @@ fn exact_cubes_cover_their_half_width() {
 
 #[test]
 fn exact_few_nodes_are_refused() {
-    let error = Spline::cube(3, 1.0, Degree::Cubic).unwrap_err().to_string();
+    let error = Voxels::cube(3, 1.0, Degree::Cubic).field().unwrap_err().to_string();
     assert!(error.contains("nodes") && error.contains("4 to 2048"), "{error}");
-    assert!(Spline::cube(4, 1.0, Degree::Cubic).is_ok());
+    assert!(Voxels::cube(4, 1.0, Degree::Cubic).field().is_ok());
 }
