@@ -9,12 +9,10 @@ mod paper;
 #[path = "support/mod.rs"]
 mod support;
 
-use kerrlight_render::dynamics::Axis;
 use kerrlight_tomo::fit::{
-    Batch, BatchSize, Data, ImageTerm, Objective, OccupancyPlan, OccupancySettings, Outcome,
-    Region, State, Trainer, Training, Weighted,
+    Batch, BatchSize, OccupancyPlan, OccupancySettings, Outcome, State, Trainer, Training,
 };
-use kerrlight_tomo::optimise::{AdamState, LinearDecay};
+use kerrlight_tomo::optimise::AdamState;
 use kerrlight_tomo::representation::{
     Gradient, Groups, InstructionSet, Network, NetworkSettings, Representation, Workspace,
 };
@@ -22,36 +20,12 @@ use support::{large_sgemm, least, wanted};
 
 /// Frames of the movie.
 const FRAMES: usize = 128;
-const REGION: Region = Region { r_min: 2.0, r_max: 5.0, z_width: f64::INFINITY };
-
-fn axis() -> Axis {
-    Axis::new([0.5, 0.0, -(0.75f64.sqrt())]).expect("an axis")
-}
-
-fn objective() -> Objective<f32> {
-    let truth = paper::Truth::about(axis());
-    let lines = paper::lines_in(REGION, &paper::screen(64), 100).expect("rays");
-    let model = paper::forward_model(&lines, FRAMES).expect("a model");
-    let term = ImageTerm::new(truth.movie(&model), lines.pixels, 1.0).expect("a movie");
-    let image = Some(Weighted { weight: 1.0, term: Box::new(term) });
-    Objective { model, data: Data { image, others: Vec::new() } }
-}
 
 fn training(batch: BatchSize) -> Training {
     let settings = OccupancySettings { cells: 24, threshold: 0.01, memory: 0.8 };
-    Training {
-        seed: 1,
-        muon: None,
-        rate: LinearDecay { from: 1e-3, to: 1e-5, steps: 400 },
-        axis_rate: None,
-        ramp: 0,
-        batch,
-        // A step in twenty looks at every cell.
-        occupancy: Some(OccupancyPlan { settings, warm_up: 60, every: 20 }),
-        change: None,
-        region: REGION,
-        keep_every: 50,
-    }
+    // A step in twenty looks at every cell.
+    let occupancy = Some(OccupancyPlan { settings, warm_up: 60, every: 20 });
+    Training { occupancy, ..paper::training(batch, 400) }
 }
 
 /// Seconds of the parts of a step on these pairs: points collected and pulled back, the network forward and back,
@@ -65,7 +39,7 @@ fn parts(
     let (mut batch, mask) = (Batch::default(), state.now.occupancy.as_ref());
     let gather = least(|| {
         batch.set(pairs.iter().copied());
-        batch.gather(&trainer.objective.model, axis(), mask);
+        batch.gather(&trainer.objective.model, paper::axis(), mask);
     });
     let count = network_parameters(network);
     let (mut gradient, mut values) = (vec![0.0; count], vec![0.0; batch.points()]);
@@ -92,8 +66,9 @@ fn network_parameters(network: &Network) -> usize {
 fn measure(batch: BatchSize, set: InstructionSet) {
     let network = Network::new(NetworkSettings::bhnerf()).expect("the paper's sizes").on(set);
     let training = training(batch);
-    let mut state = State::new(&network, axis(), &training);
-    let mut trainer = Trainer::new(objective(), &network, training);
+    let mut state = State::new(&network, paper::axis(), &training);
+    let objective = paper::objective(FRAMES).expect("a movie");
+    let mut trainer = Trainer::new(objective, &network, training);
     let mut points = 0;
     while state.now.step < 201 {
         let Ok(Outcome::Done(loss)) = trainer.step(&mut state) else { panic!("it diverged") };

@@ -12,10 +12,9 @@ use kerrlight_geodesic::gpu::{Adapter, Compute, GpuError, KernelTime, Needs, ada
 use kerrlight_render::dynamics::Axis;
 use kerrlight_tomo::fit::graphics::{GraphicsFit, open};
 use kerrlight_tomo::fit::{
-    Batch, BatchSize, Data, Drawn, ForwardModel, ImageTerm, Objective, Region, State, StepDevice,
-    Stretch, Training, Weighted,
+    Batch, BatchSize, Drawn, ForwardModel, State, StepDevice, Stretch, Training,
 };
-use kerrlight_tomo::optimise::{LinearDecay, Muon};
+use kerrlight_tomo::optimise::Muon;
 use kerrlight_tomo::representation::{
     Activation, FeatureGrid, FeatureGridSettings, Grid, GridSettings, Network, NetworkSettings,
     Representation,
@@ -23,8 +22,6 @@ use kerrlight_tomo::representation::{
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::time::Instant;
-
-const REGION: Region = Region { r_min: 2.0, r_max: 5.0, z_width: f64::INFINITY };
 
 type Answer<T> = Result<T, Box<dyn Error>>;
 
@@ -127,32 +124,6 @@ fn ceilings(adapter: &Adapter) -> Result<(), GpuError> {
     Ok(())
 }
 
-fn objective() -> Answer<(Objective<f32>, Axis)> {
-    let axis = Axis::new([0.5, 0.0, -(0.75f64.sqrt())])?;
-    let truth = paper::Truth::about(axis);
-    let lines = paper::lines_in(REGION, &paper::screen(64), 100)?;
-    let mut model = paper::forward_model(&lines, 16)?;
-    model.weigh(axis);
-    let term = Box::new(ImageTerm::new(truth.movie(&model), lines.pixels, 1.0)?);
-    let image = Some(Weighted { weight: 1.0, term });
-    Ok((Objective { model, data: Data { image, others: Vec::new() } }, axis))
-}
-
-fn training(batch: BatchSize, steps: u64) -> Training {
-    Training {
-        seed: 1,
-        muon: None,
-        rate: LinearDecay { from: 1e-3, to: 1e-5, steps },
-        axis_rate: None,
-        ramp: 0,
-        batch,
-        occupancy: None,
-        change: None,
-        region: REGION,
-        keep_every: 50,
-    }
-}
-
 /// Steps from rays that have so many points.
 fn steps_of(
     adapter: &Adapter,
@@ -161,10 +132,11 @@ fn steps_of(
     [points, steps, most]: [usize; 3],
 ) -> Answer<()> {
     let field = &*field;
-    let (objective, axis) = objective()?;
+    let (objective, axis) = (paper::objective(16)?, paper::axis());
     let model = &objective.model;
     let (pairs, held) = pairs_with(model, axis, points);
-    let training = Training { muon, ..training(BatchSize::Pixels(pairs.len()), steps as u64) };
+    let batch = BatchSize::Pixels(pairs.len());
+    let training = Training { muon, ..paper::training(batch, steps as u64) };
     let now = State::<f32>::new(field, axis, &training).now;
     let mut fit = GraphicsFit::new(open(adapter)?, &objective, field, &training, None)?;
     let stretch = |steps: usize| Stretch {
