@@ -2,15 +2,13 @@
 //! batch, beside the rate of a large matrix product in the same run. The gradient is checked first,
 //! so that nothing wrong is timed.
 //!
-//! The table printed first holds processor time a thread (Linux; elsewhere wall time), which other
-//! work on the machine disturbs least; criterion's own times follow. Threads are as many as
-//! `RAYON_NUM_THREADS` says.
+//! Times are processor time a thread (Linux; elsewhere wall time), which other work on the machine disturbs least. Threads are
+//! as many as `RAYON_NUM_THREADS` says.
 
 #[path = "support/mod.rs"]
 mod support;
 
 use core::ops::Range;
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use kerrlight_tomo::optimise::AdamState;
 use kerrlight_tomo::representation::{
     Activation, Coordinates, FeatureGrid, FeatureGridSettings, Gradient, Grid, GridSettings,
@@ -139,19 +137,7 @@ fn table((name, representation, operations): Entry<'_>) {
     }
 }
 
-fn measure(criterion: &mut Criterion, name: &str, representation: &dyn Representation<f32>) {
-    let mut group = criterion.benchmark_group(name);
-    group.sample_size(10);
-    for points in &BATCHES[..2] {
-        let mut run = Run::new(representation, *points);
-        run.check();
-        group.throughput(Throughput::Elements(*points as u64));
-        group.bench_function(format!("eval, {points}"), |bencher| bencher.iter(|| run.eval()));
-        group.bench_function(format!("step, {points}"), |bencher| bencher.iter(|| run.step()));
-    }
-}
-
-fn benches(criterion: &mut Criterion) {
+fn main() {
     println!("{} threads", rayon::current_num_threads());
     let bhnerf = Network::new(NetworkSettings::bhnerf()).expect("the paper's sizes");
     let mlp4d = Network::new(NetworkSettings::mlp4d()).expect("the paper's sizes");
@@ -178,10 +164,4 @@ fn benches(criterion: &mut Criterion) {
         ("grid 64³, linear", &linear, None),
     ];
     all.into_iter().filter(|(name, ..)| wanted(name)).for_each(table);
-    for (name, representation, _) in all {
-        measure(criterion, name, representation);
-    }
 }
-
-criterion_group!(representation, benches);
-criterion_main!(representation);
