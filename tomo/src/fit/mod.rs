@@ -75,7 +75,7 @@ pub use loss::curve_term::{FluxDatum, StokesCurveTerm};
 pub use loss::device_observable::Compared;
 pub use loss::objective::{Buffers, Data, Gradients, Loss, Objective, Weighted};
 pub use loss::regulariser::{Regulariser, Shape};
-pub use loss::scan_term::{IntensityTerm, Scan, ScanTerm};
+pub use loss::scan_term::{Scan, ScanTerm};
 pub use loss::selection::Drawn;
 pub use loss::terms::{FrameTerm, ImageTerm, LightCurveTerm};
 pub use quiescent::{Quiescent, WithStaticImage};

@@ -15,7 +15,8 @@ pub struct Scan<T> {
     pub term: Box<dyn DataTerm<T> + Send>,
 }
 
-/// Visibilities, or what is made of them, of the frames that were observed.
+/// Visibilities, or what is made of them, of the frames that were observed. Frames may have more images than transforms take,
+/// which are the first then: that of Stokes I.
 pub struct ScanTerm<T> {
     name: String,
     pixels: usize,
@@ -23,15 +24,22 @@ pub struct ScanTerm<T> {
     scans: Vec<Option<Scan<T>>>,
 }
 
+impl<T: Float> Scan<T> {
+    /// Pixels of the images that it takes.
+    fn seen(&self) -> usize {
+        self.transform.frames() * self.transform.pixels()
+    }
+}
+
 impl<T: Float> ScanTerm<T> {
-    /// Takes a scan a frame. `quadratic`: whether χ² is so in the visibilities.
+    /// Takes a scan a frame, of so many pixels in all its images. `quadratic`: whether χ² is so in the visibilities.
     ///
     /// # Panics
     /// If a transform and its term do not fit together.
     pub fn new(name: &str, pixels: usize, quadratic: bool, scans: Vec<Option<Scan<T>>>) -> Self {
         for scan in scans.iter().flatten() {
             assert_eq!(scan.transform.data(), scan.term.visibilities());
-            assert_eq!(scan.transform.frames() * scan.transform.pixels(), pixels);
+            assert!(scan.seen() <= pixels);
         }
         Self { name: name.to_owned(), pixels, quadratic, scans }
     }
@@ -66,75 +74,29 @@ impl<T: Float> FrameTerm<T> for ScanTerm<T> {
         let Some(Scan { transform, term }) = &self.scans[frame] else {
             return Some(Compared::Nothing);
         };
-        // Devices sum one image directly; several, for Stokes parameters, stay on the processor.
-        let (sky, pulse, uv) = transform.direct().filter(|_| transform.frames() == 1)?;
+        // Devices sum frames of one image directly; several, for Stokes parameters, stay on the processor.
+        let (sky, pulse, uv) = transform.direct().filter(|_| transform.pixels() == self.pixels)?;
         let of_pixel = |uv: [f64; 2]| (uv, pulse.transform(uv, sky.pixel_rad));
         let seen = uv.into_iter().map(of_pixel).collect();
         Some(Compared::Scan { sky, seen, with: term.comparison()? })
     }
 
     fn value_and_gradient(&self, frame: usize, image: &[T], weight: T, gradient: &mut [T]) -> f64 {
-        let Some(Scan { transform, term }) = &self.scans[frame] else { return 0.0 };
+        let Some(scan) = &self.scans[frame] else { return 0.0 };
+        let (Scan { transform, term }, seen) = (scan, ..scan.seen());
         let zero = Complex::new(T::zero(), T::zero());
         let mut model = vec![zero; transform.data()];
-        transform.forward(image, &mut model);
+        transform.forward(&image[seen], &mut model);
         let mut of_model = vec![zero; model.len()];
         let value = term.value_and_gradient(&model, weight, &mut of_model);
-        transform.adjoint(&of_model, gradient);
+        transform.adjoint(&of_model, &mut gradient[seen]);
         value
     }
 
     fn residuals(&self, frame: usize, image: &[T]) -> Vec<Residual> {
-        let Some(Scan { transform, term }) = &self.scans[frame] else { return Vec::new() };
-        let mut model = vec![Complex::new(T::zero(), T::zero()); transform.data()];
-        transform.forward(image, &mut model);
-        term.residuals(&model)
-    }
-}
-
-/// Data of total intensity in a fit whose frames are images of several Stokes parameters, I first.
-pub struct IntensityTerm<T: Float> {
-    /// The data.
-    pub term: Box<dyn FrameTerm<T>>,
-    /// Images of a frame.
-    pub images: usize,
-}
-
-impl<T: Float> FrameTerm<T> for IntensityTerm<T> {
-    fn name(&self) -> &str {
-        self.term.name()
-    }
-
-    fn frames(&self) -> usize {
-        self.term.frames()
-    }
-
-    fn pixels(&self) -> usize {
-        self.term.pixels() * self.images
-    }
-
-    fn degrees_of_freedom(&self, frame: usize) -> usize {
-        self.term.degrees_of_freedom(frame)
-    }
-
-    fn is_quadratic(&self) -> bool {
-        self.term.is_quadratic()
-    }
-
-    fn is_convex(&self) -> bool {
-        self.term.is_convex()
-    }
-
-    fn is_scale_free(&self) -> bool {
-        self.term.is_scale_free()
-    }
-
-    fn value_and_gradient(&self, frame: usize, image: &[T], weight: T, gradient: &mut [T]) -> f64 {
-        let first = ..self.term.pixels();
-        self.term.value_and_gradient(frame, &image[first], weight, &mut gradient[first])
-    }
-
-    fn residuals(&self, frame: usize, image: &[T]) -> Vec<Residual> {
-        self.term.residuals(frame, &image[..self.term.pixels()])
+        let Some(scan) = &self.scans[frame] else { return Vec::new() };
+        let mut model = vec![Complex::new(T::zero(), T::zero()); scan.transform.data()];
+        scan.transform.forward(&image[..scan.seen()], &mut model);
+        scan.term.residuals(&model)
     }
 }

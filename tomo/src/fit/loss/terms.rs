@@ -190,7 +190,9 @@ impl<T: Float> FrameTerm<T> for ImageTerm<T> {
 /// The total flux of every frame: (Σ I − data)²/σ².
 #[derive(Clone, Debug)]
 pub struct LightCurveTerm {
+    /// Pixels of an image, and images of a frame, of which the first is I.
     pixels: usize,
+    images: usize,
     flux: Vec<f64>,
     inverse_variance: Vec<f64>,
 }
@@ -212,7 +214,12 @@ impl LightCurveTerm {
             return range("light-curve sigma", *bad, "above 0");
         }
         let inverse_variance = noise_sigma.iter().map(|sigma| sigma.powi(-2)).collect();
-        Ok(Self { pixels, flux, inverse_variance })
+        Ok(Self { pixels, images: 1, flux, inverse_variance })
+    }
+
+    /// The same where frames are images of so many Stokes parameters, I first.
+    pub fn first_of(self, images: usize) -> Self {
+        Self { images, ..self }
     }
 }
 
@@ -226,7 +233,7 @@ impl<T: Float> FrameTerm<T> for LightCurveTerm {
     }
 
     fn pixels(&self) -> usize {
-        self.pixels
+        self.pixels * self.images
     }
 
     fn degrees_of_freedom(&self, _frame: usize) -> usize {
@@ -238,19 +245,21 @@ impl<T: Float> FrameTerm<T> for LightCurveTerm {
     }
 
     fn compared(&self, frame: usize) -> Option<Compared> {
-        Some(Compared::Flux(self.flux[frame] as f32, self.inverse_variance[frame] as f32))
+        let flux = Compared::Flux(self.flux[frame] as f32, self.inverse_variance[frame] as f32);
+        (self.images == 1).then_some(flux)
     }
 
     fn value_and_gradient(&self, frame: usize, image: &[T], weight: T, gradient: &mut [T]) -> f64 {
-        let residual = image.iter().map(|pixel| pixel.double()).sum::<f64>() - self.flux[frame];
+        let flux: f64 = image[..self.pixels].iter().map(|pixel| pixel.double()).sum();
+        let residual = flux - self.flux[frame];
         let scaled = residual * self.inverse_variance[frame];
         let slope = T::of(2.0 * scaled) * weight;
-        gradient.iter_mut().for_each(|pixel| *pixel += slope);
+        gradient[..self.pixels].iter_mut().for_each(|pixel| *pixel += slope);
         residual * scaled
     }
 
     fn residuals(&self, frame: usize, image: &[T]) -> Vec<Residual> {
-        let flux = image.iter().map(|pixel| pixel.double()).sum();
+        let flux = image[..self.pixels].iter().map(|pixel| pixel.double()).sum();
         vec![plain(flux, self.flux[frame], self.inverse_variance[frame].sqrt())]
     }
 }

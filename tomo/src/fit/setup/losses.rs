@@ -4,9 +4,7 @@ use super::imported::FILE;
 use super::polarized::images;
 use super::{FitData, Result};
 use crate::fit::settings::{FitError, Loss, LossKind, Within, refuse};
-use crate::fit::{
-    Data, FrameTerm, ImageTerm, IntensityTerm, LightCurveTerm, Scan, ScanTerm, Weighted,
-};
+use crate::fit::{Data, FrameTerm, ImageTerm, LightCurveTerm, Scan, ScanTerm, Weighted};
 use kerrlight_common::frames::Frames;
 use kerrlight_common::memory;
 use kerrlight_vlbi::Error as VlbiError;
@@ -45,12 +43,7 @@ impl FitData {
                     data.image = Some(Weighted { weight, term });
                 }
                 _ => {
-                    let term = self.other(loss, pixels).within(name())?;
-                    let term = match images(losses) {
-                        1 => term,
-                        _ if loss.data.is_polarized() => term,
-                        images => Box::new(IntensityTerm { term, images }),
-                    };
+                    let term = self.other(loss, pixels, images(losses)).within(name())?;
                     data.others.push(Weighted { weight, term });
                 }
             }
@@ -82,7 +75,8 @@ impl FitData {
         ImageTerm::of(movie.clone(), sigma)
     }
 
-    fn other(&self, loss: &Loss, pixels: usize) -> Result<Box<dyn FrameTerm<f32>>> {
+    /// Another term, of frames of so many images.
+    fn other(&self, loss: &Loss, pixels: usize, images: usize) -> Result<Box<dyn FrameTerm<f32>>> {
         if let Some(curve) = &self.curve {
             return Ok(Box::new(curve.fitted()?));
         }
@@ -95,12 +89,12 @@ impl FitData {
             })?;
             let flux: Vec<f64> = self.fluxes()?;
             let sigmas = vec![sigma; flux.len()];
-            return Ok(Box::new(LightCurveTerm::new(flux, &sigmas, pixels)?));
+            return Ok(Box::new(LightCurveTerm::new(flux, &sigmas, pixels)?.first_of(images)));
         }
-        Ok(Box::new(self.scans(loss, pixels)?))
+        Ok(Box::new(self.scans(loss, images * pixels)?))
     }
 
-    /// The visibilities of all frames, or what is made of them, in any precision.
+    /// The visibilities of all frames (of so many pixels), or what is made of them, in any precision.
     fn scans<T: Float>(&self, loss: &Loss, pixels: usize) -> Result<ScanTerm<T>> {
         let name = loss.data.label();
         let quadratic = loss.data.is_visibilities() && self.gains.is_none();
@@ -109,8 +103,7 @@ impl FitData {
         if scans.iter().all(Option::is_none) {
             refuse!("no frame has any {name}{}", self.torn(loss));
         }
-        let images = images(core::slice::from_ref(loss));
-        Ok(ScanTerm::new(name, images * pixels, quadratic, scans))
+        Ok(ScanTerm::new(name, pixels, quadratic, scans))
     }
 
     /// Explains why there are no closure quantities where averages of scans have them.
@@ -140,6 +133,7 @@ impl FitData {
         pixels: usize,
     ) -> Result<Vec<Weighted<dyn FrameTerm<T>>>> {
         let one = |(k, loss): (usize, &Loss)| -> Result<Weighted<dyn FrameTerm<T>>> {
+            let pixels = images(core::slice::from_ref(loss)) * pixels;
             let term = Box::new(self.scans(loss, pixels).within(format!("loss {k}"))?);
             Ok(Weighted { weight: loss.weight, term })
         };
