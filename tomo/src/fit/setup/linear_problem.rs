@@ -179,7 +179,7 @@ pub(super) fn solve_frames(
     let memory = if change.is_any() { MANY_ROWS } else { usual.memory };
     let (rounds, iterations) = (settings.rounds, iterations(of.file, settings));
     let (tolerance, settled) = enough(of, settings);
-    let how = LinearSettings { rounds, iterations, coarse, memory, tolerance, settled, ..usual };
+    let how = LinearSettings { rounds, iterations, coarse, memory, tolerance, settled };
     of.with(frames, |problem| match of.log_normal(&problem.voxels)? {
         Some(prior) => problem.solve_log_normal(&prior, &how, watch),
         None => problem.solve(&how, watch),
