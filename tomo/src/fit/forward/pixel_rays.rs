@@ -116,18 +116,20 @@ impl RingRays {
     /// Places spread over a pixel of width 1 about 0, such that none are behind each other from any side. Their mean is 0, so
     /// that sums over them are exact for light that is linear across the pixel.
     fn places(&self) -> Vec<[f64; 2]> {
-        // Of all hundredths those that interleave the rows and columns of six lattices of 8, 12 and 16 rays best.
-        const SHIFT: f64 = 0.56;
-        let (count, shift) = (self.count as f64, (self.lattice as f64 * SHIFT).fract());
+        // Of all hundredths one that interleaves the rows and columns of six lattices of 8, 12 and 16 rays best.
+        const SHIFT: f64 = 0.87;
+        let (count, shift) = (self.count as f64, ((self.lattice / 4) as f64 * SHIFT).fract());
         // A golden-ratio lattice on a torus: shifted and wrapped round, it stays as even.
         let rows = (0..self.count).map(|k| (k as f64 * GOLDEN + 0.5 + shift).fract());
         let middle = rows.clone().sum::<f64>() / count;
         let columns = (0..self.count).map(|k| (k as f64 + 0.5) / count - 0.5);
-        let places = columns.zip(rows).map(|(u, v)| [u, v - middle]);
-        // Columns stay where they are about a mean of 0: every other lattice has them as its rows.
-        let turned =
-            |[u, v]: [f64; 2]| if self.lattice.is_multiple_of(2) { [u, v] } else { [v, u] };
-        places.map(turned).collect()
+        // About a mean of 0 a shift moves few places: four lattices of each are mirror images.
+        let (is_mirrored, is_turned) = (self.lattice / 2 % 2 == 1, self.lattice % 2 == 1);
+        let place = |(u, v): (f64, f64)| {
+            let v = if is_mirrored { middle - v } else { v - middle };
+            if is_turned { [v, u] } else { [u, v] }
+        };
+        columns.zip(rows).map(place).collect()
     }
 }
 
@@ -192,8 +194,17 @@ mod tests {
     /// Columns and rows of several lattices interleave, whatever the number of rays.
     #[test]
     fn exact_lattices_have_columns_of_their_own() {
+        let of = |count, lattice| RingRays { count, spacing: 1.0, lattice }.places();
+        for count in 2..32 {
+            for (a, b) in (0..6).flat_map(|b| (0..b).map(move |a| (a, b))) {
+                let there = of(count, b);
+                let is_there =
+                    |place: &[f64; 2]| there.iter().any(|other| distance(*place, *other) < 1e-9);
+                assert!(!of(count, a).iter().all(is_there), "{count} rays, {a} and {b}");
+            }
+        }
         for count in [8, 12, 16] {
-            let of = |lattice| RingRays { count, spacing: 1.0, lattice }.places();
+            let of = |lattice| of(count, lattice);
             let all: Vec<[f64; 2]> = (0..6).flat_map(of).collect();
             for c in [0, 1] {
                 let mut seen: Vec<f64> = all.iter().map(|place| place[c]).collect();

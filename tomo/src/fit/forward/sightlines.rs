@@ -272,11 +272,10 @@ impl Sightlines {
     }
 }
 
-/// Returns the excess of the time of flight from a finite radius over its finite part.
-fn flight(observer: &Observer) -> f64 {
+/// Returns the part of the time of flight to an observer that times of frames leave out: r_o + 2 ln r_o at a finite radius,
+/// which grows without end. Times of frames mean the same at any distance then.
+pub fn flight(observer: &Observer) -> f64 {
     let w = observer.inverse_radius();
-    // r_o + 2 ln r_o, which delays to infinity leave out: so do all, and times of frames mean the
-    // same at any distance.
     if w > 0.0 { 1.0 / w - 2.0 * w.ln() } else { 0.0 }
 }
 

@@ -42,6 +42,11 @@ pub(super) fn is_drawn(file: &FitFile) -> bool {
     file.simulation.as_ref().is_some_and(|simulation| simulation.drawn)
 }
 
+/// Returns whether a fit simulates its data along its own rays.
+pub fn has_own_rays(file: &FitFile) -> bool {
+    file.data.is_none() && !is_drawn(file)
+}
+
 /// Returns whether data of these settings are those of a drawn geometry that another forward model can make.
 pub(super) fn is_drawn_elsewhere(file: &FitFile) -> Result<bool> {
     Ok(is_drawn(file) && is_of_other_model(&file.simulated()?))

@@ -11,7 +11,7 @@ use crate::fit::geometry::{
 use crate::fit::linear::{StopRule, refined};
 use crate::fit::settings::SearchView;
 use crate::fit::setup::Result;
-use crate::fit::setup::drawn::{is_drawn, is_drawn_elsewhere};
+use crate::fit::setup::drawn::{has_own_rays, is_drawn_elsewhere};
 use crate::fit::setup::instrument::samples;
 
 impl Detail<'_> {
@@ -71,8 +71,9 @@ impl Detail<'_> {
 
     /// Returns whether data have the rays through which a place sees them.
     pub fn shares_rays(&self, place: &Place) -> bool {
-        let is_simulated = self.file.data.is_none() && !is_drawn(self.file);
-        is_simulated && place.at.pixels == self.file.screen.pixels
+        let seen = &place.seen;
+        has_own_rays(self.file)
+            && (seen.is_images() || seen.view.file.screen.pixels == self.file.screen.pixels)
     }
 
     /// Adds the errors that the model has of itself, where data are of another one.

@@ -6,6 +6,7 @@ use crate::fit::geometry::{
     Effort, Envelope, Estimate, Free, Geometry, GeometryModel, GeometryProblem, Polished, Spread,
     bounded,
 };
+use crate::fit::seeds::{OF_POSTERIOR, mixed_seed};
 use crate::fit::settings::{FitFile, SearchView, UnknownGeometry};
 use crate::fit::setup::{FitData, Result};
 use nalgebra::{DMatrix, DVector};
@@ -79,6 +80,11 @@ fn enveloped(
     inflation: f64,
 ) -> Result<Option<Envelope>> {
     let Some(mut surroundings) = problem.around(polished)? else { return Ok(None) };
+    let resampled = resampled.filter(|_| !shares_rays);
+    if shares_rays && problem.gaussian.is_some() {
+        // Every look would be the same.
+        return Ok(surroundings.envelope(problem, inflation));
+    }
     let other_voxels = |effort: Effort, number: u64| {
         other_voxels(effort, problem.gaussian.map_or(number, |_| SAME))
     };
@@ -156,7 +162,8 @@ impl<'a> GeometryPosterior<'a> {
     /// A draw: the same for the same number. What the data say nothing about is drawn from its prior, the rest from a
     /// normal distribution with the covariance of the geometry; bounds are mirrors.
     pub fn draw(&self, number: u64) -> Geometry {
-        let mut random = Pcg64::seed_from_u64(self.file.seed ^ DRAWS.wrapping_add(number));
+        let mut random =
+            Pcg64::seed_from_u64(mixed_seed(self.file.seed, number, OF_POSTERIOR) ^ DRAWS);
         let normal = |_, _| random.sample::<f64, _>(StandardNormal);
         let normal = DVector::from_fn(self.free.len(), normal);
         let step = &self.root * normal;

@@ -142,7 +142,10 @@ impl Detail<'_> {
             Ok((excess > 0.0 && problem.gaussian.is_none(), problem.effort.degree))
         })?;
         let voxels = Voxels::cube(nodes, self.file.region.r_max, degree);
-        let is_wide = voxels.shape().spacing[0] >= 0.5 * spacing(&seen.view.file.screen)?;
+        // Of thinned images the distance between the pixels that are seen.
+        let apart = spacing(&self.file.screen)? * self.file.screen.pixels as f64
+            / seen.view.file.screen.pixels as f64;
+        let is_wide = voxels.shape().spacing[0] >= 0.5 * apart;
         Ok((asks && is_wide).then_some(Resolution { nodes, ..*at }))
     }
 }

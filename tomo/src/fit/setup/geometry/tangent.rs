@@ -14,7 +14,7 @@ use crate::fit::setup::{FitData, Result};
 use crate::fit::{Scan, ScanTerm};
 use kerrlight_vlbi::data_terms::GainTerm;
 use kerrlight_vlbi::gains::GainPriors;
-use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::observation::{Observation, Row};
 use kerrlight_vlbi::operator::Operator;
 use num_complex::Complex32;
 
@@ -72,7 +72,9 @@ impl FitData {
         let pixels = images.len() / frames.len().max(1);
         for (frame, image) in frames.iter().zip(images.chunks(pixels.max(1))) {
             let (part, sky) = self.part(*frame)?;
-            let mut places = part.stokes_i().map(|(row, _)| (row.time_h, row.channel));
+            // Gains that are solved for are those of all channels.
+            let channel = |row: &Row| self.gains.is_none().then_some(row.channel);
+            let mut places = part.stokes_i().map(|(row, _)| (row.time_h, channel(row)));
             let Some(place) = places.next() else { continue };
             if places.any(|other| other != place) {
                 return Ok(None);
