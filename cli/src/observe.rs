@@ -121,7 +121,8 @@ impl Observe {
         let (schedule, setup) = (self.observing.schedule()?, self.observing.setup()?);
         let source = &self.observing.source;
         let mut observation =
-            schedule::observe_affordable(&array, source.position, &schedule, &setup)?;
+            schedule::observe_affordable(&array, source.position, &schedule, &setup)
+                .with_context(|| source.name.clone())?;
         observation.source.clone_from(&source.name);
         let times_h = schedule.hours_utc(setup.ut1)?;
         let (movie, frames_h, said) = self.movie(&files, &times_h)?;

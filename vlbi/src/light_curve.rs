@@ -72,8 +72,11 @@ impl LightCurve {
     /// nothing for an unresolved source in the middle of the field, a half where phases are not calibrated.
     pub fn incoherent_part(observation: &Observation) -> Option<f64> {
         let near = observation.stokes_i().filter(|(row, _)| is_within_site(observation, row));
+        // Noise is in both parts, and would be most of what is weak.
         let (imaginary, all) = near.fold((0.0, 0.0), |(imaginary, all), (_, i)| {
-            (imaginary + i.visibility.im.powi(2), all + i.visibility.norm_sqr())
+            let noise = if i.noise_sigma > 0.0 { i.noise_sigma.powi(2) } else { 0.0 };
+            let power = i.visibility.norm_sqr() - 2.0 * noise;
+            (imaginary + i.visibility.im.powi(2) - noise, all + power)
         });
         Some(imaginary / all).filter(|part| *part > INCOHERENT)
     }
@@ -85,7 +88,8 @@ impl LightCurve {
         self
     }
 
-    /// Means of so many samples at a time; a rest that is fewer is left out, and a parameter that not all of them have.
+    /// Means of so many samples at a time; a rest that is fewer is left out. Those without a parameter have no part in
+    /// its mean.
     #[must_use]
     pub fn averaged(self, count: usize) -> Self {
         Self { samples: self.samples.chunks_exact(count.max(1)).map(mean).collect() }
@@ -270,7 +274,10 @@ mod tests {
         for turned in &mut observation.rows[1].products {
             *turned *= c(0.6, 0.8);
         }
-        assert!((LightCurve::incoherent_part(&observation).unwrap() - 0.64).abs() < 1e-12);
+        // Less the noise in both parts.
+        let noise = 0.25 * 0.25;
+        let expected = (0.64 * i * i - noise) / (i * i - 2.0 * noise);
+        assert!((LightCurve::incoherent_part(&observation).unwrap() - expected).abs() < 1e-12);
     }
 
     /// Stokes I as RR and LL has no V.

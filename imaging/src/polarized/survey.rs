@@ -3,6 +3,7 @@
 
 use super::{LinearPolarization, PolarizedProblem};
 use crate::Error;
+use crate::data::instants;
 use crate::found::Survey;
 use crate::settings::{StaticImageFile, StaticPolarization};
 use crate::solve::minimum;
@@ -85,7 +86,8 @@ pub fn survey_polarized(
     let search = Search { file, settings, grid, watch };
     let term = search.term(measured)?;
     let frames: Vec<usize> = (0..measured.times.len()).collect();
-    let Some(losses) = search.hold_out(&*term.term, light, survey, &frames) else {
+    let instants = instants(&measured.times, &measured.files);
+    let Some(losses) = search.hold_out(&*term.term, light, survey, &instants) else {
         return Ok(None);
     };
     let best = best_held(&losses).map_or(1.0, |best| best.value);
@@ -185,13 +187,14 @@ impl Search<'_> {
         term: &dyn FrameTerm<f64>,
         light: &[f64],
         survey: &Survey,
-        frames: &[usize],
+        instants: &[usize],
     ) -> Option<Vec<Held>> {
         let Some(settings) = &self.settings.strength else { return Some(Vec::new()) };
         let folds = settings.folds;
+        let count = instants.last().map_or(1, |last| last + 1);
         let part = |fold: usize, seen: bool| -> Vec<usize> {
-            let of = |frame: usize| frame * folds / frames.len();
-            frames.iter().copied().filter(|frame| (of(*frame) != fold) == seen).collect()
+            let of = |frame: usize| instants[frame] * folds / count;
+            (0..instants.len()).filter(|frame| (of(*frame) != fold) == seen).collect()
         };
         held(settings, |value, fold| {
             let seen = self.problem(term, light, value, part(fold, true));

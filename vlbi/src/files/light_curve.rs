@@ -210,10 +210,10 @@ pub fn parse(text: &str) -> Result<LightCurve, Error> {
     if heading.is_none() {
         return Err(FileError::whole(format!("no line names {}", wanted())).into());
     }
+    samples.retain(Sample::has_flux);
     if samples.is_empty() {
         return Err(FileError::whole("no fluxes").into());
     }
-    samples.retain(Sample::has_flux);
     samples.sort_by(|a: &Sample, b: &Sample| a.time_h.total_cmp(&b.time_h));
     Ok(LightCurve { samples })
 }

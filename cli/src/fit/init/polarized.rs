@@ -18,7 +18,7 @@ impl Tables {
     /// Returns the tables for these data; empty where RL and LR are no more than noise. Files whose name says that leakage was
     /// taken out (`dtermcal`) and Stokes parameters are compared by ratios; of others leakage is solved for. `varies` says
     /// whether the source does.
-    pub fn of(observation: &Observation, file: &str, varies: bool) -> Self {
+    pub fn of(observation: &Observation, file: &str, varies: bool, folds: usize) -> Self {
         if !is_polarized(observation) {
             return Self::default();
         }
@@ -43,9 +43,15 @@ impl Tables {
                 digits(jy)
             )
         });
+        let strength = match folds {
+            0 | 1 => String::new(),
+            folds => format!(
+                "\nstrength = {{ values = [0.01, 0.1, 1.0, 10.0, 100.0], folds = {folds} }}"
+            ),
+        };
         let polarization = format!(
             "[polarization]\n{data}\n{variability}smoothness = 0.01\niterations = 1000\nbeam_uas = 20.0 #! as published images of \
-             M87* and Sgr A* are seen\nstrength = {{ values = [0.01, 0.1, 1.0, 10.0, 100.0], folds = 4 }}"
+             M87* and Sgr A* are seen{strength}"
         );
         Self { leakage, polarization }
     }

@@ -32,14 +32,16 @@ pub fn of_visibilities(
     let losses = losses(has_closures(observation, average(source), long_only.is_some()));
     let extra = [long_only, source.and_then(|source| source.blur)].into_iter().flatten();
     let mut extra: Vec<String> = extra.map(str::to_owned).collect();
-    if source.is_some_and(|source| source.varies && source.image.is_some()) {
+    let has_law = source.is_some_and(|source| source.varies && source.image.is_some());
+    if has_law {
         // (1 + (4e9/2e9)²)^(1.25/2) = 5^0.625: 2 % of the flux at 4e9 wavelengths.
         extra.push(format!(
             "variability = {{ jy = {}, uv = 2e9, power = 1.25 }} #! the source varies by 2 % of its flux on baselines of 4e9 wavelengths, and with their length to the power of -1.25 (EHT Collaboration 2022, ApJL 930, L14)",
             digits(0.02 * short * 5f64.powf(0.625))
         ));
     }
-    let tables = Tables::of(observation, file, source.is_some_and(|source| source.varies));
+    let folds = folds(observation, average(source), long_only.is_some());
+    let tables = Tables::of(observation, file, has_law, folds);
     let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
     let published = source.and_then(|source| source.image.as_ref());
     let field = published.map_or(5.0 * beam, |images| images.field_uas);
@@ -66,7 +68,7 @@ pub fn of_visibilities(
         ("most", scaled(0.36)),
         ("average", format!("{:?}", average(source))),
         ("extra", extra.join("\n")),
-        ("strength", strength(observation, average(source), long_only.is_some())),
+        ("strength", strength(folds)),
         ("losses", losses.trim_end().to_owned()),
         ("gains", gains(observation)),
         ("leakage", tables.leakage),
@@ -84,14 +86,19 @@ const START: f64 = 0.32;
 const FOLDS: usize = 4;
 
 /// The choice of a strength by frames that are held out, two or more in each part; nothing where there are too few.
-fn strength(observation: &Observation, average_s: f64, long_only: bool) -> String {
-    let settings = VisibilitySettings { average_s, uv_min: long_only.then_some(1e8) };
-    let frames = setup::prepared(observation.clone(), &settings)
-        .map_or(0, |mut kept| setup::frames_of(&mut kept).0.len());
-    match FOLDS.min(frames / 2) {
+fn strength(folds: usize) -> String {
+    match folds {
         0 | 1 => String::new(),
         folds => format!("[strength]\nvalues = [10.0, 30.0, 100.0]\nfolds = {folds}"),
     }
+}
+
+/// Parts of the frames that the template's fit keeps.
+fn folds(observation: &Observation, average_s: f64, long_only: bool) -> usize {
+    let settings = VisibilitySettings { average_s, uv_min: long_only.then_some(1e8) };
+    let frames = setup::prepared(observation.clone(), &settings)
+        .map_or(0, |mut kept| setup::frames_of(&mut kept).0.len());
+    FOLDS.min(frames / 2)
 }
 
 /// Seconds of an average. The longer they are, the fewer closure quantities are left; a source that varies asks for frames in
