@@ -56,7 +56,7 @@ pub fn anchor(table: &mut Table, folder: &Path) {
 /// Keys that name files.
 fn is_path(key: &str, value: &str) -> bool {
     let is_array = key == "array" && kerrlight_vlbi::array::built_in(value).is_none();
-    key == "path" || is_array
+    ["path", "times"].contains(&key) || is_array
 }
 
 fn move_paths(key: &str, value: &mut Value, moved: &dyn Fn(&str) -> String) {

@@ -74,6 +74,7 @@ fn exact_a_field_of_events_is_fitted_without_a_mask() {
     let events = ["-o", "run", "--set", "representation=mlp4d"];
     let error = fail(folder.path(), &with(&small, &events));
     assert!(error.contains("training.occupancy"), "{error}");
+    let events = [&events[..], &["--set", "training.start=drawn"]].concat();
     let words = changed(folder.path(), |text| {
         let (before, rest) = text.split_once("[training.occupancy]").unwrap();
         let (_, after) = rest.split_once("[linear]").unwrap();

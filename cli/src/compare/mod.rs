@@ -130,7 +130,7 @@ impl Compare {
             chosen
         };
         runner.check_inputs(&cases)?;
-        let failed = if self.collect { None } else { Some(run(&cases, &runner)) };
+        let failed = if self.collect { None } else { Some(run(&cases, &runner, &folder)?) };
         let status = |case: &Case| match runner.known(case) {
             Status::Open => match &failed {
                 Some(failed) => failed.get(&case.slug()).cloned(),
@@ -271,7 +271,11 @@ fn with_known(chosen: Vec<Case>, all: Vec<Case>, runner: &Runner<'_>) -> Vec<Cas
 }
 
 /// Runs what is not done yet, until a signal; why which of them failed.
-fn run(cases: &[Case], runner: &Runner<'_>) -> HashMap<String, String> {
+fn run(
+    cases: &[Case],
+    runner: &Runner<'_>,
+    folder: &Path,
+) -> anyhow::Result<HashMap<String, String>> {
     let keeper = SignalGuard::saving("stopping after the fit's step; a second signal ends at once");
     let is_to_do = |case: &&Case| !matches!(runner.known(case), Status::Done(_));
     let is_wrong = |case: &&Case| case.early_error().is_some();
@@ -292,13 +296,14 @@ fn run(cases: &[Case], runner: &Runner<'_>) -> HashMap<String, String> {
         let status = runner.run(case, &keeper);
         bar.inc(u64::from(status != Status::Open));
         session::reached(&bar);
+        one::keep_failure(folder, case, &status)?;
         if let Status::Failed(why) = status {
             bar.suspend(|| eprintln!("failed: {}: {why}", case.name()));
             failed.insert(case.slug(), why);
         }
     }
     bar.finish_and_clear();
-    failed
+    Ok(failed)
 }
 
 /// The tables, how many cases are done and which of them are best and worst, and where to look.

@@ -20,11 +20,10 @@ pub fn run(case: &Case, runner: &Runner<'_>, folder: &Path) -> anyhow::Result<An
         return Err(Busy(case.slug()).into());
     };
     let keeper = SignalGuard::saving("stopping after the fit's step; a second signal ends at once");
-    let failure = failure_of(folder, case);
-    match runner.run(case, &keeper) {
+    let status = runner.run(case, &keeper);
+    keep_failure(folder, case, &status)?;
+    match status {
         Status::Done(results) => {
-            // What is left behind does no harm: results count.
-            let _ = std::fs::remove_file(failure);
             drop(lock);
             let _ = std::fs::remove_file(lock_of(folder, case));
             let run = runner.run_of(case).display().to_string();
@@ -34,12 +33,24 @@ pub fn run(case: &Case, runner: &Runner<'_>, folder: &Path) -> anyhow::Result<An
                 .with("results", results))
         }
         Status::Failed(why) => {
-            Output::new(&failure, "")?.write(why.as_bytes())?;
             Err(Failed { failed: 1, all: 1, names: format!("{}: {why}", case.name()) }.into())
         }
         Status::Open => {
             let how = "the same command resumes it";
             Err(Interrupted(format!("stopped: {} is not done; {how}", case.name())).into())
+        }
+    }
+}
+
+/// Keeps why a case failed for those who look at the folder later; that of a case which did not fail goes.
+pub fn keep_failure<T>(folder: &Path, case: &Case, status: &Status<T>) -> anyhow::Result<()> {
+    let failure = failure_of(folder, case);
+    match status {
+        Status::Failed(why) => Output::new(&failure, "")?.write(why.as_bytes()),
+        _ => {
+            // What is left behind does no harm: results count.
+            let _ = std::fs::remove_file(failure);
+            Ok(())
         }
     }
 }

@@ -131,9 +131,8 @@ impl Page<'_> {
         let seconds: f64 = summary.done().filter_map(|(_, results)| results.get("seconds")).sum();
         lines.push(format!(
             "What was run: {all} fits, of which {done} ended well, {failed} failed and {open} were not run to their end; \
-             {:.1} minutes of fitting in all, on {} threads. {}",
+             {:.1} minutes of fitting in all. {}",
             seconds / 60.0,
-            rayon::current_num_threads(),
             summary.seeds_told()
         ));
         for (case, why) in summary.failed().take(TOLD) {

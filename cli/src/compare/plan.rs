@@ -43,6 +43,13 @@ impl Plan {
             Source::BuiltIn => None,
             Source::Folder(folder) => Some(folder.clone()),
         };
+        if choice
+            .set
+            .iter()
+            .any(|set| set.split('=').next().is_some_and(|key| key.trim() == "seed"))
+        {
+            bail!("--set seed is not allowed: --seeds tells how many there are");
+        }
         let set = choice.set.iter().map(|set| paths::from_here(set, None));
         let choice = Choice { set: set.collect::<anyhow::Result<_>>()?, ..choice.clone() };
         Ok(Plan { version: env!("CARGO_PKG_VERSION").to_owned(), base, choice })

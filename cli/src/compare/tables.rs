@@ -51,9 +51,12 @@ impl Cell {
     }
 
     /// Returns its text in a table.
-    pub fn text(&self, digits: usize) -> String {
+    pub fn text(&self, digits: usize, seeds: u64) -> String {
         let best = self.best.as_ref().map(|level| format!(" ({level})"));
-        [self.spread.text(digits), best.unwrap_or_default()].concat()
+        // Of cases that failed, or found nothing to measure, there is no value.
+        let count = self.spread.count as u64;
+        let few = (count < seeds).then(|| format!(" (of {count})"));
+        [self.spread.text(digits), few.unwrap_or_default(), best.unwrap_or_default()].concat()
     }
 }
 
@@ -67,7 +70,8 @@ pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> 
     let cell = |row: &[(&str, &str)], column: &[(&str, &str)]| {
         Cell::of(experiment, summary, asked, &[row, column, &fixed].concat())
     };
-    let text = |cell: Option<Cell>| cell.map_or(NONE.to_owned(), |cell| cell.text(digits));
+    let text =
+        |cell: Option<Cell>| cell.map_or(NONE.to_owned(), |cell| cell.text(digits, summary.seeds));
     let mut lines = Vec::new();
     for row in &rows {
         let cells: Vec<Option<Cell>> = columns.iter().map(|column| cell(row, column)).collect();
@@ -93,11 +97,13 @@ pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> 
         1 => "One seed.".to_owned(),
         seeds => format!("Mean ± standard deviation over {seeds} seeds."),
     };
+    let is_few = lines.iter().flatten().any(|cell| cell.contains(" (of "));
+    let few = if is_few { " (of n): over fewer seeds, those that have a value." } else { "" };
     let gaps = if gaps { " –: not part of the experiment, or missing." } else { "" };
     let best =
         asked.best_of.as_ref().map(|name| format!(" In brackets: the best level of {name}."));
     let best = best.unwrap_or_default();
-    let caption = format!("{} {spread}{best}{gaps}", asked.caption);
+    let caption = format!("{} {spread}{few}{best}{gaps}", asked.caption);
     Table::new(title, caption.trim_start(), std::iter::once(head).chain(names), lines)
 }
 

@@ -75,7 +75,7 @@ pub fn of_table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) 
         }
         ranked.sort_by(|a, b| b.1.spread.mean.total_cmp(&a.1.spread.mean));
         let (rows, values): (Vec<_>, Vec<_>) =
-            ranked.into_iter().map(|(name, cell)| (name, cell.text(digits))).unzip();
+            ranked.into_iter().map(|(name, cell)| (name, cell.text(digits, summary.seeds))).unzip();
         match orders.iter_mut().find(|order| order.rows == rows) {
             Some(order) => {
                 order.columns.push(called(&column));

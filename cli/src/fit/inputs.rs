@@ -13,6 +13,20 @@ pub const SETTINGS: &str = "fit.toml";
 /// Its own name there.
 pub const FILE: &str = "inputs.json";
 
+/// Reads the data of a run again: nothing but the files that it was begun with.
+pub fn read_again<R>(run: &Path, read: impl FnOnce() -> anyhow::Result<R>) -> anyhow::Result<R> {
+    let (found, all) = output::with_reads(read);
+    let (found, inputs) = (found?, Inputs::load(run)?);
+    if let Some((other, _)) = all.iter().find(|(path, _)| !inputs.holds(path)) {
+        bail!(
+            "{} was not there when {} was begun: take it away, or start a new run with -o",
+            other.display(),
+            run.display()
+        );
+    }
+    Ok(found)
+}
+
 /// Inputs that decide a run beside its seed: the version of the program, settings and files.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Inputs {

@@ -117,7 +117,8 @@ impl Fit {
             let (folder, text) = Folder::open(path, self.patience())?;
             self.same(&text)?;
             let work = Work::read(&text).with_context(|| path.display().to_string())?;
-            let work = work.prepared(&base_dir_of(&text), registry)?;
+            let read = || work.prepared(&base_dir_of(&text), registry);
+            let work = inputs::read_again(folder.path(), read)?;
             work.check_device(device.as_ref())?;
             return self.run_all(&work, &text, &folder, true, device);
         }

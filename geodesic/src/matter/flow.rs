@@ -19,7 +19,8 @@ use crate::spacetime::point::PathPoint;
 /// ```
 pub fn keplerian_redshift(hole: &Kerr, r: f64, lambda: f64) -> Option<f64> {
     let (cube, root) = orbit(hole, r)?;
-    Some(root / (cube + hole.spin() - lambda))
+    // A ray with more angular momentum does not reach this radius.
+    Some(root / (cube + hole.spin() - lambda)).filter(|g| *g > 0.0)
 }
 
 /// Boyer–Lindquist components (uᵗ, uʳ, u^θ, u^φ) of a circular equatorial geodesic that turns about +z at radius r

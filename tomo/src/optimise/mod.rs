@@ -1,6 +1,6 @@
 //! Steps towards smaller losses.
 //!
-//! Optimisers. Their state is plain slices and counters that the caller owns: written out and read
+//! Optimisers. The state of Adam and Muon is plain slices and counters that the caller owns: written out and read
 //! back, a run goes on as if it had never stopped, to the last bit.
 
 pub(crate) mod adam;

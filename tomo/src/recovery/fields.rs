@@ -84,7 +84,8 @@ fn on_nodes(
     nodes.volume(values)
 }
 
-/// The field at another time, M since the reference time; zero outside the region.
+/// The field at another time, M since the reference time; zero outside the region, where matter has come from outside of it,
+/// and before emission is injected.
 ///
 /// # Errors
 /// If the volume is larger than memory, or out of range.
@@ -96,7 +97,16 @@ pub fn recovered_at(
     since: f64,
 ) -> Result<Volume, Error> {
     let region = file.region.limits();
-    on_nodes(file, trainer, Some((motion, since)), state, &|x| region.holds(x))
+    let shines = motion.injection.is_none_or(|start| motion.reference + since >= start.time);
+    let was_inside = |[x, y, z]: [f64; 3]| {
+        let radius = x.hypot(y).hypot(z);
+        let flow = motion.velocity.falling();
+        flow.is_none_or(|flow| {
+            (region.r_min..=region.r_max).contains(&flow.radius_before(radius, since))
+        })
+    };
+    let wanted = |x: [f64; 3]| shines && region.holds(x) && was_inside(x);
+    on_nodes(file, trainer, Some((motion, since)), state, &wanted)
 }
 
 /// The truth at a time since the reference time, M.

@@ -9,6 +9,7 @@ mod summary;
 use super::folder::Folder;
 use super::geometry_search;
 use super::held_out;
+use super::inputs;
 use super::run;
 use crate::answer::Answer;
 use crate::checksum::{is_whole, sealed};
@@ -21,6 +22,7 @@ use indicatif::ProgressBar;
 use kerrlight_render::volume::{Volume, VolumeFile};
 use kerrlight_tomo::fit::settings::{AxisSearch, FitFile, Kind, UnknownGeometry};
 use kerrlight_tomo::fit::setup::{GeometryPosterior, RaySampling, Resolution};
+use kerrlight_tomo::fit::{OF_POSTERIOR, mixed_seed, setup};
 use kerrlight_tomo::recovery::results::{GeometryResults, PerParameter};
 use kerrlight_tomo::recovery::{Problem, ResolvedFit, true_volume};
 use kerrlight_tomo::representation::Registry;
@@ -73,7 +75,8 @@ impl Posterior {
             );
         }
         let file = super::parse(text).with_context(|| self.run.display().to_string())?;
-        run::problem(file, &super::base_dir_of(text), registry)
+        let read = || run::problem(file, &super::base_dir_of(text), registry);
+        inputs::read_again(&self.run, read)
     }
 
     /// Draws some, each a file of its own, and adds nothing up. Others may draw around the same run: a draw is the same
@@ -192,7 +195,9 @@ fn add_up(
     let geometry = folder.found::<GeometryResults>(geometry_search::FILE)?;
     let truth = prepared.measured.truth.as_ref();
     let truth = truth.map(|truth| true_volume(&prepared.settings, truth, 0.0)).transpose()?;
-    let found = summary::Summary::new(&prepared.settings, geometry.as_deref(), all, truth)?;
+    // With the prior that held-out frames have chosen, which is that of the draws.
+    let file = held_out::settled(&prepared.settings, folder)?;
+    let found = summary::Summary::new(&file, geometry.as_deref(), all, truth)?;
     page::write(&found, prepared, path)?;
     let numbers = found.numbers();
     output::Output::new(&path.join(NUMBERS), "")?.write(sealed(numbers.clone()).as_bytes())?;
@@ -322,7 +327,7 @@ impl<'a> Drawing<'a> {
         let mut file = self.file.clone();
         // All draws have the flow of the fit: its seed is not theirs.
         file.motion.velocity = file.motion.velocity.clone().seeded(file.seed);
-        file.seed = file.seed.wrapping_add(number);
+        file.seed = mixed_seed(file.seed, number, OF_POSTERIOR);
         let has_prior = file.linear.as_ref().is_some_and(|linear| linear.prior.is_some());
         if file.representation.kind == Kind::LinearGrid && !has_prior {
             // A prior varies what the data do not resolve; without one, other voxels vary what
@@ -340,8 +345,9 @@ impl<'a> Drawing<'a> {
         told("the geometry");
         let data = geometries.data(noise)?;
         let geometry = geometries.draw(number);
-        // Other rays of the photon ring in each draw: what depends on their places is not known.
-        let rays = RaySampling { lattice: number, ..self.rays };
+        // Other rays of the photon ring in each draw, where those of the data are not known.
+        let lattice = if setup::has_own_rays(&file) { 0 } else { number };
+        let rays = RaySampling { lattice, ..self.rays };
         let ResolvedFit { file, instrument, motion, .. } =
             ResolvedFit::in_geometry(self.prepared, &file, &geometry, rays)?;
         let (instrument, motion) = (&instrument, &motion);

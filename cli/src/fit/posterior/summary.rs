@@ -6,7 +6,7 @@ use super::predictive::{self, Check};
 use kerrlight_render::volume::ranks::{Ranks, rank};
 use kerrlight_render::volume::{Coverage, Ensemble, Feature, Volume};
 use kerrlight_tomo::fit::geometry::Parameter;
-use kerrlight_tomo::fit::settings::FitFile;
+use kerrlight_tomo::fit::settings::{FieldKind, FitFile, Kind};
 use kerrlight_tomo::fit::setup;
 use kerrlight_tomo::recovery::results::GeometryResults;
 use rand::{RngExt, SeedableRng};
@@ -91,10 +91,10 @@ impl Summary {
         let ranked = |truth: &Volume| ranks(file, &ensemble, &features, &volumes, truth);
         let ranks = truth.as_ref().map(ranked).transpose()?;
         let certain = certain(&ensemble);
-        let open = open(file, &ensemble)?;
+        let open = open(file, &ensemble, &volumes)?;
         let open_part = open.as_ref().map(|open| part_of_region(file, open, |ratio| ratio > OPEN));
         let factors = draws.iter().map(|draw| draw.numbers.noise_factor);
-        let factor = factors.fold(1.0, f64::max);
+        let factor = factors.fold(0.0, f64::max);
         Ok(Self {
             ensemble,
             geometry,
@@ -309,12 +309,30 @@ fn ranks(
     Ok([random, bright, Ranks::of(features.first().map(radius).into_iter())])
 }
 
-/// The standard deviation of the draws over that of the prior.
-fn open(file: &FitFile, ensemble: &Ensemble) -> anyhow::Result<Option<Volume>> {
+/// The standard deviation of the draws over that of the prior: of the logarithm where that is normal. None where the prior is that
+/// of a start alone.
+fn open(file: &FitFile, ensemble: &Ensemble, draws: &[Volume]) -> anyhow::Result<Option<Volume>> {
+    if file.representation.kind != Kind::LinearGrid {
+        return Ok(None);
+    }
     let Some(prior) = setup::deviation_of_prior(file)? else { return Ok(None) };
     let drawn = &ensemble.deviation;
-    let ratio = drawn.values().iter().map(|x| x / prior as f32).collect();
+    let ratio = match file.linear.as_ref().and_then(|linear| linear.prior_of(FieldKind::LogNormal))
+    {
+        // A few draws tell nothing of the deviation of what has a heavy tail.
+        Some(_) => (0..drawn.values().len()).map(|k| log_deviation(draws, k) / prior).collect(),
+        None => drawn.values().iter().map(|x| f64::from(*x) / prior).collect::<Vec<f64>>(),
+    };
+    let ratio = ratio.into_iter().map(|x| x as f32).collect();
     Ok(Some(Volume::new(drawn.nodes(), drawn.low(), drawn.high(), ratio)?))
+}
+
+/// The standard deviation of the logarithm of draws at a node.
+fn log_deviation(draws: &[Volume], node: usize) -> f64 {
+    let logs = draws.iter().map(|draw| f64::from(draw.values()[node].max(f32::MIN_POSITIVE)).ln());
+    let count = draws.len() as f64;
+    let mean = logs.clone().sum::<f64>() / count;
+    (logs.map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt()
 }
 
 /// Part of the nodes of the region at which a volume is such.

@@ -8,7 +8,7 @@ use kerrlight_common::toml_file;
 use kerrlight_render::dynamics::Velocity;
 use kerrlight_render::scene::{Scene, VolumeRegion};
 use kerrlight_render::volume::VolumeFile;
-use kerrlight_tomo::fit::{Region, Sampling, State, Trainer, setup};
+use kerrlight_tomo::fit::{Region, Sampling, State, Trainer, flight, setup};
 use kerrlight_tomo::recovery::carried;
 
 /// The scene, and the volume that it names.
@@ -50,7 +50,7 @@ impl Estimate<'_> {
 
     fn scene_text(&self, state: &State<f32>, frame: usize, flux: f64) -> anyhow::Result<String> {
         let parts = [
-            self.heading(),
+            self.heading()?,
             self.place(frame)?,
             self.screen(flux)?,
             self.light(),
@@ -66,8 +66,9 @@ impl Estimate<'_> {
         (0..times.len()).min_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or(0)
     }
 
-    fn heading(&self) -> String {
-        let (folder, times) = (plain::path(self.folder.path()), &self.measured.times);
+    fn heading(&self) -> anyhow::Result<String> {
+        let (folder, later) = (plain::path(self.folder.path()), self.later()?);
+        let times: Vec<f64> = self.measured.times.iter().map(|time| time + later).collect();
         let mut text = format!(
             "# The emission that a fit recovered, with its motion. The fit: {}\n#   kerrlight render {folder}/{SCENE}\n",
             plain::line(&self.file.title)
@@ -102,13 +103,19 @@ impl Estimate<'_> {
         if self.file.effects.absorption.is_some() {
             text += "# The medium of the fit's effects.absorption is not part of scenes: this one is without it.\n";
         }
-        text
+        Ok(text)
+    }
+
+    /// What scenes count of the way of light, and times of frames leave out, M.
+    fn later(&self) -> anyhow::Result<f64> {
+        let is_slow = self.file.effects.slow_light;
+        Ok(if is_slow { flight(&setup::observer(&self.file.observer)?) } else { 0.0 })
     }
 
     /// Hole and observer.
     fn place(&self, frame: usize) -> anyhow::Result<String> {
         let (hole, observer) = (&self.file.hole, &self.file.observer);
-        let time = self.measured.times.get(frame).context("no frame")?;
+        let time = self.measured.times.get(frame).context("no frame")? + self.later()?;
         let mut text = format!("[hole]\nspin = {:?}\n", hole.spin.value());
         text += &line("mass_msun", hole.mass_msun);
         text += &line("distance_kpc", hole.distance_kpc);
@@ -178,7 +185,10 @@ impl Estimate<'_> {
         let ratio = (high / low).ln() / f64::from(KNOTS - 1);
         let radii: Vec<f64> = (0..KNOTS).map(|k| low * (ratio * f64::from(k)).exp()).collect();
         let angular = radii.iter().map(|r| found.rate(*r)).collect();
-        let radial = radii.iter().map(|r| found.fall(*r)).collect();
+        // Profiles fall at all radii or at none: circles outside of falling matter fall by next to nothing.
+        let falls: Vec<f64> = radii.iter().map(|r| found.fall(*r)).collect();
+        let least = if falls.iter().any(|fall| *fall < 0.0) { -1e-12 } else { 0.0 };
+        let radial = falls.iter().map(|fall| if *fall == 0.0 { least } else { *fall }).collect();
         Ok(Velocity::Profile { radii, angular, radial })
     }
 }

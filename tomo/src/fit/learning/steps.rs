@@ -8,6 +8,7 @@ use crate::fit::Field;
 use crate::fit::forward::occupancy::Occupancy;
 use crate::fit::loss::objective::{Gradients, Loss};
 use crate::fit::loss::selection::Drawn;
+use crate::fit::seeds::mixed_seed;
 use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::Axis;
 use rand::seq::index;
@@ -66,7 +67,7 @@ impl Trainer<'_, f32> {
         let Some(plan) = self.training.occupancy else { return };
         let Some(mask) = &mut now.occupancy else { return };
         if now.step >= plan.warm_up && (now.step - plan.warm_up).is_multiple_of(plan.every.max(1)) {
-            let seed = mix(self.training.seed, now.step, 1);
+            let seed = mixed_seed(self.training.seed, now.step, 1);
             let (representation, parameters) = (self.representation, &now.parameters);
             let times = self.training.change.map_or(Vec::new(), |change| change.knots.times());
             mask.refresh(representation, parameters, seed, &times, self.buffers.workspace());
@@ -125,7 +126,7 @@ impl<T: Float> Trainer<'_, T> {
         let field = Field { representation: self.representation, parameters, axis, occupancy };
         let mut loss = self.of_data(field, step, of_axis);
         if let Some(change) = &self.training.change {
-            let seed = mix(self.training.seed, step, 3);
+            let seed = mixed_seed(self.training.seed, step, 3);
             let (buffers, workspace) = (&mut self.changes, self.buffers.workspace());
             let found =
                 change.value_and_gradient(field, seed, &mut self.gradient, buffers, workspace);
@@ -154,7 +155,7 @@ impl<T: Float> Trainer<'_, T> {
     /// Draws the pairs or frames of a step.
     pub(in crate::fit) fn drawn(&self, step: u64) -> Drawn {
         // Of seed and step alone: a fit that is resumed, or goes back, draws the same.
-        let mut random = Pcg64::seed_from_u64(mix(self.training.seed, step, 0));
+        let mut random = Pcg64::seed_from_u64(mixed_seed(self.training.seed, step, 0));
         let observed = &self.observed;
         match self.training.batch {
             BatchSize::Pixels(count) => {
@@ -173,14 +174,4 @@ impl<T: Float> Trainer<'_, T> {
             BatchSize::All => Drawn::Frames(observed.clone()),
         }
     }
-}
-
-/// A seed for what a step draws.
-fn mix(seed: u64, step: u64, purpose: u64) -> u64 {
-    // SplitMix64's finaliser (Steele, Lea & Flood 2014): seeds and steps in a row give unrelated
-    // streams. Two bits tell four purposes apart.
-    let mut x = seed ^ step.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ purpose << 62;
-    x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    x ^ (x >> 31)
 }

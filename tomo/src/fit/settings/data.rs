@@ -59,7 +59,7 @@ pub enum DataFiles {
 pub struct Loss {
     /// Kind of data.
     pub data: LossKind,
-    /// Weight of the term; 1 with numbers of the geometry that have a prior.
+    /// Weight of the term.
     #[serde(default = "one")]
     #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "a factor"))]
     pub weight: f64,

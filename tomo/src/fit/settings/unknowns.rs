@@ -1,6 +1,6 @@
 //! Emission that data leave unknown, and settings that have to be given or avoided because of it.
 
-use super::{AxisSearch, FitError, FitFile, Kind, Linear, LossKind, Start, refuse};
+use super::{AxisSearch, FitError, FitFile, Kind, Linear, LossKind, Start, Weight, refuse};
 use crate::representation::Activation;
 
 impl FitFile {
@@ -113,7 +113,11 @@ fn flux(file: &FitFile) -> Result<(), FitError> {
         );
     }
     let pulls = |linear: &Linear| linear.smoothness > 0.0 || linear.sparsity > 0.0;
-    if file.linear.as_ref().is_some_and(pulls) {
+    let is_chosen = file
+        .held_out
+        .as_ref()
+        .is_some_and(|held_out| matches!(held_out.setting, Weight::Smoothness | Weight::Sparsity));
+    if file.linear.as_ref().is_some_and(pulls) || is_chosen {
         refuse!(
             "linear.smoothness and linear.sparsity are not allowed with {} alone: these do not determine the flux, and penalties would drive it to 0; add a loss of amplitudes or of the light curve",
             data(file)

@@ -255,7 +255,7 @@ pub(super) fn samples(file: &FitFile) -> Result<usize> {
 }
 
 /// κ(x) of the medium.
-fn opacity(medium: Absorption) -> impl Fn([f64; 3]) -> f64 {
+pub(super) fn opacity(medium: Absorption) -> impl Fn([f64; 3]) -> f64 {
     let Absorption { coefficient, radius, height } = medium;
     move |[x, y, z]: [f64; 3]| {
         let square = (x * x + y * y + z * z) / (radius * radius) + z * z / (height * height);

@@ -6,7 +6,8 @@ use super::{Result, axis, linear, motion, polarized};
 use crate::fit::linear::{Change, Voxels};
 use crate::fit::settings;
 use crate::fit::settings::{
-    FieldKind, FitError, FitFile, Kind, LossKind, Occupancy, Optimiser, Start, Within, refuse,
+    AxisSearch, FieldKind, FitError, FitFile, Kind, LossKind, Occupancy, Optimiser, Quantity,
+    Start, Within, refuse,
 };
 use crate::fit::{
     BatchSize, ChangePrice, OccupancyPlan, OccupancySettings, Region, Training, WithStaticImage,
@@ -17,6 +18,7 @@ use crate::representation::{
     Knots, Network, NetworkSettings, OwnSettings, Registry, Representation,
 };
 use kerrlight_common::memory;
+use kerrlight_render::dynamics::Velocity;
 
 /// Returns the representation, with the parameters of emission that does not move behind its own; `registry` has what the
 /// program adds to kerrlight's own representations. Where emission may change, `times` are those of the first and the last
@@ -87,11 +89,16 @@ pub(super) fn of_matter(
     let r = file.region.r_max;
     Ok(match &chosen.kind {
         Kind::Own(name) => own(name, file, registry)?,
+        Kind::FeatureGrid | Kind::Bhnerf | Kind::Mlp4d
+            if chosen.activation == Activation::Linear =>
+        {
+            refuse!(
+                "representation.activation = linear is not allowed: sigmoid or softplus with {}, whose network's output has any sign",
+                chosen.kind.name()
+            )
+        }
         Kind::Bhnerf => Box::new(network(NetworkSettings::bhnerf())?),
         Kind::Mlp4d => Box::new(network(NetworkSettings::mlp4d())?),
-        Kind::FeatureGrid if chosen.activation == Activation::Linear => refuse!(
-            "representation.activation = linear is not allowed: sigmoid or softplus with feature-grid, whose network's output has any sign"
-        ),
         Kind::FeatureGrid => {
             let settings = FeatureGridSettings {
                 coarsest: chosen.feature_grid.coarsest,
@@ -264,6 +271,11 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     if file.representation.kind == Kind::LinearGrid || file.training.start != Start::Drawn {
         linear(file)?;
     }
+    if file.representation.kind == Kind::Mlp4d && file.training.start != Start::Drawn {
+        refuse!(
+            "training.start needs to be \"drawn\" with mlp4d: a linear start is a field that matter carries, which this network does not know"
+        );
+    }
     if file.unknown_geometry()?.is_some() {
         linear(file).within("search")?;
         unweighted(
@@ -272,8 +284,46 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
         )?;
     }
     check_prior(file)?;
+    check_axis(file)?;
     enough_nodes_and_iterations(file)?;
-    file.simulated().map(drop)
+    check_reference(file)
+}
+
+/// Refuses an axis that nothing learns, and flows that would have to turn with it.
+fn check_axis(file: &FitFile) -> Result<()> {
+    if file.axis == (AxisSearch::Known {}) {
+        return Ok(());
+    }
+    let learns = !matches!(file.representation.kind, Kind::LinearGrid | Kind::Mlp4d);
+    if axis(file)?.1.is_some() && !learns {
+        refuse!(
+            "representation.kind = \"{}\" learns no axis: use another one, [axis.known], or [axis.scan] with rate = 0",
+            file.representation.kind.name()
+        );
+    }
+    let follows = |law: &Velocity<Quantity>| {
+        matches!(law, Velocity::Keplerian { drag: None } | Velocity::Infall { drag: None, .. })
+    };
+    let mut law = &file.motion.velocity;
+    while let Velocity::Perturbed(by) = law {
+        law = &by.of;
+    }
+    if file.motion.axis.is_none() && file.hole.spin.value() != 0.0 && follows(law) {
+        refuse!(
+            "motion.velocity needs a drag where the axis is not known: flows about different axes are compared, and a ξ_z is another one for each"
+        );
+    }
+    Ok(())
+}
+
+/// Refuses a truth that is compared with the fit at another time.
+fn check_reference(file: &FitFile) -> Result<()> {
+    let (own, of_truth) = (file.motion.reference_time, file.simulated()?.motion.reference_time);
+    if own == of_truth {
+        return Ok(());
+    }
+    let allowed = format!("{own}, that of the fit: truth and fit are compared there");
+    Err(FitError::range("simulation.motion.reference_time", of_truth, &allowed).into())
 }
 
 /// Refuses a prior of voxels where it would have no part, or where data do not count as their errors say.

@@ -42,7 +42,7 @@ pub use band::{
 pub use change::{change, emission_times};
 pub use coarse_view::CoarseView;
 pub use curve::Curve;
-pub use drawn::{Drawn, OtherModel};
+pub use drawn::{Drawn, OtherModel, has_own_rays};
 pub use errors::errors;
 pub use fit_data::FitData;
 pub use geometry::{

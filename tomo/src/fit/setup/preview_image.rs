@@ -1,7 +1,7 @@
 //! One sharp image of the volume as the observer sees it, with more rays than the data have pixels and as many
 //! along photon rings as these take.
 
-use super::instrument::upright;
+use super::instrument::{opacity, upright};
 use super::{Instrument, Result, Truth, observer, spacing};
 use crate::fit::settings::FitFile;
 use crate::fit::{
@@ -121,7 +121,10 @@ impl PreviewView<'_> {
             momentum: redshift.is_some() || polarized.is_some(),
         };
         let observer = observer(&self.file.observer)?;
-        let lines = Sightlines::trace(hole, &observer, &rays.alpha, &rays.beta, &request)?;
+        let mut lines = Sightlines::trace(hole, &observer, &rays.alpha, &rays.beta, &request)?;
+        if let Some(medium) = self.file.effects.absorption {
+            lines.absorb(opacity(medium));
+        }
         let model = ForwardModel::new(&lines, motion, hole, *redshift)?;
         let Some(view) = polarized else { return Ok(model) };
         let screen = [rays.alpha.clone(), rays.beta.clone()];

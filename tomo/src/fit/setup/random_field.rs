@@ -52,9 +52,10 @@ const PLACES: usize = 12;
 /// Stream of their random numbers.
 const SPREAD: u64 = 0x7370_7265_6164_0000;
 
-/// Standard deviation of the emission at a voxel under `[linear.prior]`, before any data: none without a prior.
+/// Standard deviation of the emission at a voxel under `[linear.prior]`, before any data, and of its logarithm where that is
+/// normal: none without a prior.
 ///
-/// Returns the standard deviation of the prior. That of a Gaussian field is smaller than its amplitude, since emission is not
+/// That of a Gaussian field is smaller than its amplitude, since emission is not
 /// negative and not above `linear.upper`; it is that of eight fields.
 ///
 /// # Errors
@@ -63,10 +64,7 @@ pub fn deviation_of_prior(file: &FitFile) -> Result<Option<f64>> {
     let Some(linear) = &file.linear else { return Ok(None) };
     let Some(prior) = &linear.prior else { return Ok(None) };
     if prior.kind == FieldKind::LogNormal {
-        // Mean and variance of a log-normal number.
-        let variance = prior.amplitude.powi(2);
-        let mean = (prior.mean + 0.5 * variance).exp();
-        return Ok(Some(mean * variance.exp_m1().sqrt()));
+        return Ok(Some(prior.amplitude));
     }
     let voxels = Voxels::cube(file.voxel_nodes(), file.region.r_max, linear.degree);
     let field = GaussianField::new(prior.law(), &voxels).within("linear.prior")?;

@@ -244,7 +244,7 @@ fn clockwise(scan: &BandScan, upwards: f64) -> f64 {
         geometry.rotation_factor * geometry.inclination_deg.to_radians().cos()
     };
     // Seen edge-on there is no sense; standing matter has none.
-    let share = |towards: f64| match towards * upwards.signum() {
+    let share = |towards: f64| match towards * upwards.signum() * f64::from(upwards != 0.0) {
         x if x.abs() < 1e-9 => 0.5,
         x => f64::from(u8::from(x < 0.0)),
     };
