@@ -225,7 +225,8 @@ fn radius([x, y, z]: [f64; 3]) -> f64 {
 
 type Range = (&'static str, f64, bool, &'static str);
 
-fn first_wrong(ranges: impl IntoIterator<Item = Range>) -> Result<(), Error> {
+/// Refuses the first number that is out of its range.
+pub(super) fn first_wrong(ranges: impl IntoIterator<Item = Range>) -> Result<(), Error> {
     let wrong = ranges.into_iter().find(|(_, _, ok, _)| !ok);
     wrong.map_or(Ok(()), |(field, value, _, allowed)| {
         Err(Error::out_of_range(field, value, allowed))

@@ -2,7 +2,6 @@
 
 use super::AngularVelocity;
 use super::infall::{Falling, Family, Law, Profile};
-use super::perturbed::Perturbation;
 use crate::Error;
 use kerrlight_geodesic::infall::Mixture;
 use schemars::JsonSchema;
@@ -141,15 +140,13 @@ impl Velocity {
                 AngularVelocity::PowerLaw { radius, rate, exponent }
             }
             Velocity::Table { radii, rates } => AngularVelocity::Table { radii, rates },
-            Velocity::Perturbed(law) => {
-                let Perturbed { of, deviation, correlation_length, radii, seed: own } = law;
-                let by = Perturbation { deviation, correlation_length, radii };
-                let of = of.angular(seed, drag)?;
+            Velocity::Perturbed(by) => {
+                let of = by.of.angular(seed, drag)?;
                 if of.falling().is_some() {
                     let allowed = "a law of matter that stays at its radius";
                     return Err(Error::out_of_range("of", f64::NAN, allowed));
                 }
-                of.perturbed(by, own.unwrap_or(seed))?
+                of.perturbed(&by, by.seed.unwrap_or(seed))?
             }
             Velocity::Infall { xi, beta_r, beta_phi, drag: own } => {
                 let mixture = Mixture { xi, beta_r, beta_phi };

@@ -1,45 +1,28 @@
 //! Velocities that differ from a smooth law by chance.
 
 use super::AngularVelocity;
+use super::angular_velocity::first_wrong;
+use super::law::Perturbed;
 use crate::Error;
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
-/// A Gaussian process over the radius: mean 0, covariance s² exp(−(r − r')²/(2 ℓ²)), as in the
-/// mismatch study of Levis et al. 2022 (their Fig. 7).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Perturbation {
-    /// s, radians a unit of time.
-    pub deviation: f64,
-    /// ℓ, M.
-    pub correlation_length: f64,
-    /// The first and the last radius of the table, M.
-    pub radii: [f64; 2],
-}
-
 /// Rows of the table.
 const ROWS: usize = 100;
 
-impl Perturbation {
-    fn checked(self) -> Result<Self, Error> {
-        let Self { deviation, correlation_length, radii: [first, last] } = self;
-        for (field, value, ok, allowed) in [
+/// The process has mean 0 and covariance s² exp(−(r − r')²/(2 ℓ²)), as in the mismatch study of Levis et al. 2022 (their
+/// Fig. 7).
+impl Perturbed {
+    fn check(&self) -> Result<(), Error> {
+        let Self { deviation, correlation_length: length, radii: [first, last], .. } = *self;
+        let grow = first > 0.0 && first < last && last.is_finite();
+        first_wrong([
             ("deviation", deviation, deviation >= 0.0 && deviation.is_finite(), "0 or above"),
-            (
-                "correlation_length",
-                correlation_length,
-                correlation_length > 0.0 && correlation_length.is_finite(),
-                "above 0",
-            ),
-            ("radii", first, first > 0.0 && first < last && last.is_finite(), "above 0, growing"),
-        ] {
-            if !ok {
-                return Err(Error::out_of_range(field, value, allowed));
-            }
-        }
-        Ok(self)
+            ("correlation_length", length, length > 0.0 && length.is_finite(), "above 0"),
+            ("radii", first, grow, "above 0, growing"),
+        ])
     }
 
     /// Radii of the table.
@@ -74,8 +57,9 @@ impl AngularVelocity {
     ///
     /// # Errors
     /// If a number of the perturbation is out of its range.
-    pub(super) fn perturbed(&self, by: Perturbation, seed: u64) -> Result<Self, Error> {
-        let radii = by.checked()?.table();
+    pub(super) fn perturbed(&self, by: &Perturbed, seed: u64) -> Result<Self, Error> {
+        by.check()?;
+        let radii = by.table();
         let drawn = by.draw(&radii, seed);
         let rates = radii.iter().zip(drawn).map(|(r, by)| self.rate(*r) + by).collect();
         Self::Table { radii, rates }.checked()
@@ -84,16 +68,20 @@ impl AngularVelocity {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Velocity;
     use super::*;
 
-    const BY: Perturbation =
-        Perturbation { deviation: 0.3, correlation_length: 0.5, radii: [1.0, 10.0] };
+    fn by() -> Perturbed {
+        let of = Box::new(Velocity::Keplerian { drag: None });
+        let (deviation, radii) = (0.3, [1.0, 10.0]);
+        Perturbed { of, deviation, correlation_length: 0.5, radii, seed: None }
+    }
 
     /// Variance and correlations of many draws are those of the process.
     #[test]
     fn exact_moments_of_the_process() {
-        let radii = BY.table();
-        let draws: Vec<Vec<f64>> = (0..4000).map(|seed| BY.draw(&radii, seed)).collect();
+        let radii = by().table();
+        let draws: Vec<Vec<f64>> = (0..4000).map(|seed| by().draw(&radii, seed)).collect();
         let mean = |i: usize, k: usize| {
             draws.iter().map(|d| d[i] * d[k]).sum::<f64>() / draws.len() as f64
         };
@@ -108,10 +96,10 @@ mod tests {
     #[test]
     fn exact_no_deviation_is_the_velocity() {
         let law = AngularVelocity::bhnerf();
-        let same = law.perturbed(Perturbation { deviation: 0.0, ..BY }, 3).unwrap();
-        let again = law.perturbed(BY, 3).unwrap();
-        assert_eq!(again, law.perturbed(BY, 3).unwrap());
-        assert_ne!(again, law.perturbed(BY, 4).unwrap());
+        let same = law.perturbed(&Perturbed { deviation: 0.0, ..by() }, 3).unwrap();
+        let again = law.perturbed(&by(), 3).unwrap();
+        assert_eq!(again, law.perturbed(&by(), 3).unwrap());
+        assert_ne!(again, law.perturbed(&by(), 4).unwrap());
         for r in [1.0, 1.0 + 9.0 * 27.0 / 99.0, 10.0] {
             assert!((same.rate(r) - law.rate(r)).abs() < 1e-12 * law.rate(r).abs());
         }
@@ -120,9 +108,7 @@ mod tests {
     #[test]
     fn numbers_out_of_range_are_named() {
         let law = AngularVelocity::bhnerf();
-        let text = |by| law.perturbed(by, 1).unwrap_err().to_string();
-        assert!(
-            text(Perturbation { correlation_length: 0.0, ..BY }).contains("correlation_length")
-        );
+        let text = |by: Perturbed| law.perturbed(&by, 1).unwrap_err().to_string();
+        assert!(text(Perturbed { correlation_length: 0.0, ..by() }).contains("correlation_length"));
     }
 }
