@@ -55,7 +55,7 @@ pub struct PreparedScene {
     pub(super) time: f64,
     pub(super) disc: Option<Disc>,
     pub(super) media: Media,
-    pub(super) meshes: Option<Meshes>,
+    pub(super) meshes: Option<Arc<Meshes>>,
     pub(super) spots: Spots,
     pub(super) sky: Option<Sky>,
 }
@@ -143,7 +143,7 @@ impl PreparedScene {
             time: scene.observer.time,
             disc: Disc::new(scene, &hole),
             media: Media::new(scene, &assets.volumes, &hole)?,
-            meshes: Meshes::new(scene, &assets.meshes, &hole)?,
+            meshes: Meshes::new(scene, &assets.meshes, &hole)?.map(Arc::new),
             spots: Spots::new(scene, &hole),
             sky: Sky::new(scene, assets.sky, assets.stars),
             optics,

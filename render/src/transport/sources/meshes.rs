@@ -12,13 +12,6 @@ use crate::transport::tree::{Node, Tree, Walk, WalkScratch};
 use kerrlight_geodesic::vector::distance;
 use kerrlight_geodesic::{Kerr, Path, PathOfRay, Ray};
 use std::ops::ControlFlow;
-use std::sync::Arc;
-
-/// The meshes of a scene.
-#[derive(Debug, Clone)]
-pub(in crate::transport) struct Meshes {
-    tree: Arc<MeshTree>,
-}
 
 /// Scratch space of meshes, from ray to ray.
 #[derive(Debug, Default)]
@@ -30,7 +23,7 @@ pub(in crate::transport) struct MeshScratch {
 
 /// All meshes of a scene in one hierarchy.
 #[derive(Debug)]
-struct MeshTree {
+pub(in crate::transport) struct Meshes {
     meshes: Vec<MeshModel>,
     tree: Tree,
     /// Mesh and triangle of each leaf.
@@ -45,9 +38,21 @@ struct Hit {
     leaf: u32,
 }
 
-impl MeshTree {
-    /// The hierarchy of the meshes' triangles.
-    pub fn new(meshes: Vec<MeshModel>, hole: &Kerr) -> Self {
+impl Meshes {
+    /// The meshes of a scene with their files, if it has any.
+    pub fn new(scene: &Scene, files: &[MeshFile], hole: &Kerr) -> Result<Option<Self>, Error> {
+        if files.len() != scene.mesh.len() {
+            let (value, allowed) = (files.len() as f64, "one file for each [[mesh]]");
+            return Err(Error::out_of_range("number of mesh files", value, allowed));
+        }
+        if files.is_empty() {
+            return Ok(None);
+        }
+        let placed = scene.mesh.iter().zip(files).map(|(mesh, file)| MeshModel::new(mesh, file));
+        Ok(Some(Self::of(placed.collect::<Result<_, _>>()?, hole)))
+    }
+
+    fn of(meshes: Vec<MeshModel>, hole: &Kerr) -> Self {
         let leaves: Vec<[u32; 2]> = (0u32..)
             .zip(&meshes)
             .flat_map(|(m, mesh)| (0..mesh.triangles.len() as u32).map(move |t| [m, t]))
@@ -61,16 +66,11 @@ impl MeshTree {
         let corners = triangles().flat_map(|triangle| triangle.corners);
         let high = corners.map(|x| distance(x, [0.0; 3])).fold(0.0, f64::max);
         // A little more, so that a corner is never left out by rounding.
-        MeshTree {
+        Meshes {
             tree: Tree::new(&boxes, [low * (1.0 - 1e-9), high * (1.0 + 1e-9)]),
             meshes,
             leaves,
         }
-    }
-
-    /// Returns whether a ray can meet any triangle at all.
-    pub fn can_be_met(&self, ray: &Ray) -> bool {
-        self.tree.can_be_met(ray)
     }
 
     fn at(&self, leaf: u32) -> (&MeshModel, &Triangle) {
@@ -81,14 +81,13 @@ impl MeshTree {
 
     /// Fills `hits` with where the path meets triangles, in order, up to the first that hides
     /// the rest, and returns the Mino time of that.
-    pub fn meet(
+    fn meet_by_tree(
         &self,
         path: &Path,
         bound: &ChordBound,
         scratch: &mut WalkScratch,
         hits: &mut Vec<Hit>,
     ) -> Option<f64> {
-        hits.clear();
         let walk = Walk { tree: &self.tree, path, bound, longest: 8.0 };
         let mut end = None;
         walk.go(f64::INFINITY, scratch, &|_, _, _| true, &mut |ends, leaves| {
@@ -110,8 +109,7 @@ impl MeshTree {
     }
 
     /// The same without the hierarchy: pieces that turn by little are held against every triangle.
-    pub fn meet_every(&self, path: &Path, bound: &ChordBound, hits: &mut Vec<Hit>) -> Option<f64> {
-        hits.clear();
+    fn meet_every(&self, path: &Path, bound: &ChordBound, hits: &mut Vec<Hit>) -> Option<f64> {
         let [low, high] = self.tree.shell();
         let mut intervals = Vec::new();
         path.intervals_within(low, high, &mut intervals);
@@ -130,6 +128,67 @@ impl MeshTree {
         let last = hits.iter().position(|hit| self.at(hit.leaf).0.opaque)?;
         hits.truncate(last + 1);
         hits.last().map(|hit| hit.mino_time)
+    }
+
+    /// Returns whether the path of a ray is needed.
+    pub fn need_path(&self, optics: &Optics, ray: &Ray) -> bool {
+        optics.one_by_one || self.tree.can_be_met(ray)
+    }
+
+    /// Finds where a ray meets triangles; the Mino time of the first that hides the rest.
+    pub fn meet(
+        &self,
+        optics: &Optics,
+        PathOfRay { ray, path, tolerance }: PathOfRay<'_>,
+        MeshScratch { walk, hits }: &mut MeshScratch,
+    ) -> Option<f64> {
+        hits.clear();
+        let bound = ChordBound::new(&optics.hole, ray, path, tolerance);
+        if optics.one_by_one {
+            return self.meet_every(path, &bound, hits);
+        }
+        if self.tree.can_be_met(ray) { self.meet_by_tree(path, &bound, walk, hits) } else { None }
+    }
+
+    /// Adds the light of the triangles met up to Mino time `end` behind gas of optical depth D: I = g^{3+α} I_em e^{−D}.
+    pub fn add(
+        &self,
+        optics: &Optics,
+        (path, end): (&Path, f64),
+        scratch: &MeshScratch,
+        depths: &DepthProfile,
+        light: &mut Accumulator,
+    ) {
+        for hit in scratch.hits.iter().take_while(|hit| hit.mino_time <= end) {
+            let (mesh, triangle) = self.at(hit.leaf);
+            let source = self.source(optics, hit);
+            if !mesh.shines() {
+                continue;
+            }
+            let point = path.at(hit.mino_time);
+            let (emitted, color) = mesh.light(triangle, point.cartesian());
+            let g = match optics.spectral_index {
+                Some(_) => mesh.redshift(&optics.hole, &point),
+                None => Some(1.0),
+            };
+            // Where matter cannot move like this there is none that shines.
+            let Some(g) = g else { continue };
+            let boost = optics.spectral_index.map_or(1.0, |index| g.powf(3.0 + index));
+            let intensity = emitted * boost * (-depths.at(hit.mino_time)).exp();
+            light.add(intensity, g, color, hit.mino_time);
+            let origin = Origin { source, mino_time: hit.mino_time };
+            light.mark(intensity, Place::of_point(&point), origin);
+        }
+    }
+
+    /// The mesh that ends the last ray at a Mino time, if one does.
+    pub fn hidden_by(&self, optics: &Optics, scratch: &MeshScratch, time: f64) -> Option<u32> {
+        let hit = scratch.hits.iter().find(|hit| hit.mino_time == time)?;
+        Some(self.source(optics, hit))
+    }
+
+    fn source(&self, optics: &Optics, hit: &Hit) -> u32 {
+        optics.numbering.meshes + self.leaves[hit.leaf as usize][0]
     }
 }
 
@@ -221,82 +280,5 @@ impl Cut<'_> {
             (b, to) = (node.point.mino_time, height);
         }
         node
-    }
-}
-
-impl Meshes {
-    /// The meshes of a scene with their files, if it has any.
-    pub fn new(scene: &Scene, files: &[MeshFile], hole: &Kerr) -> Result<Option<Self>, Error> {
-        if files.len() != scene.mesh.len() {
-            let (value, allowed) = (files.len() as f64, "one file for each [[mesh]]");
-            return Err(Error::out_of_range("number of mesh files", value, allowed));
-        }
-        if files.is_empty() {
-            return Ok(None);
-        }
-        let placed = scene.mesh.iter().zip(files).map(|(mesh, file)| MeshModel::new(mesh, file));
-        let tree = MeshTree::new(placed.collect::<Result<_, _>>()?, hole);
-        Ok(Some(Meshes { tree: Arc::new(tree) }))
-    }
-
-    /// Returns whether the path of a ray is needed.
-    pub fn need_path(&self, optics: &Optics, ray: &Ray) -> bool {
-        optics.one_by_one || self.tree.can_be_met(ray)
-    }
-
-    /// Finds where a ray meets triangles; the Mino time of the first that hides the rest.
-    pub fn meet(
-        &self,
-        optics: &Optics,
-        PathOfRay { ray, path, tolerance }: PathOfRay<'_>,
-        MeshScratch { walk, hits }: &mut MeshScratch,
-    ) -> Option<f64> {
-        hits.clear();
-        let bound = ChordBound::new(&optics.hole, ray, path, tolerance);
-        if optics.one_by_one {
-            return self.tree.meet_every(path, &bound, hits);
-        }
-        if self.tree.can_be_met(ray) { self.tree.meet(path, &bound, walk, hits) } else { None }
-    }
-
-    /// Adds the light of the triangles met up to Mino time `end` behind gas of optical depth D: I = g^{3+α} I_em e^{−D}.
-    pub fn add(
-        &self,
-        optics: &Optics,
-        (path, end): (&Path, f64),
-        scratch: &MeshScratch,
-        depths: &DepthProfile,
-        light: &mut Accumulator,
-    ) {
-        for hit in scratch.hits.iter().take_while(|hit| hit.mino_time <= end) {
-            let (mesh, triangle) = self.tree.at(hit.leaf);
-            let source = self.source(optics, hit);
-            if !mesh.shines() {
-                continue;
-            }
-            let point = path.at(hit.mino_time);
-            let (emitted, color) = mesh.light(triangle, point.cartesian());
-            let g = match optics.spectral_index {
-                Some(_) => mesh.redshift(&optics.hole, &point),
-                None => Some(1.0),
-            };
-            // Where matter cannot move like this there is none that shines.
-            let Some(g) = g else { continue };
-            let boost = optics.spectral_index.map_or(1.0, |index| g.powf(3.0 + index));
-            let intensity = emitted * boost * (-depths.at(hit.mino_time)).exp();
-            light.add(intensity, g, color, hit.mino_time);
-            let origin = Origin { source, mino_time: hit.mino_time };
-            light.mark(intensity, Place::of_point(&point), origin);
-        }
-    }
-
-    /// The mesh that ends the last ray at a Mino time, if one does.
-    pub fn hidden_by(&self, optics: &Optics, scratch: &MeshScratch, time: f64) -> Option<u32> {
-        let hit = scratch.hits.iter().find(|hit| hit.mino_time == time)?;
-        Some(self.source(optics, hit))
-    }
-
-    fn source(&self, optics: &Optics, hit: &Hit) -> u32 {
-        optics.numbering.meshes + self.tree.leaves[hit.leaf as usize][0]
     }
 }
