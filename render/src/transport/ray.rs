@@ -252,7 +252,7 @@ impl<'a> Sum<'a> {
     #[inline(always)]
     fn accumulator(&self, k: usize, ray: &TracedRay, crossings: &[PlaneCrossing]) -> Accumulator {
         let record = (!self.layers.is_empty()).then(|| self.record(k, ray, crossings));
-        Accumulator { record, ..Accumulator::new() }
+        Accumulator { record, ..Accumulator::default() }
     }
 
     /// Returns the record of ray number `k`: as long as nothing shines, the surface that ends it.

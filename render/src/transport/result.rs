@@ -85,7 +85,7 @@ impl RayResult {
 }
 
 /// Light gathered along one ray.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(super) struct Accumulator {
     pub intensity: f64,
     pub shift: f64,
@@ -101,22 +101,6 @@ pub(super) struct Accumulator {
 }
 
 impl Accumulator {
-    #[inline(always)]
-    pub fn new() -> Self {
-        Accumulator {
-            intensity: 0.0,
-            shift: 0.0,
-            rgb: [0.0; 3],
-            brightest: 0.0,
-            place: Place::default(),
-            depth: 0.0,
-            stokes: [0.0; 3],
-            disc_images: 0,
-            passes: [0.0; PASSES],
-            record: None,
-        }
-    }
-
     /// Adds intensity from a Mino time that is shifted by g.
     #[inline(always)]
     pub fn add(&mut self, intensity: f64, g: f64, color: [f32; 3], mino_time: f64) {
