@@ -2,7 +2,7 @@
 //! transfer use (Gold et al. 2020, ApJ 897, 148, section 3.2).
 
 use super::medium::{CellSize, Emission, Medium, Moment, Part};
-use crate::scene::{Gas, GasMotion, GasProfile};
+use crate::scene::{Effects, Gas, GasMotion, GasProfile};
 use kerrlight_geodesic::simd::RayNodes;
 use kerrlight_geodesic::{Kerr, Quantities};
 
@@ -41,18 +41,9 @@ struct Metric {
     big_r: f64,
 }
 
-/// Effects on the light of a medium.
-#[derive(Debug, Clone, Copy)]
-pub struct GasEffects {
-    /// Spectral index α, if redshift is simulated.
-    pub spectral_index: Option<f64>,
-    /// True if it absorbs.
-    pub absorption: bool,
-}
-
 impl GasModel {
     /// The gas of a scene around a hole with M = GM/c² of `centimetres`.
-    pub fn new(gas: &Gas, hole: &Kerr, centimetres: f64, effects: GasEffects) -> Self {
+    pub fn new(gas: &Gas, hole: &Kerr, centimetres: f64, effects: &Effects) -> Self {
         let emissivity = gas.emissivity * centimetres;
         GasModel {
             hole: *hole,
@@ -62,7 +53,7 @@ impl GasModel {
             motion: gas.motion,
             emissivity,
             absorption: if effects.absorption { gas.absorptivity * emissivity } else { 0.0 },
-            spectral_index: effects.spectral_index,
+            spectral_index: effects.index(),
             outer: gas.outer_radius,
             color: gas.color,
         }

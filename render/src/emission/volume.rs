@@ -6,7 +6,7 @@ use super::occupied::Occupied;
 use crate::Error;
 use crate::dynamics::infall::Falling;
 use crate::dynamics::{AngularVelocity, Axis, Injection};
-use crate::scene::{Rotation, VolumeRegion, VolumeSource};
+use crate::scene::{Effects, Rotation, VolumeRegion, VolumeSource};
 use crate::volume::{Volume, VolumeFile};
 use kerrlight_geodesic::flow::{
     falling_norm, falling_redshift_at, rotating_redshift_at, rotation_norm,
@@ -37,7 +37,7 @@ pub struct VolumeModel {
 }
 
 impl VolumeModel {
-    /// The volume of a scene around `hole`; `spectral_index` is there if redshift is simulated.
+    /// The volume of a scene around `hole`.
     ///
     /// # Errors
     /// If a value is negative or there is no axis to turn about.
@@ -45,8 +45,7 @@ impl VolumeModel {
         source: &VolumeSource,
         file: &VolumeFile,
         hole: &Kerr,
-        spectral_index: Option<f64>,
-        slow_light: bool,
+        effects: &Effects,
     ) -> Result<Self, Error> {
         let range = |field, value, allowed| Error::out_of_range(field, value, allowed);
         let axis = match (source.axis.or(file.axis), &source.rotation) {
@@ -72,8 +71,8 @@ impl VolumeModel {
             reference: source.reference_time.unwrap_or(0.0),
             injection: source.injection_time.map(|time| Injection { time }),
             region: source.region,
-            spectral_index,
-            slow_light,
+            spectral_index: effects.index(),
+            slow_light: effects.slow_light,
             occupied: Occupied::new(&file.volume, axis.vector()),
             color: source.color,
         })

@@ -6,7 +6,7 @@ mod depth;
 pub(in crate::transport) use depth::DepthProfile;
 
 use crate::Error;
-use crate::emission::gas::{GasEffects, GasModel};
+use crate::emission::gas::GasModel;
 use crate::emission::medium::{CellSize, Emission, Medium, Moment, Part};
 use crate::emission::volume::VolumeModel;
 use crate::scene::Scene;
@@ -147,22 +147,14 @@ impl Media {
             let (value, allowed) = (files.len() as f64, "one file for each [[volume]]");
             return Err(Error::out_of_range("number of volume files", value, allowed));
         }
-        let spectral_index = scene.effects.index();
         let mut all: Vec<Arc<dyn Medium>> = Vec::new();
         if let Some(gas) = &scene.gas {
-            let effects = GasEffects { spectral_index, absorption: scene.effects.absorption };
             let length = 100.0 * SPEED_OF_LIGHT;
             let length = length * scene.hole.seconds().unwrap_or(f64::NAN); // gas needs it
-            all.push(Arc::new(GasModel::new(gas, hole, length, effects)));
+            all.push(Arc::new(GasModel::new(gas, hole, length, &scene.effects)));
         }
         for (source, file) in scene.volume.iter().zip(files) {
-            all.push(Arc::new(VolumeModel::new(
-                source,
-                file,
-                hole,
-                spectral_index,
-                scene.effects.slow_light,
-            )?));
+            all.push(Arc::new(VolumeModel::new(source, file, hole, &scene.effects)?));
         }
         let smooth = (0..all.len()).filter(|m| all[*m].cell_size().is_none()).collect();
         Ok(Media { all, smooth })
