@@ -1,7 +1,7 @@
 //! Many pictures of one scene: a film. Under a fixed camera each ray is traced once for a whole
 //! batch of frames.
 
-use super::raw::Raw;
+use super::raw::Frame;
 use super::{Progress, Raster, Rendered, TILE};
 use crate::Error;
 use crate::image::exr::CameraMatrices;
@@ -16,27 +16,12 @@ pub struct Film {
     raster: Raster,
 }
 
-/// One picture of a film, in the scene's own unit of intensity.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Frame {
-    raw: Raw,
-    /// Time of observation, in M.
-    time: f64,
-}
-
 /// A batch has at most this many values: 1 GiB.
 const MOST_VALUES: usize = 1 << 28;
 
 /// A batch has at most this many frames: then tracing costs little more than if it were done once
 /// for all frames, and little is lost where a film is stopped.
 const MOST_FRAMES: usize = 32;
-
-impl Frame {
-    /// Rays that were given up.
-    pub fn unresolved(&self) -> u64 {
-        self.raw.unresolved()
-    }
-}
 
 impl Film {
     /// A film of `scene` with the decoded files that it names.
@@ -98,7 +83,7 @@ impl Film {
     /// # Errors
     /// If the frame has no light to be scaled.
     pub fn unit_factor(&self, frame: &Frame) -> Result<f64, Error> {
-        self.raster.unit_factor(&self.scene_at(frame.time), &frame.raw)
+        self.raster.unit_factor(frame)
     }
 
     /// The frame as [`render`](crate::picture::render) would give it, but with its intensity times
@@ -107,13 +92,7 @@ impl Film {
     /// # Errors
     /// If a value is too large for 32 bits then.
     pub fn rendered(&self, frame: Frame, factor: f64) -> Result<Rendered, Error> {
-        self.raster.rendered(&self.scene_at(frame.time), frame.raw, factor)
-    }
-
-    fn scene_at(&self, time: f64) -> Scene {
-        let mut scene = self.raster.scene().clone();
-        scene.observer.time = time;
-        scene
+        self.raster.rendered(frame, factor)
     }
 
     /// The pictures at `times` (of observation, in M); where rays differ from frame to frame they are
@@ -124,18 +103,13 @@ impl Film {
     /// returned false.
     pub fn frames(&mut self, times: &[f64], progress: &Progress<'_>) -> Result<Vec<Frame>, Error> {
         if !self.one_by_one() {
-            return self.together(times, progress);
+            return self.raster.raw(times, progress);
         }
         let mut frames = Vec::with_capacity(times.len());
         for time in times {
             self.raster.move_to(*time)?;
-            frames.append(&mut self.together(&[*time], progress)?);
+            frames.append(&mut self.raster.raw(&[*time], progress)?);
         }
         Ok(frames)
-    }
-
-    fn together(&self, times: &[f64], progress: &Progress<'_>) -> Result<Vec<Frame>, Error> {
-        let raws = self.raster.raw(times, progress)?;
-        Ok(raws.into_iter().zip(times).map(|(raw, time)| Frame { raw, time: *time }).collect())
     }
 }

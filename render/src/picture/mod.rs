@@ -22,9 +22,10 @@ mod workspace;
 
 pub use channels::{CHANNELS, ChannelKind};
 pub use choice::all_channels;
-pub use film::{Film, Frame};
+pub use film::Film;
 pub use journal::{AnyJournal, Found, Journal};
 pub use plan::{Plan, Step};
+pub use raw::Frame;
 pub use requested::REQUESTED;
 pub use rings::{RingStrata, Stratum};
 pub use tally::Summary;
@@ -227,8 +228,7 @@ impl Raster {
     }
 
     fn summarize(&self, tally: &Tally) -> Result<Summary, Error> {
-        let factor = Summary::factor(&self.scene, tally).map_err(RenderError::NoFlux)?;
-        Summary::new(&self.scene, tally, factor)
+        Summary::new(&self.scene, tally, Summary::factor(&self.scene, tally)?)
     }
 }
 
@@ -288,10 +288,10 @@ impl Raster {
     /// # Errors
     /// If a value is out of range or does not fit, or `progress` returned false.
     pub fn render(&self, progress: &Progress<'_>) -> Result<Rendered, Error> {
-        let mut raw = self.raw(&[self.prepared.time()], progress)?;
+        let mut frames = self.raw(&[self.prepared.time()], progress)?;
         // One for each time.
-        let raw = raw.pop().unwrap_or_default();
-        let factor = self.unit_factor(&self.scene, &raw)?;
-        self.rendered(&self.scene, raw, factor)
+        let frame = frames.pop().unwrap_or_default();
+        let factor = self.unit_factor(&frame)?;
+        self.rendered(frame, factor)
     }
 }

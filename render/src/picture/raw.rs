@@ -3,28 +3,30 @@
 use super::bands::{Band, render_bands};
 use super::grid::Grid;
 use super::tally::{Summary, Tally};
-use super::{Progress, Raster, RenderError, Rendered, resolver};
+use super::{Progress, Raster, Rendered, resolver};
 use crate::Error;
 use crate::image::{Channel, Picture};
 use crate::scene::Scene;
 use std::sync::{Mutex, PoisonError};
 
-/// A picture in its raster's unit of intensity.
+/// One picture of a film, in its raster's unit of intensity.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Raw {
+pub struct Frame {
     /// Row by row, of each channel.
     channels: Vec<Vec<f32>>,
-    pub(super) tally: Tally,
+    tally: Tally,
+    /// Time of observation, in M.
+    pub(super) time: f64,
 }
 
-impl Raw {
+impl Frame {
     /// Rays that were given up.
     pub fn unresolved(&self) -> u64 {
         self.tally.unresolved
     }
 
     /// Joins bands in their order.
-    fn of(bands: Vec<Band>, channels: usize, pixels: usize) -> Self {
+    fn of(bands: Vec<Band>, channels: usize, pixels: usize, time: f64) -> Self {
         let tally = bands.iter().map(|band| band.tally).fold(Tally::default(), Tally::plus);
         let mut values = vec![Vec::with_capacity(pixels); channels];
         for band in bands {
@@ -32,14 +34,14 @@ impl Raw {
                 all.extend(some);
             }
         }
-        Raw { channels: values, tally }
+        Frame { channels: values, tally, time }
     }
 }
 
 impl Raster {
     /// The pictures at `times` of observation (in M), with rays that are traced once for all.
     /// Where pixels are refined there is one time, the prepared scene's.
-    pub(crate) fn raw(&self, times: &[f64], progress: &Progress<'_>) -> Result<Vec<Raw>, Error> {
+    pub(crate) fn raw(&self, times: &[f64], progress: &Progress<'_>) -> Result<Vec<Frame>, Error> {
         let all: Vec<usize> = (0..self.bands()).collect();
         // Bands come in any order.
         let done = Mutex::new(vec![vec![None; all.len()]; times.len()]);
@@ -54,37 +56,38 @@ impl Raster {
         render_bands(self, times, &mut all.iter().copied(), &keep, progress)?;
         let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
         let pixels = self.grid.width * self.grid.height;
-        let picture = |bands: Vec<Option<Band>>| {
-            Raw::of(bands.into_iter().flatten().collect(), self.channels.len(), pixels)
+        let picture = |(bands, time): (Vec<Option<Band>>, &f64)| {
+            Frame::of(bands.into_iter().flatten().collect(), self.channels.len(), pixels, *time)
         };
-        Ok(done.into_iter().map(picture).collect())
+        Ok(done.into_iter().zip(times).map(picture).collect())
     }
 
-    /// The factor that gives a picture of `scene` the unit, and the flux, that the scene asks for.
+    /// The factor that gives a picture the unit, and the flux, that the scene asks for.
     ///
     /// # Errors
     /// If a flux is requested and there is no light.
-    pub(crate) fn unit_factor(&self, scene: &Scene, raw: &Raw) -> Result<f64, Error> {
-        Ok(Summary::factor(scene, &raw.tally).map_err(RenderError::NoFlux)?)
+    pub(crate) fn unit_factor(&self, frame: &Frame) -> Result<f64, Error> {
+        Summary::factor(&self.scene_at(frame.time), &frame.tally)
     }
 
-    /// A picture of `scene` with its intensity times `factor`.
+    /// A picture with its intensity times `factor`.
     ///
     /// # Errors
     /// If a value does not fit then.
-    pub(crate) fn rendered(
-        &self,
-        scene: &Scene,
-        mut raw: Raw,
-        factor: f64,
-    ) -> Result<Rendered, Error> {
-        let summary = Summary::new(scene, &raw.tally, factor)?;
-        self.rescale(&mut raw.channels, factor);
-        let named = self.channels.iter().zip(raw.channels);
+    pub(crate) fn rendered(&self, mut frame: Frame, factor: f64) -> Result<Rendered, Error> {
+        let summary = Summary::new(&self.scene_at(frame.time), &frame.tally, factor)?;
+        self.rescale(&mut frame.channels, factor);
+        let named = self.channels.iter().zip(frame.channels);
         let channels =
             named.map(|(kind, values)| Channel { name: kind.name.to_owned(), values }).collect();
         let (width, height) = (self.grid.width, self.grid.height);
         Ok(Rendered { picture: Picture { width, height, channels }, summary })
+    }
+
+    fn scene_at(&self, time: f64) -> Scene {
+        let mut scene = self.scene.clone();
+        scene.observer.time = time;
+        scene
     }
 
     /// Moves to another time of observation, and with it a camera that moves.

@@ -140,12 +140,16 @@ pub struct Summary {
 
 impl Summary {
     /// Factor from the scene's unit of intensity to that of the file, for a picture with these
-    /// sums; the sum itself where there is no light to scale.
-    pub(super) fn factor(scene: &Scene, tally: &Tally) -> Result<f64, f64> {
+    /// sums; refused where there is no light to scale.
+    pub(super) fn factor(scene: &Scene, tally: &Tally) -> Result<f64, Error> {
         let own = own_unit(scene);
         let asked = |jy: f64| jy / (tally.intensity * pixel_area(scene));
         let factor = scene.screen.total_flux_jy.map_or(own, asked);
-        if factor.is_normal() { Ok(factor) } else { Err(tally.intensity) }
+        if factor.is_normal() {
+            Ok(factor)
+        } else {
+            Err(RenderError::NoFlux(tally.intensity).into())
+        }
     }
 
     /// Takes the sums over all pixels of a scene's picture that is scaled by `factor`.
