@@ -4,6 +4,7 @@ use super::super::FileError;
 use super::super::fits::{Header, Table, Unit};
 use super::layout::{Layout, Parameter, SELECTORS};
 use crate::earth::SourcePosition;
+use crate::source::Source;
 use std::collections::BTreeSet;
 
 /// Largest number of values that are listed.
@@ -40,19 +41,11 @@ fn values(unit: &Unit<'_>, layout: &Layout, parameter: Parameter) -> BTreeSet<i6
     with_data.map(|group| layout.parameter(group, parameter) as i64).collect()
 }
 
-/// A source of the `AIPS SU` table.
-pub struct TableSource {
-    /// Its name.
-    pub name: String,
-    /// Position.
-    pub position: SourcePosition,
-}
-
 /// The source that groups with data have, as the `AIPS SU` table tells it; none where groups or tables do not tell.
 ///
 /// # Errors
 /// If there are several, each with its name, or coordinates are not of J2000.
-pub fn source(units: &[Unit<'_>], layout: &Layout) -> Result<Option<TableSource>, FileError> {
+pub fn source(units: &[Unit<'_>], layout: &Layout) -> Result<Option<Source>, FileError> {
     let unit = units.iter().find(|unit| unit.is_named("AIPS SU"));
     let table = unit.map(Table::new).transpose()?;
     let row_of = |number: i64| {
@@ -93,7 +86,7 @@ pub fn source(units: &[Unit<'_>], layout: &Layout) -> Result<Option<TableSource>
     let (ra, dec) = place.ok_or_else(|| fail("no RAEPO or DECEPO".to_owned()))?;
     let position = SourcePosition::new(ra.rem_euclid(360.0) / 15.0, dec);
     let position = position.map_err(|error| fail(error.to_string()))?;
-    Ok(Some(TableSource { name: name(number).unwrap_or_default(), position }))
+    Ok(Some(Source { name: name(number).unwrap_or_default(), position }))
 }
 
 /// `number name` of the sources that there are.
