@@ -125,20 +125,16 @@ impl ImageProblem<'_> {
         self.terms.iter().map(|term| count(&*term.term, &self.frames)).collect()
     }
 
-    /// The loss of the data and of a flux (over its expectation) alone, and its gradient with respect to the pixels, without that
-    /// of the flux's prior.
-    pub(super) fn data_and_gradient(&self, image: &[f64], flux: f64) -> (f64, Vec<f64>) {
+    /// The loss of the data and of a flux in Jy alone, its gradient with respect to the pixels, without that of the flux's
+    /// prior, and the slope of the latter with ln F.
+    pub(super) fn data_and_gradient(&self, image: &[f64], flux: f64) -> (f64, Vec<f64>, f64) {
         let mut gradient = vec![0.0; image.len()];
         let one = |Weighted { weight, term }: &Weighted<dyn FrameTerm<f64>>| {
             weight * reduced_chi2(&**term, &self.frames, image, *weight, &mut gradient)
         };
         let value: f64 = self.terms.iter().map(one).sum();
-        (value + self.flux_prior(self.flux.jy * flux).0, gradient)
-    }
-
-    /// The slope of the prior of the flux with its logarithm, at a flux over its expectation.
-    pub(super) fn flux_slope(&self, flux: f64) -> f64 {
-        self.flux_prior(self.flux.jy * flux).1
+        let (prior, slope) = self.flux_prior(flux);
+        (value + prior, gradient, slope)
     }
 
     /// χ² per datum of each kind of data.
@@ -159,15 +155,9 @@ impl ImageProblem<'_> {
     pub fn value_and_gradient(&self, parameters: &[f64], gradient: &mut [f64]) -> f64 {
         let (shares, flux) = self.light(parameters);
         let image: Vec<f64> = shares.iter().map(|share| share * flux).collect();
-        let mut of_image = vec![0.0; image.len()];
-        let data = self.terms.iter().map(|Weighted { weight, term }| {
-            weight * reduced_chi2(&**term, &self.frames, &image, *weight, &mut of_image)
-        });
-        let mut value: f64 = data.sum();
+        let (mut value, of_image, slope) = self.data_and_gradient(&image, flux);
         // All pixels go as F: the slope with ln F is Σ g I. Penalties see shares alone.
         let pull: f64 = of_image.iter().zip(&image).map(|(g, i)| g * i).sum();
-        let (prior, slope) = self.flux_prior(flux);
-        value += prior;
         let mut of_shares: Vec<f64> = of_image.iter().map(|g| g * flux).collect();
         value += self.penalties(&shares, &mut of_shares);
         value += self.entropy(&shares, &mut of_shares);

@@ -262,7 +262,8 @@ impl Fitting<'_> {
     fn solved(&self, begin: &[f64], go_on: &(dyn Fn() -> bool + Sync)) -> Option<Minimum> {
         let mut objective = |x: &[f64], g: &mut [f64]| {
             // Only pixels are differenced: data and their gains are solved once for a gradient.
-            let (value, of_image) = self.problem.data_and_gradient(&self.image(x), x[0].exp());
+            let flux = self.problem.flux.jy * x[0].exp();
+            let (value, of_image, slope) = self.problem.data_and_gradient(&self.image(x), flux);
             for (k, g) in g.iter_mut().enumerate() {
                 const STEP: f64 = 1e-4;
                 let moved = |step: f64| {
@@ -273,7 +274,7 @@ impl Fitting<'_> {
                 let ends = moved(STEP).into_iter().zip(moved(-STEP));
                 *g = ends.zip(&of_image).map(|((a, b), g)| (a - b) * g).sum::<f64>() / (2.0 * STEP);
             }
-            g[0] += self.problem.flux_slope(x[0].exp());
+            g[0] += slope;
             value
         };
         minimum(&mut objective, begin, ITERATIONS, go_on)
