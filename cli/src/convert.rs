@@ -113,8 +113,9 @@ impl Convert {
             bail!("--flag-station {name}: {} has no such station", self.input.display());
         }
         self.check_intervals(&observation)?;
-        let selection = flags.apply(&observation);
-        let mut observation = selection.observation;
+        let all = observation.rows.len();
+        observation = flags.apply(&observation);
+        let flagged = all - observation.rows.len();
         // Gains and leakage belong to single times and feeds: they come out before any average.
         self.calibrate(&mut observation)?;
         self.correct_leakage(&mut observation)?;
@@ -142,7 +143,7 @@ impl Convert {
             );
         }
         output.write(&observation).map_err(told)?;
-        let (rows, flagged) = (observation.rows.len(), selection.dropped);
+        let rows = observation.rows.len();
         eprintln!("{rows} rows, {flagged} flagged");
         Ok(output.answer().with("rows", rows).with("flagged", flagged))
     }
@@ -217,7 +218,7 @@ impl Convert {
                 );
             }
             let alone = Flags { times_h: vec![[from, to]], ..Flags::default() };
-            if alone.apply(observation).dropped == 0 {
+            if alone.apply(observation).rows.len() == observation.rows.len() {
                 eprintln!("--flag-utc {from}-{to}: no visibility lies in it");
             }
         }

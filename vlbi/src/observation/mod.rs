@@ -7,7 +7,7 @@ mod select;
 
 pub use average::Averaging;
 pub use repeats::Repeats;
-pub use select::{Flags, Selection};
+pub use select::Flags;
 
 use super::Complex64;
 use super::array::Station;

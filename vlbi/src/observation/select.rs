@@ -16,15 +16,6 @@ pub struct Flags {
     pub longer_than: Option<f64>,
 }
 
-/// Rows that were kept.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Selection {
-    /// The rest.
-    pub observation: Observation,
-    /// Number of rows that were thrown away.
-    pub dropped: usize,
-}
-
 impl Flags {
     /// Names that no station of the observation has.
     pub fn unknown_stations<'a>(&'a self, observation: &Observation) -> Vec<&'a str> {
@@ -33,12 +24,10 @@ impl Flags {
     }
 
     /// The observation without what is flagged. Stations stay in its list.
-    pub fn apply(&self, observation: &Observation) -> Selection {
-        let kept: Vec<Row> =
+    pub fn apply(&self, observation: &Observation) -> Observation {
+        let rows: Vec<Row> =
             observation.rows.iter().filter(|row| !self.hits(observation, row)).copied().collect();
-        let dropped = observation.rows.len() - kept.len();
-        let observation = Observation { rows: kept, ..observation.clone_without_rows() };
-        Selection { observation, dropped }
+        Observation { rows, ..observation.clone_without_rows() }
     }
 
     fn hits(&self, observation: &Observation, row: &Row) -> bool {
@@ -77,9 +66,7 @@ mod tests {
             .map(|(time, stations, u)| Row::total_intensity(time, stations, [u, 0.0], i))
             .to_vec();
         let kept = |flags: Flags| {
-            let selection = flags.apply(&all);
-            assert_eq!(selection.dropped + selection.observation.rows.len(), 3);
-            selection.observation.rows.iter().map(|row| row.time_h as i32).collect::<Vec<_>>()
+            flags.apply(&all).rows.iter().map(|row| row.time_h as i32).collect::<Vec<_>>()
         };
         assert_eq!(kept(Flags::default()), [1, 2, 3]);
         assert_eq!(kept(Flags { stations: vec!["A".into()], ..Flags::default() }), [3]);

@@ -48,7 +48,7 @@ fn averaged(observation: Observation, settings: &VisibilitySettings) -> Result<O
 
 fn long_enough(observation: Observation, uv_min: Option<f64>) -> Result<Observation> {
     let flags = Flags { shorter_than: uv_min, ..Flags::default() };
-    let kept = flags.apply(&observation).observation;
+    let kept = flags.apply(&observation);
     let has_any = |data: &Observation| data.stokes_i().next().is_some();
     match uv_min {
         _ if has_any(&kept) => Ok(kept),
