@@ -4,7 +4,8 @@
 
 use kerrlight_geodesic::simd::lanes::Element;
 
-/// f32 (to run) or f64 (to test and to measure).
+/// f32 (to run) or f64 (to test and to measure), with the constants that the elementary functions of [`math`](super::math)
+/// need.
 pub trait Float:
     num_traits::Float
     + num_traits::FromPrimitive
@@ -15,40 +16,7 @@ pub trait Float:
     + Send
     + Sync
     + Element
-    + Coefficients
 {
-    /// The nearest number of this kind.
-    fn of(x: f64) -> Self;
-    /// Converts to double precision.
-    fn double(self) -> f64;
-}
-
-impl Float for f32 {
-    #[inline]
-    fn of(x: f64) -> Self {
-        x as f32
-    }
-
-    #[inline]
-    fn double(self) -> f64 {
-        self.into()
-    }
-}
-
-impl Float for f64 {
-    #[inline]
-    fn of(x: f64) -> Self {
-        x
-    }
-
-    #[inline]
-    fn double(self) -> f64 {
-        self
-    }
-}
-
-/// Constants of a floating-point type that the elementary functions of [`math`](super::math) need.
-pub trait Coefficients: Sized + 'static {
     /// (sin √z/√z − 1)/z on 0 ≤ z ≤ (π/4)².
     const SIN: &'static [Self];
     /// ((cos √z − 1)/z + ½)/z on 0 ≤ z ≤ (π/4)².
@@ -69,9 +37,13 @@ pub trait Coefficients: Sized + 'static {
     const FAR: Self;
     /// Largest |x| of eˣ; beyond it is held.
     const HELD: Self;
+    /// The nearest number of this kind.
+    fn of(x: f64) -> Self;
+    /// Converts to double precision.
+    fn double(self) -> f64;
 }
 
-impl Coefficients for f32 {
+impl Float for f32 {
     const SIN: &'static [f32] =
         &[-0.166666646563107068, 0.00833274710437289478, -0.00019587639035792598];
     const COS: &'static [f32] =
@@ -96,9 +68,19 @@ impl Coefficients for f32 {
     const LOG2_E: f32 = core::f32::consts::LOG2_E;
     const FAR: f32 = 8192.0;
     const HELD: f32 = 87.0;
+
+    #[inline]
+    fn of(x: f64) -> Self {
+        x as f32
+    }
+
+    #[inline]
+    fn double(self) -> f64 {
+        self.into()
+    }
 }
 
-impl Coefficients for f64 {
+impl Float for f64 {
     const SIN: &'static [f64] = &[
         -0.166666666666666667,
         0.00833333333333333148,
@@ -155,4 +137,14 @@ impl Coefficients for f64 {
     const LOG2_E: f64 = core::f64::consts::LOG2_E;
     const FAR: f64 = 1_000_000.0;
     const HELD: f64 = 708.0;
+
+    #[inline]
+    fn of(x: f64) -> Self {
+        x
+    }
+
+    #[inline]
+    fn double(self) -> f64 {
+        self
+    }
 }
