@@ -8,7 +8,6 @@ use crate::Error;
 use core::ops::Range;
 use kerrlight_common::frames::Frames;
 use kerrlight_common::memory;
-use std::borrow::Cow;
 
 /// Exponentials up to this many bytes are kept while a movie is transformed.
 const MEMORY: usize = 256 << 20;
@@ -79,9 +78,9 @@ pub fn fill_from(
     let mut visibilities = Vec::new();
     for first in (0..movie.count()).step_by(AT_A_TIME) {
         let range = first..(first + AT_A_TIME).min(movie.count());
-        let some = || some_of(movie, range.clone());
-        let shares = &shares[range.clone()];
-        visibilities.extend(seen(observation, shares, grid, pulse, Method::Direct, some)?.1);
+        let some = some_of(movie, range.clone())?;
+        let shares = &shares[range];
+        visibilities.extend(seen(observation, shares, grid, pulse, Method::Direct, &some)?.1);
     }
     let seen = summed(observation.rows.len(), &shares, visibilities)?;
     set(observation, &seen);
@@ -91,12 +90,12 @@ pub fn fill_from(
 /// Images that are transformed together.
 const AT_A_TIME: usize = 16;
 
-fn some_of(movie: &Frames<f64>, range: Range<usize>) -> Result<Cow<'static, [f64]>, Error> {
+fn some_of(movie: &Frames<f64>, range: Range<usize>) -> Result<Vec<f64>, Error> {
     let mut some = Vec::with_capacity(range.len() * movie.pixels());
     for frame in range {
         some.extend_from_slice(&movie.image(frame)?);
     }
-    Ok(some.into())
+    Ok(some)
 }
 
 /// Rows that see an image, each with its share.
@@ -115,20 +114,20 @@ fn shares(observation: &Observation, frames: usize, times_h: &[f64]) -> Result<V
 }
 
 /// Returns the visibilities of images at the rows, image after image.
-fn seen<'p>(
+fn seen(
     observation: &Observation,
     shares: &[Shares],
     grid: ImageGrid,
     pulse: Pulse,
     method: Method,
-    pixels: impl FnOnce() -> Result<Cow<'p, [f64]>, Error>,
+    pixels: &[f64],
 ) -> Result<(Transform<f64>, Vec<Complex64>), Error> {
     let uv_of = |shares: &Shares| shares.iter().map(|(row, _)| observation.rows[*row].uv).collect();
     let uv: Vec<Vec<[f64; 2]>> = shares.iter().map(uv_of).collect();
     let memory = MEMORY.min(memory::part(1.0 / 8.0) as usize);
     let operator = Transform::<f64>::new(grid, pulse, &uv, method, memory)?;
     let mut visibilities = vec![Complex64::new(0.0, 0.0); operator.data()];
-    operator.forward(&pixels()?, &mut visibilities);
+    operator.forward(pixels, &mut visibilities);
     Ok((operator, visibilities))
 }
 
@@ -142,8 +141,7 @@ fn all_seen(
     method: Method,
 ) -> Result<(String, Vec<Complex64>), Error> {
     let shares = shares(observation, pixels.len() / grid.pixels().max(1), times_h)?;
-    let all = || Ok(Cow::Borrowed(pixels));
-    let (operator, visibilities) = seen(observation, &shares, grid, pulse, method, all)?;
+    let (operator, visibilities) = seen(observation, &shares, grid, pulse, method, pixels)?;
     Ok((operator.describe(), summed(observation.rows.len(), &shares, visibilities)?))
 }
 
