@@ -13,12 +13,9 @@ use toml::de::{DeFloat, DeInteger, DeTable, DeValue};
 
 type Entry<'a> = (&'a Spanned<std::borrow::Cow<'a, str>>, &'a Spanned<DeValue<'a>>);
 
-/// The whole text.
-pub(super) struct Root<'a>(pub(super) &'a Spanned<DeTable<'a>>);
-
-/// A value in it.
+/// The table that a whole text is, or a value in it.
 #[derive(Clone, Copy)]
-struct Value<'a>(&'a Spanned<DeValue<'a>>);
+pub(super) struct Value<'a>(pub(super) &'a Spanned<DeValue<'a>>);
 
 enum Number {
     Integer(i64),
@@ -239,19 +236,6 @@ impl<'de> Deserializer<'de> for Value<'_> {
 
     fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {
         visitor.visit_unit()
-    }
-}
-
-impl<'de> Deserializer<'de> for Root<'_> {
-    type Error = ReadError;
-
-    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ReadError> {
-        visitor.visit_map(Entries::new(self.0.get_ref()))
-    }
-
-    serde::forward_to_deserialize_any! {
-        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf option unit unit_struct
-        newtype_struct seq tuple tuple_struct map struct enum identifier ignored_any
     }
 }
 

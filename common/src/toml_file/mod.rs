@@ -15,8 +15,8 @@ pub use keys::{Key, Keys, OutOfRange, Range, bound, shown};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde::ser::Error;
-use toml::Table;
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue};
+use toml::{Spanned, Table};
 use toml_edit::{DocumentMut, Item};
 
 /// The value that a TOML text describes.
@@ -39,7 +39,8 @@ use toml_edit::{DocumentMut, Item};
 /// ```
 pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, ReadError> {
     let table = DeTable::parse(text).map_err(|error| ReadError::syntax(&error))?;
-    T::deserialize(deserializer::Root(&table)).map_err(|error| error.in_text(text))
+    let root = Spanned::new(table.span(), DeValue::Table(table.into_inner()));
+    T::deserialize(deserializer::Value(&root)).map_err(|error| error.in_text(text))
 }
 
 /// The value that a table describes.
@@ -48,9 +49,7 @@ pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, ReadError> {
 /// Those of [`read`], without a line.
 pub fn read_table<T: DeserializeOwned>(table: &Table) -> Result<T, ReadError> {
     // By way of text, so that no type is compiled for a second deserialiser.
-    let text = table.to_string();
-    let table = DeTable::parse(&text).map_err(|error| ReadError::syntax(&error))?;
-    T::deserialize(deserializer::Root(&table))
+    read(&table.to_string()).map_err(ReadError::without_line)
 }
 
 /// The TOML text of a value, its keys in the order of the fields.
