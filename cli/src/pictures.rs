@@ -9,7 +9,7 @@ use anyhow::Context;
 use kerrlight_common::memory;
 use kerrlight_render::image::exr::{self, Attributes, CameraMatrices, Style};
 use kerrlight_render::image::preview::{Look, encode_png};
-use kerrlight_render::picture::{Film, Progress, Raster, Rendered};
+use kerrlight_render::picture::{Progress, Raster, Rendered};
 use kerrlight_render::scene::Scene;
 use std::path::Path;
 
@@ -89,11 +89,11 @@ impl Shot {
             at_time(&self.source.name, &self.text, *time)?;
         }
         let files = assets::load(&self.scene, &self.source.folder, &[], Reach::default())?;
-        let film = Film::new(&self.scene, files.decoded);
+        let film = Raster::new(&self.scene, files.decoded);
         let mut film = film.with_context(|| self.source.name.clone())?;
         let common = Common {
-            legend: film.raster().legend(),
-            identifiers: film.raster().identifiers(),
+            legend: film.legend(),
+            identifiers: film.identifiers(),
             files: &files.identity,
         };
         let (mut shown, mut factor) = (Vec::with_capacity(times.len()), None);
@@ -103,7 +103,7 @@ impl Shot {
                 factor = Some(film.unit_factor(first)?);
             }
             for frame in frames {
-                let camera = film.camera(&frame)?;
+                let camera = film.camera_of(&frame)?;
                 let rendered = film.rendered(frame, factor.unwrap_or(1.0))?;
                 shown.push(self.shown(rendered, camera, &common));
             }

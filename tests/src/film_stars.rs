@@ -5,7 +5,7 @@ use crate::support::{root, scene};
 use kerrlight_geodesic::vector::dot;
 use kerrlight_geodesic::{Camera, Kerr, footprint};
 use kerrlight_render::emission::sky::SkyModel;
-use kerrlight_render::picture::Film;
+use kerrlight_render::picture::Raster;
 use kerrlight_render::scene::Scene;
 /// An image of a star: which one, with which parity, where in pixels, and its exact flux on the
 /// picture plane.
@@ -116,7 +116,7 @@ fn photometry(text: &str, overrides: &[&str], frames: u32, most: f64) -> (Vec<f6
         panic!("a field of stars");
     };
     let stars = field.catalogue();
-    let mut film = Film::new(&scene, None).unwrap();
+    let mut film = Raster::new(&scene, None).unwrap();
     let (mut ratios, mut changes) = (Vec::new(), Vec::new());
     let mut before: Vec<(usize, bool, f64)> = Vec::new();
     for k in 0..frames {

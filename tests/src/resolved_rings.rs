@@ -85,7 +85,7 @@ fn exact_rings_do_not_depend_on_tiles_or_batches() {
     };
     let whole = raster(64);
     assert_eq!(whole, raster(7));
-    let mut film = kerrlight_render::picture::Film::new(&scene, None).unwrap();
+    let mut film = kerrlight_render::picture::Raster::new(&scene, None).unwrap();
     let times = [40.0, 55.0];
     let frames = film.frames(&times, &|_| true).unwrap();
     for (frame, time) in frames.into_iter().zip(times) {

@@ -8,7 +8,7 @@ use anyhow::{Context, bail};
 use kerrlight_render::image::Picture;
 use kerrlight_render::image::exr::{self, Attributes, Style};
 use kerrlight_render::picture::Rendered;
-use kerrlight_render::picture::{Film, Frame};
+use kerrlight_render::picture::{Frame, Raster};
 use kerrlight_render::scene::Scene;
 use rayon::prelude::*;
 use std::ops::{Range, RangeInclusive};
@@ -182,7 +182,7 @@ impl Sequence {
     }
 
     /// Gives all frames the scale of this one.
-    pub fn scale_like(&mut self, film: &Film, first: &Frame) -> anyhow::Result<()> {
+    pub fn scale_like(&mut self, film: &Raster, first: &Frame) -> anyhow::Result<()> {
         self.factor = Some(film.unit_factor(first)?);
         Ok(())
     }
@@ -208,7 +208,7 @@ impl Sequence {
     /// factor.
     pub fn write(
         &mut self,
-        film: &Film,
+        film: &Raster,
         options: &ExrOptions,
         per_second: u16,
         batch: &[usize],
@@ -220,12 +220,12 @@ impl Sequence {
         let factor = self.factor.context("the film has no unit of intensity")?;
         let this: &Sequence = self;
         let written = batch.par_iter().zip(frames).map(|(k, frame)| -> anyhow::Result<_> {
-            let style = options.style(film.camera(&frame)?);
+            let style = options.style(film.camera_of(&frame)?);
             let style = Style { frames_per_second: Some(per_second), ..style };
             let Rendered { picture, summary } = film.rendered(frame, factor)?;
             let Plan { scene, text } = &this.plans[*k];
-            let mut attributes = report::attributes(scene, text, film.raster().legend(), &summary);
-            attributes.extend(film.raster().identifiers().map(|ids| ("ids".to_owned(), ids)));
+            let mut attributes = report::attributes(scene, text, film.legend(), &summary);
+            attributes.extend(film.identifiers().map(|ids| ("ids".to_owned(), ids)));
             attributes.append(&mut this.settings(*k));
             let bytes = exr::encode_in_style(&picture, &attributes, style);
             let bytes = bytes.context("cannot encode the EXR")?;

@@ -18,7 +18,7 @@ use clap::Args;
 use frames::{Origin, Sequence};
 use kerrlight_common::memory;
 use kerrlight_geodesic::RayDevice;
-use kerrlight_render::picture::Film;
+use kerrlight_render::picture::Raster;
 use kerrlight_render::scene::Scene;
 use rendering::Rendering;
 use std::iter;
@@ -56,9 +56,9 @@ pub struct Movie {
 }
 
 /// Refuses frames that there is no memory for.
-fn afford(film: &Film, scene: &Scene) -> anyhow::Result<()> {
+fn afford(film: &Raster, scene: &Scene) -> anyhow::Result<()> {
     let (width, height) = (scene.screen.width, scene.screen.rows());
-    let (count, channels) = (film.batch(), film.raster().names().len());
+    let (count, channels) = (film.batch(), film.names().len());
     let what = || format!("{count} frames at once of {width} x {height} pixels");
     let pixels = f64::from(width) * f64::from(height);
     Ok(memory::afford(what, memory::frames(count as f64, pixels, channels as f64))?)
@@ -77,7 +77,7 @@ impl Movie {
         let animations = self.viewing.outputs()?;
         let files = assets::load(&scene, &source.folder, &animations.files(), self.reach)?;
         animations.files().iter().try_for_each(|output| output.must_differ_from(&self.scene))?;
-        let mut film = Film::new(&scene, files.decoded).with_context(|| source.name.clone())?;
+        let mut film = Raster::new(&scene, files.decoded).with_context(|| source.name.clone())?;
         if animations.any() && !self.frames.are_all() {
             bail!(
                 "--gif and --png show the whole film: give them with --frames {}",
@@ -86,13 +86,13 @@ impl Movie {
         }
         // A missing channel is told before the frames are rendered.
         if animations.any() {
-            self.look.channels(&scene, &film.raster().names())?;
+            self.look.channels(&scene, &film.names())?;
         }
         if let Some(device) = self.device.open()? {
             film = film.with_device(device);
         }
         afford(&film, &scene)?;
-        let device = film.raster().device().map_or("", RayDevice::name);
+        let device = film.device().map_or("", RayDevice::name);
         let of = Origin { name: &source.name, text: &text, files: &files.identity, device };
         let mut sequence = Sequence::new(&self.output, &of, &times, &self.frames.part)?;
         for input in iter::once(&self.scene).chain(&files.paths) {
@@ -102,8 +102,8 @@ impl Movie {
             eprintln!("warning: nothing in this scene moves: all frames are the same");
         }
         sequence.find()?;
-        if let Some(device) = film.raster().device() {
-            devices::announce(device, &film.raster().beside_device());
+        if let Some(device) = film.device() {
+            devices::announce(device, &film.beside_device());
         }
         let start = Instant::now();
         let per_second = self.viewing.frames_per_second();

@@ -7,13 +7,13 @@ use crate::render::exr_options::ExrOptions;
 use indicatif::ProgressBar;
 use kerrlight_geodesic::RayDevice;
 use kerrlight_render::Error;
-use kerrlight_render::picture::{Film, Frame, RenderError};
+use kerrlight_render::picture::{Frame, Raster, RenderError};
 use std::path::Path;
 use std::time::Instant;
 
 /// A film under way.
 pub struct Rendering<'a> {
-    film: &'a mut Film,
+    film: &'a mut Raster,
     sequence: &'a mut Sequence,
     folder: &'a Path,
     options: &'a ExrOptions,
@@ -25,7 +25,7 @@ pub struct Rendering<'a> {
 impl<'a> Rendering<'a> {
     /// Takes the frames in `folder`, written in some style, so many a second.
     pub fn new(
-        film: &'a mut Film,
+        film: &'a mut Raster,
         sequence: &'a mut Sequence,
         folder: &'a Path,
         options: &'a ExrOptions,
@@ -77,7 +77,7 @@ impl<'a> Rendering<'a> {
                 Err(Interrupted(self.there()).into())
             }
             Err(error) => {
-                let failure = self.film.raster().device().and_then(RayDevice::failure);
+                let failure = self.film.device().and_then(RayDevice::failure);
                 let told = failure.map(|failure| {
                     format!("{failure}; {}, or with --device cpu into another folder", self.there())
                 });

@@ -22,7 +22,6 @@ mod workspace;
 
 pub use channels::{CHANNELS, ChannelKind};
 pub use choice::all_channels;
-pub use film::Film;
 pub use journal::{AnyJournal, Found, Journal};
 pub use plan::{Plan, Step};
 pub use raw::Frame;

@@ -2,6 +2,7 @@
 
 use super::Raster;
 use super::grid::Grid;
+use super::raw::Frame;
 use crate::Error;
 use crate::image::exr::CameraMatrices;
 use crate::transport::{FAR, view};
@@ -92,10 +93,12 @@ impl Raster {
         matrices(self.prepared.view(), size)
     }
 
-    /// The same at a time of observation (M).
-    pub(super) fn camera_at(&self, time: f64) -> Result<CameraMatrices, Error> {
-        let mut scene = self.scene().clone();
-        scene.observer.time = time;
+    /// The same of a frame.
+    ///
+    /// # Errors
+    /// If the camera is impossible there.
+    pub fn camera_of(&self, frame: &Frame) -> Result<CameraMatrices, Error> {
+        let scene = self.scene_at(frame.time);
         let (Grid { width, height, size, .. }, hole) = (Grid::new(&scene), self.prepared.hole());
         let size = [width, height].map(|pixels| pixels as f64 * size);
         Ok(matrices(&view(&scene, hole)?, size))

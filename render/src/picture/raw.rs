@@ -62,19 +62,21 @@ impl Raster {
         Ok(done.into_iter().zip(times).map(picture).collect())
     }
 
-    /// The factor that gives a picture the unit, and the flux, that the scene asks for.
+    /// Factor from the scene's unit of intensity to that of the file, such that the frame has the
+    /// scene's flux.
     ///
     /// # Errors
-    /// If a flux is requested and there is no light.
-    pub(crate) fn unit_factor(&self, frame: &Frame) -> Result<f64, Error> {
+    /// If the frame has no light to be scaled.
+    pub fn unit_factor(&self, frame: &Frame) -> Result<f64, Error> {
         Summary::factor(&self.scene_at(frame.time), &frame.tally)
     }
 
-    /// A picture with its intensity times `factor`.
+    /// The frame as [`render`](crate::picture::render) would give it, but with its intensity times
+    /// `factor`: all frames of a film share one.
     ///
     /// # Errors
-    /// If a value does not fit then.
-    pub(crate) fn rendered(&self, mut frame: Frame, factor: f64) -> Result<Rendered, Error> {
+    /// If a value is too large for 32 bits then.
+    pub fn rendered(&self, mut frame: Frame, factor: f64) -> Result<Rendered, Error> {
         let summary = Summary::new(&self.scene_at(frame.time), &frame.tally, factor)?;
         self.rescale(&mut frame.channels, factor);
         let named = self.channels.iter().zip(frame.channels);
@@ -84,7 +86,7 @@ impl Raster {
         Ok(Rendered { picture: Picture { width, height, channels }, summary })
     }
 
-    fn scene_at(&self, time: f64) -> Scene {
+    pub(super) fn scene_at(&self, time: f64) -> Scene {
         let mut scene = self.scene.clone();
         scene.observer.time = time;
         scene
@@ -94,16 +96,11 @@ impl Raster {
     ///
     /// # Errors
     /// If the camera is impossible there.
-    pub(crate) fn move_to(&mut self, time: f64) -> Result<(), Error> {
+    pub(super) fn move_to(&mut self, time: f64) -> Result<(), Error> {
         self.scene.observer.time = time;
         self.prepared.move_to(&self.scene)?;
         self.rings = resolver(&self.scene, &self.prepared);
         self.grid = Grid::new(&self.scene);
         Ok(())
-    }
-
-    /// Returns the rendered scene.
-    pub(crate) fn scene(&self) -> &Scene {
-        &self.scene
     }
 }
