@@ -6,9 +6,9 @@ use crate::emission::sky::{CatalogueError, PanoramaError};
 use crate::image::animation::AnimationError;
 use crate::picture::RenderError;
 use crate::scene::SceneError;
+use crate::volume::VolumeError;
 use crate::volume::metrics::Mismatch;
 use crate::volume::vti::VtiError;
-use crate::volume::{VolumeError, VolumeFileError};
 use kerrlight_common::numpy::NumpyError;
 use kerrlight_common::toml_file::shown;
 use kerrlight_geodesic::Error as OutOfRange;
@@ -55,8 +55,6 @@ pub enum Error {
     Animation(#[from] AnimationError),
     /// A volume of emission.
     Volume(#[from] VolumeError),
-    /// The file of a volume.
-    VolumeFile(#[from] VolumeFileError),
     /// Volumes as fields of a VTK file.
     Vti(#[from] VtiError),
     /// Two volumes that do not have the same nodes.

@@ -13,19 +13,10 @@ pub struct VolumeArrays {
     axis: Option<[f64; 3]>,
 }
 
-/// Reason why a file holds no volume.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum VolumeFileError {
-    /// The contents are incomplete, or do not go with the scene.
-    #[error("{0}")]
-    Content(String),
-}
-
 type Result<T> = std::result::Result<T, crate::Error>;
 
 /// Nodes along x, y and z and the values of an array of three dimensions.
-fn emission(bytes: &[u8]) -> std::result::Result<([usize; 3], Vec<f32>), crate::Error> {
+fn emission(bytes: &[u8]) -> Result<([usize; 3], Vec<f32>)> {
     let (shape, values) = read_array(bytes)?;
     let [x, y, z] = shape[..] else {
         return Err(
@@ -54,7 +45,7 @@ fn node(k: usize, nodes: [usize; 3]) -> (usize, usize, usize) {
     (k / (nodes[1] * nodes[2]), k / nodes[2] % nodes[1], k % nodes[2])
 }
 
-fn three(bytes: &[u8]) -> std::result::Result<[f64; 3], crate::Error> {
+fn three(bytes: &[u8]) -> Result<[f64; 3]> {
     let (shape, values) = read_array(bytes)?;
     let expected = |_| NumpyError::content(format!("shape {shape:?}: 3 numbers are expected"));
     let three: [f64; 3] = values.try_into().map_err(expected)?;
@@ -79,7 +70,7 @@ impl VolumeArrays {
         if found != wanted {
             return Err(super::VolumeError::Length { found, wanted }.into());
         }
-        let values = finite(nodes, values).map_err(VolumeFileError::Content)?;
+        let values = finite(nodes, values).map_err(NumpyError::content)?;
         Ok(VolumeArrays { nodes, values, corners, axis })
     }
 
@@ -99,7 +90,7 @@ impl VolumeArrays {
     /// If there is no emission, or an array has another shape.
     pub fn from_npz(bytes: &[u8]) -> Result<Self> {
         let mut archive = Archive::open(bytes)?;
-        let none = || VolumeFileError::Content("holds no array named emission".to_owned());
+        let none = || NumpyError::content("holds no array named emission".to_owned());
         let found = archive.member("emission")?.ok_or_else(none)?;
         let (nodes, values) =
             emission(&found).map_err(|error| NumpyError::member("array emission", error))?;
@@ -114,7 +105,7 @@ impl VolumeArrays {
 
     /// Corners and axis of the file, by the ranges of scenes.
     fn check_place(&self) -> Result<()> {
-        let refuse = |message: String| Err(VolumeFileError::Content(message).into());
+        let refuse = |message: String| Err(NumpyError::content(message).into());
         for (name, corner) in ["low", "high"].into_iter().zip(self.corners) {
             if let Some(corner) = corner.filter(|corner| !corner.iter().all(|x| x.abs() <= 1e6)) {
                 return refuse(format!(
@@ -137,9 +128,7 @@ impl VolumeArrays {
     /// If it does not say so, or the arrays are no volume.
     pub fn located(self) -> Result<VolumeFile> {
         let [Some(low), Some(high)] = self.corners else {
-            return Err(
-                VolumeFileError::Content("arrays low and high are missing".to_owned()).into()
-            );
+            return Err(NumpyError::content("arrays low and high are missing".to_owned()).into());
         };
         self.check_place()?;
         let volume = Volume::new(self.nodes, low, high, self.values)?;
@@ -153,9 +142,9 @@ impl VolumeArrays {
     pub fn placed(self, source: &VolumeSource) -> Result<VolumeFile> {
         let [low, high] = self.corners;
         self.check_place()?;
-        let refuse = |message: String| Err(VolumeFileError::Content(message).into());
+        let refuse = |message: String| Err(NumpyError::content(message).into());
         let missing = |name: &str| {
-            VolumeFileError::Content(format!(
+            NumpyError::content(format!(
                 "neither the file nor the scene gives `{name}`: coordinates of a corner (M)"
             ))
         };

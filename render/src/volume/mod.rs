@@ -15,7 +15,7 @@ pub mod vti;
 use crate::Error;
 use crate::dynamics::Axis;
 pub use ensemble::{Coverage, Ensemble, Feature};
-pub use file::{VolumeArrays, VolumeFileError};
+pub use file::VolumeArrays;
 use kerrlight_geodesic::vector::rotate;
 pub use over_time::OverTime;
 pub use panels::Shown;
