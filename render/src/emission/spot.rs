@@ -58,9 +58,13 @@ impl SpotModel {
 
     /// Angular velocity vector of the spot's matter at radius r.
     pub fn angular_velocity(&self, r: f64) -> [f64; 3] {
+        self.axis.map(|x| x * self.matter_rate(r))
+    }
+
+    /// Angular velocity of the spot's matter at radius r.
+    fn matter_rate(&self, r: f64) -> f64 {
         // A rigid spot turns as a whole, at the rate of its centre.
-        let r = if self.sheared_since.is_some() { r } else { self.orbit };
-        self.axis.map(|x| x * self.rate(r))
+        self.rate(if self.sheared_since.is_some() { r } else { self.orbit })
     }
 
     /// Returns the centre at `time`, both in M.
@@ -68,19 +72,19 @@ impl SpotModel {
         rotate(self.axis, self.rate(self.orbit) * time, self.start)
     }
 
-    /// The angle by which matter at radius r has turned at `time` since the spot had its
-    /// shape at its starting point.
-    fn turned(&self, r: f64, time: f64) -> f64 {
+    /// The angle by which matter with an angular velocity has turned at `time` since the spot had
+    /// its shape at its starting point.
+    fn turned(&self, rate: f64, time: f64) -> f64 {
         match self.sheared_since {
-            None => self.rate(self.orbit) * time,
-            Some(since) => self.rate(r) * (time - since) + self.rate(self.orbit) * since,
+            None => rate * time,
+            Some(since) => rate * (time - since) + self.rate(self.orbit) * since,
         }
     }
 
     /// The point `x` at `time` carried along with the matter to where the spot is a round
     /// Gaussian about its starting point.
     pub fn comoving(&self, x: [f64; 3], time: f64) -> Comoving {
-        let angle = self.turned(dot(x, x).sqrt(), time);
+        let angle = self.turned(self.matter_rate(dot(x, x).sqrt()), time);
         Comoving { position: rotate(self.axis, -angle, x), angle }
     }
 
@@ -103,17 +107,12 @@ impl SpotModel {
 
     /// Matter at radius r and at `time`, both in M.
     pub fn matter_at(&self, radius: f64, time: f64) -> MatterPoint {
-        let rate = self.rate(if self.sheared_since.is_some() { radius } else { self.orbit });
-        MatterPoint { radius, time, rate }
+        MatterPoint { radius, time, rate: self.matter_rate(radius) }
     }
 
     /// The point `x` (M) carried along with its matter, as in [`comoving`](Self::comoving).
     pub fn carried(&self, x: [f64; 3], at: &MatterPoint) -> [f64; 3] {
-        let angle = match self.sheared_since {
-            None => at.rate * at.time,
-            Some(since) => at.rate * (at.time - since) + self.rate(self.orbit) * since,
-        };
-        rotate(self.axis, -angle, x)
+        rotate(self.axis, -self.turned(at.rate, at.time), x)
     }
 
     /// Distance in M of a point carried along with the matter from the spot's centre.
@@ -165,7 +164,7 @@ impl SpotModel {
             return [a.min(b), a.max(b)];
         }
         let corners = [(inner, from), (inner, to), (outer, from), (outer, to)];
-        let angles = corners.map(|(r, time)| self.turned(r, time));
+        let angles = corners.map(|(r, time)| self.turned(self.rate(r), time));
         if angles.iter().any(|angle| !angle.is_finite()) {
             return [f64::NEG_INFINITY, f64::INFINITY];
         }

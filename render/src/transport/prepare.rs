@@ -3,7 +3,7 @@
 use super::layers::{Numbering, Wanted};
 use super::optics::Optics;
 use super::polarized::Polarization;
-use super::sources::disc::Disc;
+use super::sources::disc::{CROSSINGS, Disc};
 use super::sources::media::Media;
 use super::sources::meshes::Meshes;
 use super::sources::sky::Sky;
@@ -156,7 +156,7 @@ impl PreparedScene {
     /// Returns the quantities needed of each ray.
     fn needs(&self, half_orbits: Option<u32>) -> BlockRequest {
         BlockRequest {
-            crossings: self.disc.as_ref().map_or(0, Disc::crossings),
+            crossings: if self.disc.is_some() { CROSSINGS } else { 0 },
             all_crossings: self.disc.is_some(),
             // dw/dτ tells whether light of plunging matter moves outward; its g depends on it.
             rates: self.optics.polarization.is_some() || self.has_plunging_disc(),

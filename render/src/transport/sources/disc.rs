@@ -9,7 +9,7 @@ use crate::transport::result::{Accumulator, PASSES, Place};
 use kerrlight_geodesic::{Kerr, Outcome, PlaneCrossing, TracedRay, orbits};
 
 /// Crossings of a ray that are located in closed form; rays with more are traced step by step.
-const CROSSINGS: usize = 4;
+pub(in crate::transport) const CROSSINGS: usize = 4;
 
 /// The disc of a scene.
 #[derive(Debug, Clone)]
@@ -42,11 +42,6 @@ impl Disc {
         let [inner, outer] = model.edges();
         let edges = [1.0 / outer, 1.0 / inner];
         Some(Disc { model, edges, horizon: 1.0 / hole.horizon() })
-    }
-
-    /// Returns the number of crossings of a ray to be located.
-    pub fn crossings(&self) -> usize {
-        CROSSINGS
     }
 
     /// Returns whether it hides what is behind it.
