@@ -1,9 +1,8 @@
 //! Comments of kerrlight's CSV, in lines that start with `#`: `key: value`, one a line. Lines of
 //! other keys are passed over.
 
-use super::{Names, number};
+use super::{Names, locate, number};
 use crate::array;
-use crate::earth::SourcePosition;
 use crate::observation::{Channel, Observation};
 use core::fmt::Write;
 
@@ -41,24 +40,14 @@ pub fn write(observation: &Observation) -> String {
 /// Takes in a line of comment, without its `#`; tells whether it is one of these.
 pub fn read(line: &str, observation: &mut Observation, names: &mut Names) -> Result<bool, String> {
     let Some((key, value)) = line.trim().split_once(": ") else { return Ok(false) };
-    let position = observation.position;
-    let place = |ra_hours: f64, dec_deg: f64| {
-        SourcePosition::new(ra_hours, dec_deg).map(Some).map_err(|error| error.to_string())
-    };
     let hertz = |name: &str| match number(value, name)? {
         hertz if hertz > 0.0 => Ok(Some(hertz)),
         hertz => Err(format!("{name} = {hertz} must be positive")),
     };
     match key {
         "source" => value.clone_into(&mut observation.source),
-        "ra_h" => {
-            observation.position =
-                place(number(value, "ra_h")?, position.map_or(0.0, |p| p.dec_deg))?;
-        }
-        "dec_deg" => {
-            observation.position =
-                place(position.map_or(0.0, |p| p.ra_hours), number(value, "dec_deg")?)?;
-        }
+        "ra_h" => locate(observation, Some(number(value, "ra_h")?), None)?,
+        "dec_deg" => locate(observation, None, Some(number(value, "dec_deg")?))?,
         "mjd" => {
             let mjd = number(value, "mjd")?;
             if !(-1e6..=1e6).contains(&mjd) || mjd.fract() != 0.0 {
@@ -69,7 +58,7 @@ pub fn read(line: &str, observation: &mut Observation, names: &mut Names) -> Res
         "frequency_hz" => observation.frequency_hz = hertz("frequency_hz")?,
         "bandwidth_hz" => observation.bandwidth_hz = hertz("bandwidth_hz")?,
         "channel" => observation.channels.push(channel(value, observation.channels.len())?),
-        "station" => station(value, names)?,
+        "station" => names.add(&value.split_whitespace().take(40).collect::<Vec<_>>())?,
         "history" => observation.history.push(value.to_owned()),
         _ => return Ok(false),
     }
@@ -90,16 +79,4 @@ fn channel(value: &str, expected: usize) -> Result<Channel, String> {
         return Err(format!("channel's frequency = {frequency_hz} Hz must be positive"));
     }
     Ok(Channel { frequency_hz, bandwidth_hz: number(bandwidth, "channel's bandwidth")? })
-}
-
-/// A station in the columns of eht-imaging.
-fn station(value: &str, names: &mut Names) -> Result<(), String> {
-    let words: Vec<&str> = value.split_whitespace().take(40).collect();
-    let station = array::station(&words)?;
-    if names.known(&station.name).is_some() {
-        return Err(format!("station {} is listed twice", station.name));
-    }
-    let k = usize::from(names.number(&station.name)?);
-    names.stations[k] = station;
-    Ok(())
 }

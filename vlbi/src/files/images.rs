@@ -1,6 +1,6 @@
 //! Images and movies as grids of numbers, arrays of NumPy, and pictures in EXR.
 
-use super::FileError;
+use super::{FileError, shortened};
 use crate::Error;
 use crate::operator::ImageGrid;
 use crate::simulate::{Movie, StokesMovie};
@@ -90,8 +90,7 @@ pub fn csv_grid(bytes: &[u8]) -> Result<Pixels> {
         let before = pixels.values.len();
         for (column, cell) in line.trim_end_matches(',').split(',').enumerate() {
             let value = cell.trim().parse().map_err(|_| {
-                let cell: String = cell.chars().take(20).collect();
-                let at = format!("line {number}, column {}", column + 1);
+                let (cell, at) = (shortened(cell), format!("line {number}, column {}", column + 1));
                 FileError::whole(format!("{at}: `{cell}` is not a number"))
             })?;
             pixels.values.push(value);

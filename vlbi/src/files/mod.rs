@@ -28,7 +28,8 @@ pub use table::{COLUMNS as TABLE_COLUMNS, parse as parse_table, to_csv};
 pub use text_image::{is_text_image, parse as parse_text_image};
 pub use uvfits::{read as read_uvfits, write as write_uvfits};
 
-use super::array::{MOST_STATIONS, Station};
+use super::array::{self, MOST_STATIONS, Station};
+use super::earth::SourcePosition;
 use super::observation::Observation;
 use crate::Error;
 use std::collections::HashMap;
@@ -190,6 +191,29 @@ impl Names {
         self.numbers.insert(name.to_owned(), number);
         Ok(number)
     }
+
+    /// Adds a station in the columns of eht-imaging.
+    fn add(&mut self, columns: &[&str]) -> Result<(), String> {
+        let station = array::station(columns)?;
+        if self.known(&station.name).is_some() {
+            return Err(format!("station {} is listed twice", station.name));
+        }
+        let k = usize::from(self.number(&station.name)?);
+        self.stations[k] = station;
+        Ok(())
+    }
+}
+
+/// Sets right ascension (hours) or declination (degrees) of the source; the other one stays, and is 0 before it is known.
+fn locate(
+    observation: &mut Observation,
+    ra_hours: Option<f64>,
+    dec_deg: Option<f64>,
+) -> Result<(), String> {
+    let [ra, dec] = observation.position.map_or([0.0; 2], |p| [p.ra_hours, p.dec_deg]);
+    let place = SourcePosition::new(ra_hours.unwrap_or(ra), dec_deg.unwrap_or(dec));
+    observation.position = Some(place.map_err(|error| error.to_string())?);
+    Ok(())
 }
 
 /// Returns the largest number of rows that a text may hold: as many as lines, which are 16 bytes at least.

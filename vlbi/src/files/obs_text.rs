@@ -1,11 +1,10 @@
 //! eht-imaging's text format of observations: a heading with source, date, frequency and
 //! stations, then 20 columns, amplitudes in Jy and phases in degrees.
 
-use super::{FileError, MOST_HOURS, MOST_WAVELENGTHS, Names, number, number_within, sigma};
+use super::{FileError, MOST_HOURS, MOST_WAVELENGTHS, Names, locate, number, number_within, sigma};
 use crate::Complex64;
 use crate::Error;
 use crate::array;
-use crate::earth::SourcePosition;
 use crate::observation::{Basis, MissingMetadata, Observation, Row};
 use core::fmt::Write;
 
@@ -67,15 +66,8 @@ fn read_heading(
     let first = || words.get(1).copied().unwrap_or_default();
     match words.first().copied().unwrap_or_default() {
         "SRC:" => observation.source = words[1..].join(" "),
-        "RA:" => {
-            let ra_hours = sexagesimal(&words, "RA")?;
-            let dec_deg = observation.position.map_or(0.0, |p| p.dec_deg);
-            observation.position = Some(checked(ra_hours, dec_deg)?);
-        }
-        "DEC:" => {
-            let ra_hours = observation.position.map_or(0.0, |p| p.ra_hours);
-            observation.position = Some(checked(ra_hours, sexagesimal(&words, "DEC")?)?);
-        }
+        "RA:" => locate(observation, Some(sexagesimal(&words, "RA")?), None)?,
+        "DEC:" => locate(observation, None, Some(sexagesimal(&words, "DEC")?))?,
         "MJD:" => {
             let mjd = number(first(), "MJD")?;
             if !(0.0..=1e6).contains(&mjd) || mjd.fract() != 0.0 {
@@ -99,7 +91,14 @@ fn read_heading(
             };
             return Ok(true);
         }
-        _ => read_station(&words, names)?,
+        _ => {
+            // Lines of other headings are passed over.
+            let is_station = matches!(words.len(), 5 | 13)
+                && words[1..].iter().all(|word| word.parse::<f64>().is_ok());
+            if is_station {
+                names.add(&words)?;
+            }
+        }
     }
     Ok(false)
 }
@@ -117,27 +116,6 @@ fn check_columns(line: &str, words: &[&str]) -> Result<(), String> {
         }
         None => Ok(()),
     }
-}
-
-/// Takes in a station; lines of other headings are passed over.
-fn read_station(words: &[&str], names: &mut Names) -> Result<(), String> {
-    let is_station =
-        matches!(words.len(), 5 | 13) && words[1..].iter().all(|w| w.parse::<f64>().is_ok());
-    if !is_station {
-        return Ok(());
-    }
-    let station = array::station(words)?;
-    let known = names.stations.len();
-    let k = usize::from(names.number(&station.name)?);
-    if k < known {
-        return Err(format!("station {} is listed twice", station.name));
-    }
-    names.stations[k] = station;
-    Ok(())
-}
-
-fn checked(ra_hours: f64, dec_deg: f64) -> Result<SourcePosition, String> {
-    SourcePosition::new(ra_hours, dec_deg).map_err(|error| error.to_string())
 }
 
 /// `230.0 GHz`, in Hz.

@@ -1,7 +1,7 @@
 //! FITS binary tables.
 
 use super::super::FileError;
-use super::{Header, Unit};
+use super::{Header, Unit, stored};
 
 /// A column: where its cells are, and how many values of what kind they hold.
 #[derive(Debug, Clone)]
@@ -79,17 +79,15 @@ impl<'a> Table<'a> {
         let size = size_of(column.code)?;
         let start = row * self.row_size + column.offset + index * size;
         let cell = self.data.get(start..start + size)?;
-        let stored: f64 = match (column.code, cell) {
+        let value: f64 = match (column.code, cell) {
             ('B', &[a]) => a.into(),
-            ('I', &[a, b]) => i16::from_be_bytes([a, b]).into(),
-            ('J', cell) => i32::from_be_bytes(cell.try_into().ok()?).into(),
             ('K', cell) => i64::from_be_bytes(cell.try_into().ok()?) as f64,
-            ('E', cell) => f32::from_be_bytes(cell.try_into().ok()?).into(),
-            ('D', cell) => f64::from_be_bytes(cell.try_into().ok()?),
+            ('I' | 'J', cell) => stored(false, cell),
+            ('E' | 'D', cell) => stored(true, cell),
             _ => return None,
         };
         let [scale, zero] = column.scale;
-        Some(stored * scale + zero)
+        Some(value * scale + zero)
     }
 }
 

@@ -43,7 +43,7 @@ pub struct Layout {
     pub u: Parameter,
     pub v: Parameter,
     /// Those of [`SELECTORS`] that there are.
-    pub selectors: Vec<(&'static str, Parameter)>,
+    selectors: Vec<(&'static str, Parameter)>,
     pub antennas: Antennas,
     /// Parts of the date, to be added.
     pub date: Vec<Parameter>,
@@ -174,8 +174,12 @@ impl Layout {
 
     /// Parameter of a group that tells sources, setups and the like apart, if it has it.
     pub fn selected(&self, group: &[u8], name: &str) -> Option<i64> {
-        let (_, parameter) = self.selectors.iter().find(|(known, _)| *known == name)?;
-        Some(self.parameter(group, *parameter) as i64)
+        Some(self.parameter(group, self.selector(name)?) as i64)
+    }
+
+    /// The parameter of [`SELECTORS`] with a name, if there is one.
+    pub fn selector(&self, name: &str) -> Option<Parameter> {
+        self.selectors.iter().find(|(known, _)| *known == name).map(|(_, parameter)| *parameter)
     }
 
     /// Place of a datum on the axis of polarisations.

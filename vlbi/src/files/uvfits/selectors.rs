@@ -15,10 +15,8 @@ const SHOWN: usize = 16;
 /// # Errors
 /// If there are several.
 pub fn only(unit: &Unit<'_>, layout: &Layout, name: &str) -> Result<Option<i64>, FileError> {
-    let Some((_, parameter)) = layout.selectors.iter().find(|(known, _)| *known == name) else {
-        return Ok(None);
-    };
-    let values = values(unit, layout, *parameter);
+    let Some(parameter) = layout.selector(name) else { return Ok(None) };
+    let values = values(unit, layout, parameter);
     if values.len() > 1 {
         let what = SELECTORS.iter().find(|(known, _)| *known == name).map_or("", |(_, what)| what);
         let shown: Vec<String> = values.iter().take(SHOWN).map(i64::to_string).collect();
@@ -60,8 +58,8 @@ pub fn source(units: &[Unit<'_>], layout: &Layout) -> Result<Option<Source>, Fil
         table.text(row, "SOURCE")
     };
     let number = only(&units[0], layout, "SOURCE").map_err(|error| {
-        let values = layout.selectors.iter().find(|(known, _)| *known == "SOURCE");
-        let values = values.map(|(_, parameter)| values_named(&units[0], layout, *parameter, name));
+        let values = layout.selector("SOURCE");
+        let values = values.map(|parameter| values_named(&units[0], layout, parameter, name));
         match (values, error) {
             (Some(names), FileError::Byte { offset, message }) if !names.is_empty() => {
                 FileError::byte(offset, format!("{message} ({})", names.join(", ")))
