@@ -38,7 +38,6 @@ pub struct StaticImageFile {
     /// Measured data.
     pub data: StaticData,
     /// Instrumental parameters that are fitted with the image.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instrument: Option<InstrumentSettings>,
     /// Terms of the loss: visibilities, amplitudes and closure quantities.
     pub loss: Vec<Loss>,
@@ -46,16 +45,12 @@ pub struct StaticImageFile {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub regulariser: Vec<PenaltySettings>,
     /// Light that is expected in the middle of the field.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub envelope: Option<EnvelopeSettings>,
     /// A factor on all penalties, chosen by cross-validation; 1 without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub strength: Option<StrengthSettings>,
     /// Measures a ring in the image.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ring: Option<RingSettings>,
     /// Fits linear polarisation as well.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub polarization: Option<StaticPolarization>,
 }
 
@@ -82,7 +77,6 @@ pub struct ImageSettings {
     pub iterations: usize,
     /// Fits of the image measured once more with other noise, and half as many of a simple shape, which give errors; needs a
     /// loss of amplitudes or visibilities.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 2, max = 1000), extend("unit" = "draws"))]
     pub draws: Option<usize>,
 }
@@ -114,7 +108,6 @@ pub enum StartImage {
 pub struct EnvelopeSettings {
     /// Full width at half maximum of a Gaussian, µas; without it, light with the second moment of the best simple shape, flat with soft edges if
     /// that is a disc, a ring or a crescent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
     pub fwhm_uas: Option<f64>,
     /// Factor on the entropy relative to it.
@@ -142,17 +135,13 @@ pub struct StaticVisibilities {
     /// Fraction of each amplitude, added to its error in quadrature.
     pub systematic: f64,
     /// Drops baselines shorter than this.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uv_min: Option<f64>,
     /// First and last hour of UTC, hours; all without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = 0.0, max = 1000.0)), extend("unit" = "hours"))]
     pub utc_h: Option<[f64; 2]>,
     /// Interstellar scattering that is part of the model.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scattering: Option<Scattering>,
     /// Adds jy/(1 + (|u|/uv)²)^(power/2) to all errors, for what the source varies.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variability: Option<Variability>,
 }
 

@@ -13,7 +13,6 @@ pub struct StaticPolarization {
     /// `polarimetric-ratios` or `polarized-visibilities`.
     pub data: LossKind,
     /// Ratios: least signal-to-noise ratio in Stokes I of baselines; 0 without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a signal-to-noise ratio"))]
     pub least_snr: Option<f64>,
     /// Part of Stokes I of each station that is added to errors of RL and LR, for leakage that calibration has
@@ -21,7 +20,6 @@ pub struct StaticPolarization {
     #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "a part of the light"))]
     pub leakage_left: f64,
     /// Adds jy/(1 + (|u|/uv)²)^(power/2) to errors of RL and LR.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variability: Option<Variability>,
     /// Factor on ∫ e |∇m|², e the brightness over its mean and m the fraction of polarisation.
     #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "a factor"))]
@@ -33,7 +31,6 @@ pub struct StaticPolarization {
     #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
     pub beam_uas: f64,
     /// A factor on `smoothness`, chosen by cross-validation with frames held out in blocks; 1 without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub strength: Option<StrengthSettings>,
 }
 

@@ -17,7 +17,6 @@ pub enum Velocity<N = f64> {
     /// Ω = 1/(r^{3/2} + drag).
     Keplerian {
         /// Spin of the flow; for circular geodesics that of the hole. Without it, a ξ_z.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = -1.0, max = 1.0), extend("unit" = "a/M, as Ω = 1/(r^{3/2} + drag)"))]
         drag: Option<f64>,
     },
@@ -56,7 +55,6 @@ pub enum Velocity<N = f64> {
         #[schemars(extend("minimum" = 0.0, "maximum" = 1.0, "unit" = "0: free fall, 1: circular"))]
         beta_phi: N,
         /// Spin of the flow. Without it, a ξ_z.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = -1.0, max = 1.0), extend("unit" = "a/M"))]
         drag: Option<f64>,
     },
@@ -87,7 +85,6 @@ pub struct Perturbed<N = f64> {
     /// First and last radius of its table of 100 rows, M.
     pub radii: [f64; 2],
     /// Its seed; the fit's without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
 }
 

@@ -17,31 +17,24 @@ macro_rules! pose_table {
         pub struct $name {
             $($more)*
             /// Boyer–Lindquist radius, M, outside the horizon.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
             #[schemars(range(min = 1.0, max = 1e6), extend("unit" = "M"))]
             pub radius: Option<f64>,
             /// Polar angle, degrees.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
             #[schemars(range(min = 0.0, max = 180.0), extend("unit" = "degrees"))]
             pub theta_deg: Option<f64>,
             /// Azimuth, degrees; 720 is a second turn.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
             #[schemars(range(min = -1e6, max = 1e6), extend("unit" = "degrees"))]
             pub phi_deg: Option<f64>,
             /// Width of the field of a pinhole lens, degrees.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
             #[schemars(range(min = 1e-6, max = 170.0), extend("unit" = "degrees"))]
             pub field_of_view_deg: Option<f64>,
             /// Turn to the right, away from the hole, degrees.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
             #[schemars(range(min = -1e6, max = 1e6), extend("unit" = "degrees"))]
             pub yaw_deg: Option<f64>,
             /// Then upwards, degrees.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
             #[schemars(range(min = -1e6, max = 1e6), extend("unit" = "degrees"))]
             pub pitch_deg: Option<f64>,
             /// Then clockwise about the line of sight, degrees.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
             #[schemars(range(min = -1e6, max = 1e6), extend("unit" = "degrees"))]
             pub roll_deg: Option<f64>,
         }

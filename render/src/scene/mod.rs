@@ -70,7 +70,6 @@ pub struct Scene {
     #[serde(default)]
     pub observer: ObserverConfig,
     /// A camera in place of the observer, except its time, and of the field of view of the screen.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraConfig>,
     /// Field of view and pixels.
     pub screen: Screen,
@@ -80,13 +79,10 @@ pub struct Scene {
     /// Method by which rays are traced.
     pub tracer: TracerConfig,
     /// A thin disc in the equatorial plane with the flux profile of Page & Thorne (1974).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disc: Option<Disc>,
     /// Magnetic field of the gas, for polarised light: components in the frame of the gas.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub magnetic_field: Option<MagneticField>,
     /// Volumetric gas with an analytic density and motion (Gold et al. 2020).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gas: Option<Gas>,
     /// Gaussian hot spots on circular Keplerian orbits.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -98,7 +94,6 @@ pub struct Scene {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub mesh: Vec<Mesh>,
     /// Sky that rays which escape see: one of four. It adds to R, G, B only.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sky: Option<Sky>,
 }
 
@@ -110,11 +105,9 @@ pub struct Hole {
     #[schemars(range(min = -1.0, max = 1.0), extend("unit" = "a/M"))]
     pub spin: f64,
     /// Mass, solar masses; needed with µas, Jy, gas, or times in seconds.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-20, max = 1e15), extend("unit" = "solar masses"))]
     pub mass_msun: Option<f64>,
     /// Distance, kpc; needed with µas, Jy or gas.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-9, max = 1e12), extend("unit" = "kpc"))]
     pub distance_kpc: Option<f64>,
 }
@@ -133,32 +126,21 @@ impl Hole {
 
 /// Place and time of the observer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct ObserverConfig {
     /// Angle between +z and the line of sight, degrees; needed without `[camera]`.
-    #[serde(default = "nowhere", skip_serializing_if = "is_nowhere")]
+    #[serde(skip_serializing_if = "is_nowhere")]
     #[schemars(range(min = 0.0, max = 180.0), extend("unit" = "degrees"))]
     pub inclination_deg: f64,
     /// Azimuth of the observer, degrees.
-    #[serde(default)]
     #[schemars(range(min = -3600.0, max = 3600.0), extend("unit" = "degrees"))]
     pub azimuth_deg: f64,
     /// Boyer–Lindquist radius, M, at most 1e9 or `inf`; half the diagonal of the field must stay below 0.9 of it.
-    #[serde(default = "infinity")]
     #[schemars(range(min = 10.0), extend("unit" = "M"))]
     pub radius: f64,
     /// Time of observation, M.
-    #[serde(default)]
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub time: f64,
-}
-
-fn infinity() -> f64 {
-    f64::INFINITY
-}
-
-fn nowhere() -> f64 {
-    f64::NAN
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref)] // serde's signature
@@ -168,7 +150,7 @@ fn is_nowhere(degrees: &f64) -> bool {
 
 impl Default for ObserverConfig {
     fn default() -> Self {
-        let (inclination_deg, radius) = (nowhere(), infinity());
+        let (inclination_deg, radius) = (f64::NAN, f64::INFINITY);
         ObserverConfig { inclination_deg, azimuth_deg: 0.0, radius, time: 0.0 }
     }
 }
@@ -178,16 +160,13 @@ impl Default for ObserverConfig {
 #[serde(deny_unknown_fields)]
 pub struct Screen {
     /// Width of the field, M, 1e-9 to 1e7 a side. This or the next, without `[camera]`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field_of_view_m: Option<f64>,
     /// Width of the field, µas.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field_of_view_uas: Option<f64>,
     /// Pixels per row; pixels are square.
     #[schemars(range(min = 1, max = 16_384), extend("unit" = "pixels"))]
     pub width: u32,
     /// Pixels per column; as many as per row without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 16_384), extend("unit" = "pixels"))]
     pub height: Option<u32>,
     /// Rays per pixel, a square number, on a regular grid.
@@ -198,17 +177,14 @@ pub struct Screen {
     #[serde(default)]
     pub rings: Rings,
     /// Scales `intensity` to this flux, Jy; scene units without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-30, max = 1e30), extend("unit" = "Jy"))]
     pub total_flux_jy: Option<f64>,
     /// Refines pixels until the estimated relative L1 error of `intensity` is below this value; needs
     /// `samples_per_pixel = 1`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-6, max = 0.5), extend("unit" = "a part of the light"))]
     pub image_error: Option<f64>,
     /// Channels or layers to write, such as `["intensity"]` or `["default", "A", "sky"]`; `"default"` stands for
     /// all but those on request.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channels: Option<Vec<String>>,
 }
 
@@ -232,42 +208,36 @@ pub enum Rings {
 
 /// Effects that are simulated. What is off is not computed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct Effects {
     /// Gravitational lensing; if off, rays are straight lines in the same coordinates.
-    #[serde(default = "on")]
     pub lensing: bool,
     /// Gravitational redshift and Doppler shift: I = g^{3+α} I_em of a surface, dI = g^{2+α} j ds of a volume.
-    #[serde(default)]
     pub redshift: bool,
     /// α of the spectrum ν^−α; 1 is the law of bolometric intensity. Needed with `redshift`, unless the next key is
     /// given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -10.0, max = 10.0), extend("unit" = "an exponent"))]
     pub spectral_index: Option<f64>,
     /// 2 + α, as in fits, in place of `spectral_index`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -8.0, max = 12.0), extend("unit" = "an exponent"))]
     pub redshift_power: Option<f64>,
     /// True if emission is evaluated at the time when the light passed.
-    #[serde(default)]
     pub slow_light: bool,
     /// True if gas absorbs what is behind it.
-    #[serde(default)]
     pub absorption: bool,
     /// Order of the last lensed image to include; 0: the direct image only; all without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(max = 100), extend("unit" = "half-orbits"))]
     pub half_orbits: Option<u32>,
     /// Polarised synchrotron emission; needs `redshift` and `[magnetic_field]`.
-    #[serde(default)]
     pub polarization: bool,
     /// Lorentz factor of the emitting electrons; without it V is not computed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 10.0, max = 1e12), extend("unit" = "a factor"))]
     pub circular_polarization_lorentz_factor: Option<f64>,
     /// Averages the sky over the solid angle between neighbouring rays.
-    #[serde(default)]
     pub ray_bundles: bool,
 }
 
@@ -286,10 +256,6 @@ impl Default for Effects {
             ray_bundles: false,
         }
     }
-}
-
-fn on() -> bool {
-    true
 }
 
 impl Effects {

@@ -72,7 +72,6 @@ pub enum GasMotion {
 #[serde(deny_unknown_fields)]
 pub struct Disc {
     /// Inner edge, M, at or outside the innermost stable orbit; that orbit without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inner_edge: Option<f64>,
     /// Outer edge, M, outside the inner one.
     #[schemars(range(max = 1e9), extend("unit" = "M"))]
@@ -84,12 +83,10 @@ pub struct Disc {
     /// True if it hides what is behind it.
     pub opaque: bool,
     /// Temperature at the flux peak, K: black-body colours; with redshift only with `spectral_index = 1`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 300.0, max = 1e8), extend("unit" = "K"))]
     pub peak_temperature_k: Option<f64>,
     /// Emission of matter that falls in from the innermost stable orbit, which `inner_edge` must be; dark inside
     /// without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plunging: Option<Plunging>,
     /// Linear colour of its light: R, G, B.
     #[serde(default = "white")]
@@ -138,7 +135,6 @@ pub struct Spot {
     /// Time at which a round spot lights up, M, at most 2000 before `observer.time`. Differential rotation shears
     /// it from then on, and it is dark before. With slow light this is a time of emission. Rigid and always lit
     /// without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sheared_since: Option<f64>,
     /// Linear colour of its light: R, G, B.
     #[serde(default = "white")]
@@ -177,11 +173,9 @@ pub struct Mesh {
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "scene units"))]
     pub brightness: f64,
     /// Linear colour of its light: R, G, B; that of its materials without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = 0.0, max = 1e6)), extend("unit" = "a colour"))]
     pub color: Option<[f32; 3]>,
     /// Motion of its matter, for the redshift, with which it is needed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity: Option<MeshVelocity>,
 }
 
@@ -207,30 +201,24 @@ pub struct VolumeSource {
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "intensity per M"))]
     pub factor: f64,
     /// Coordinates of the first node, M; those of the file without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = -1e6, max = 1e6)), extend("unit" = "M"))]
     pub low: Option<[f64; 3]>,
     /// Coordinates of the last node, M; those of the file without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = -1e6, max = 1e6)), extend("unit" = "M"))]
     pub high: Option<[f64; 3]>,
     /// Rotation axis, right-handed; that of the file without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<[f64; 3]>,
     /// Motion of the matter; `velocity` means the same, as fits call it.
     #[serde(alias = "velocity")]
     #[schemars(with = "super::rotation::RotationKeys")]
     pub rotation: Rotation,
     /// Time at which the volume is as in the file, M; needed if it rotates.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub reference_time: Option<f64>,
     /// Dark before this time, M; always lit without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub injection_time: Option<f64>,
     /// Lit only where r_min ≤ r < r_max and |z| ≤ z_width, at rest; everywhere without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region: Option<VolumeRegion>,
     /// Linear colour of its light: R, G, B.
     #[serde(default = "white")]
@@ -260,7 +248,6 @@ pub struct VolumeRegion {
     #[schemars(range(max = 1e6), extend("unit" = "M"))]
     pub r_max: f64,
     /// Largest |z|, M, above 0; any without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(max = 1e6), extend("unit" = "M"))]
     pub z_width: Option<f64>,
 }
