@@ -13,7 +13,6 @@ mod journal;
 mod layers;
 mod pixels;
 mod placement;
-mod plan;
 mod raw;
 mod requested;
 mod rings;
@@ -23,11 +22,12 @@ mod workspace;
 pub use channels::{CHANNELS, ChannelKind};
 pub use choice::all_channels;
 pub use journal::{AnyJournal, Found, Journal};
-pub use plan::{Plan, Step};
 pub use raw::Frame;
 pub use requested::REQUESTED;
 pub use rings::{RingStrata, Stratum};
 pub use tally::Summary;
+
+pub use crate::transport::{Plan, Step};
 
 use crate::Error;
 use crate::image::Picture;
@@ -143,6 +143,11 @@ impl Raster {
     /// The device on which rays are traced, if it is not this processor.
     pub fn device(&self) -> Option<&dyn RayDevice> {
         self.prepared.tracer().device()
+    }
+
+    /// Returns the plan of the picture.
+    pub fn plan(&self) -> Plan {
+        self.prepared.plan()
     }
 
     /// Returns the parts of the scene that are traced on this processor even so.

@@ -9,7 +9,6 @@ use super::sources::meshes::Meshes;
 use super::sources::sky::Sky;
 use super::sources::spots::Spots;
 use crate::Error;
-use crate::emission::medium::Medium;
 use crate::emission::mesh::MeshFile;
 use crate::emission::sky::{Catalogue, Panorama, SkyModel};
 use crate::scene::Scene;
@@ -159,7 +158,8 @@ impl PreparedScene {
             crossings: if self.disc.is_some() { CROSSINGS } else { 0 },
             all_crossings: self.disc.is_some(),
             // dw/dτ tells whether light of plunging matter moves outward; its g depends on it.
-            rates: self.optics.polarization.is_some() || self.has_plunging_disc(),
+            rates: self.optics.polarization.is_some()
+                || self.disc.as_ref().is_some_and(Disc::plunges),
             exit: self.sky.is_some() || self.optics.wanted.exit || self.optics.wanted.footprint,
             beams: self.optics.lensing && self.sky.as_ref().is_some_and(Sky::is_averaged),
             half_orbits,
@@ -241,44 +241,9 @@ impl PreparedScene {
         &self.tracer
     }
 
-    /// Returns the request of each ray.
-    pub fn request(&self) -> &BlockRequest {
-        &self.request
-    }
-
     /// Returns whether rays are bent.
     pub fn has_lensing(&self) -> bool {
         self.optics.lensing
-    }
-
-    /// Returns whether light is seen as it was when it passed, not as it is at the time of observation.
-    pub fn has_slow_light(&self) -> bool {
-        self.optics.slow_light
-    }
-
-    /// Returns the media that fill space: gas and volumes.
-    pub fn media(&self) -> impl Iterator<Item = &dyn Medium> {
-        self.media.iter()
-    }
-
-    /// Returns the quantities computed at the nodes in a medium besides r and cos θ.
-    pub fn quantities_of(&self, medium: &dyn Medium) -> Quantities {
-        self.optics.quantities_of(medium)
-    }
-
-    /// Returns whether there is a disc.
-    pub fn has_disc(&self) -> bool {
-        self.disc.is_some()
-    }
-
-    /// Returns whether there is a disc some of whose matter plunges.
-    pub fn has_plunging_disc(&self) -> bool {
-        self.disc.as_ref().is_some_and(Disc::plunges)
-    }
-
-    /// Returns whether there are triangle meshes.
-    pub fn has_meshes(&self) -> bool {
-        self.meshes.is_some()
     }
 
     /// The brightest light of the disc, if it were met, along the ray that arrives at (x, y).
@@ -292,19 +257,9 @@ impl PreparedScene {
         shift.map_or(light, |(index, shift)| light * shift.powf(3.0 + index))
     }
 
-    /// Number of hot spots.
-    pub fn spots(&self) -> usize {
-        self.spots.len()
-    }
-
     /// The sky.
     pub fn sky(&self) -> Option<&SkyModel> {
         self.sky.as_ref().map(Sky::model)
-    }
-
-    /// Returns whether the sky is averaged over the beams of rays.
-    pub fn averages_sky(&self) -> bool {
-        self.sky.as_ref().is_some_and(Sky::is_averaged)
     }
 
     /// Returns whether g is computed.

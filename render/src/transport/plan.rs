@@ -1,9 +1,8 @@
 //! Plan of a prepared scene: what is computed, and what is left out.
 
-use super::Raster;
+use super::prepare::PreparedScene;
 use crate::emission::medium::{Medium, Part};
 use crate::emission::sky::SkyModel;
-use crate::transport::PreparedScene;
 use kerrlight_geodesic::Method;
 
 /// A line of a plan.
@@ -24,17 +23,17 @@ pub struct Plan {
     pub steps: Vec<Step>,
 }
 
-impl Raster {
-    /// Returns the plan of the picture.
+impl PreparedScene {
+    /// Returns the plan of its pictures.
     pub fn plan(&self) -> Plan {
-        let (mut plan, prepared) = (Plan { steps: Vec::new() }, &self.prepared);
-        plan.rays(prepared);
-        plan.layers(prepared);
-        plan.surfaces(prepared);
-        plan.gas(prepared);
-        plan.volumes(prepared);
-        plan.spots(prepared);
-        plan.sky(prepared);
+        let mut plan = Plan { steps: Vec::new() };
+        plan.rays(self);
+        plan.layers(self);
+        plan.surfaces(self);
+        plan.gas(self);
+        plan.volumes(self);
+        plan.spots(self);
+        plan.sky(self);
         plan
     }
 }
@@ -51,7 +50,7 @@ impl Plan {
 
     fn rays(&mut self, prepared: &PreparedScene) {
         self.say(Part::Rays, true, how(prepared));
-        match prepared.request().half_orbits {
+        match prepared.request.half_orbits {
             Some(n) => self.say(Part::Rays, true, format!("light of images 0 to {n}")),
             None => self.say(Part::Rays, false, "no limit of half-orbits"),
         }
@@ -63,7 +62,7 @@ impl Plan {
 
     /// Adds the needs of channels on request.
     fn layers(&mut self, prepared: &PreparedScene) {
-        let wanted = prepared.wanted();
+        let wanted = prepared.optics.wanted;
         for (done, what) in [
             (wanted.orders, "images of each order apart"),
             (wanted.depth, "path length of central rays, traced once more"),
@@ -78,9 +77,9 @@ impl Plan {
 
     fn surfaces(&mut self, prepared: &PreparedScene) {
         let part = Part::Surfaces;
-        if prepared.has_disc() {
+        if let Some(disc) = &prepared.disc {
             self.say(part, true, "disc: radius, azimuth and delay at its crossings");
-            let plunges = prepared.has_plunging_disc();
+            let plunges = disc.plunges();
             let shift = if plunges {
                 "g of circular orbits and of plunging matter, with the radial momentum"
             } else {
@@ -93,19 +92,19 @@ impl Plan {
         } else {
             self.say(part, false, "no disc: crossings are counted, not located");
         }
-        if prepared.has_meshes() {
+        if prepared.meshes.is_some() {
             self.say(part, true, "meshes, in a hierarchy of their triangles");
         }
     }
 
     fn gas(&mut self, prepared: &PreparedScene) {
         let part = Part::Gas;
-        let found = prepared.media().find(|medium| medium.part() == part);
+        let found = prepared.media.iter().find(|medium| medium.part() == part);
         let Some(gas) = found else {
             return self.say(part, false, "no gas: no nodes between surfaces");
         };
         self.say(part, true, format!("nodes of r and theta inside r = {}", gas.sphere()));
-        let nodes = prepared.quantities_of(gas);
+        let nodes = prepared.optics.quantities_of(gas);
         for (name, channel, kept) in
             [("azimuth", "azimuth", nodes.azimuth), ("time", "delay", nodes.time)]
         {
@@ -124,7 +123,7 @@ impl Plan {
     fn volumes(&mut self, prepared: &PreparedScene) {
         let part = Part::Volumes;
         let volumes: Vec<&dyn Medium> =
-            prepared.media().filter(|medium| medium.part() == part).collect();
+            prepared.media.iter().filter(|medium| medium.part() == part).collect();
         if volumes.is_empty() {
             return self.say(part, false, "no volumes");
         }
@@ -134,7 +133,7 @@ impl Plan {
             true,
             format!("{count} volumes: nodes of r, theta and phi, and their values"),
         );
-        let what = if prepared.has_lensing() {
+        let what = if prepared.optics.lensing {
             "nodes in occupied bricks alone, which turn with the matter"
         } else {
             "nodes inside the largest radius"
@@ -147,20 +146,20 @@ impl Plan {
     }
 
     fn spots(&mut self, prepared: &PreparedScene) {
-        let (part, count) = (Part::Spots, prepared.spots());
+        let (part, count) = (Part::Spots, prepared.spots.len());
         if count == 0 {
             return self.say(part, false, "no spots");
         }
         self.say(part, true, format!("{count} hot spots, in a hierarchy of their orbits' parts"));
         let sentences = ["emission when the light passed", "one time: no slow light"];
-        self.either(part, prepared.has_slow_light(), sentences);
+        self.either(part, prepared.optics.slow_light, sentences);
     }
 
     fn sky(&mut self, prepared: &PreparedScene) {
-        let Some(sky) = prepared.sky() else {
+        let Some(sky) = &prepared.sky else {
             return self.say(Part::Sky, false, "no sky: no directions of escape");
         };
-        let what = match sky {
+        let what = match sky.model() {
             SkyModel::Checker(_) => "checkered sky",
             SkyModel::Stars(_) => "stars",
             SkyModel::Catalogue(_) => "stars of a catalogue",
@@ -168,14 +167,14 @@ impl Plan {
         };
         self.say(Part::Sky, true, what);
         let beams = ["averaged over ray bundles", "no ray bundles"];
-        self.either(Part::Sky, prepared.averages_sky(), beams);
+        self.either(Part::Sky, sky.is_averaged(), beams);
     }
 }
 
 /// Describes how rays are traced.
 fn how(prepared: &PreparedScene) -> &'static str {
-    let (tracer, request) = (prepared.tracer(), prepared.request());
-    if !prepared.has_lensing() {
+    let (tracer, request) = (&prepared.tracer, &prepared.request);
+    if !prepared.optics.lensing {
         return "straight lines: lensing is off";
     }
     if tracer.device().is_some() {
