@@ -191,6 +191,7 @@ fn steffen_slope(knots: &[[f64; 2]], k: usize) -> f64 {
         return secant(0);
     }
     if k > 0 && k < last {
+        let sign = |x: f64| f64::from(i8::from(x > 0.0) - i8::from(x < 0.0));
         let (s0, s1, h0, h1) = (secant(k - 1), secant(k), width(k - 1), width(k));
         let parabola = (s0 * h1 + s1 * h0) / (h0 + h1);
         let least = s0.abs().min(s1.abs()).min(0.5 * parabola.abs());
@@ -206,16 +207,6 @@ fn steffen_slope(knots: &[[f64; 2]], k: usize) -> f64 {
         2.0 * s
     } else {
         parabola
-    }
-}
-
-fn sign(x: f64) -> f64 {
-    if x > 0.0 {
-        1.0
-    } else if x < 0.0 {
-        -1.0
-    } else {
-        0.0
     }
 }
 

@@ -132,7 +132,7 @@ impl Layers {
 }
 
 /// Record gathered along one ray.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Record {
     /// Mino times in M⁻¹ from which on light is of the next image.
     pub cuts: [f64; ORDERS - 1],
@@ -142,11 +142,6 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// Starts a ray whose images change at `cuts`.
-    pub fn new(cuts: [f64; ORDERS - 1]) -> Self {
-        Record { cuts, orders: Default::default(), sky: [0.0; 3], origin: None }
-    }
-
     /// Adds intensity from a Mino time.
     pub fn add(&mut self, intensity: f64, color: [f32; 3], mino_time: f64) {
         let order = self.cuts.iter().filter(|cut| mino_time > **cut).count();

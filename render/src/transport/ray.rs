@@ -11,7 +11,7 @@ use super::layers::{HOLE, Layers, Origin, Record};
 use super::meter::Meter;
 use super::prepare::PreparedScene;
 use super::result::{Accumulator, RayResult};
-use super::sources::disc::{Disc, DiscRay};
+use super::sources::disc::DiscRay;
 use super::sources::media::{MediaRay, MediaScratch};
 use super::sources::meshes::MeshScratch;
 use super::sources::spots::{SpotRay, SpotScratch, SpotTree};
@@ -258,7 +258,7 @@ impl<'a> Sum<'a> {
     /// Returns the record of ray number `k`: as long as nothing shines, the surface that ends it.
     fn record(&self, k: usize, ray: &TracedRay, crossings: &[PlaneCrossing]) -> Box<Record> {
         let cuts = self.sources.cuts.get(k).copied().unwrap_or([f64::INFINITY; 2]);
-        Box::new(Record { origin: self.end(ray, crossings), ..Record::new(cuts) })
+        Box::new(Record { cuts, origin: self.end(ray, crossings), ..Record::default() })
     }
 
     /// The opaque surface or the hole that a ray ends at.
@@ -319,12 +319,8 @@ impl<'a> Sum<'a> {
             let depths = self.sources.media.depths(ray);
             let polarized = optics.polarized(x, y, ray.lambda);
             let blueshift = optics.blueshift(x, y);
-            Disc::add(
-                disc,
-                optics,
-                &DiscRay { ray, crossings, depths, polarized, blueshift },
-                light,
-            );
+            let seen = DiscRay { ray, crossings, depths, polarized, blueshift };
+            disc.add(optics, &seen, light);
         }
         if let (Some(meshes), Some(path), true) = (meshes, path, ray.stepped) {
             let (way, depths) = ((path.path, ray.last_time()), self.sources.media.profile());

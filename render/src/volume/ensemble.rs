@@ -144,13 +144,12 @@ impl Ensemble {
     /// The nodes joined to a peak and brighter than a part of it, which are marked; none if they join others.
     fn around(&self, peak: usize, label: u32, labels: &mut [u32]) -> Option<Vec<usize>> {
         let least = (EDGE * f64::from(self.mean.values()[peak])) as f32;
-        let [_, ny, nz] = self.mean.nodes();
-        let [nx, ..] = self.mean.nodes();
+        let [nx, ny, nz] = self.mean.nodes();
         let (mut all, mut next, mut joined) = (vec![peak], 0, false);
         labels[peak] = label;
         while let Some(node) = all.get(next).copied() {
             next += 1;
-            let at = [node / (ny * nz), node / nz % ny, node % nz];
+            let at = self.mean.indices(node);
             for (axis, (stride, count)) in
                 [(ny * nz, nx), (nz, ny), (1, nz)].into_iter().enumerate()
             {

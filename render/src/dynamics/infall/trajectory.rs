@@ -184,7 +184,6 @@ struct Span {
 impl Span {
     fn cell(&self, [start, azimuth]: [f64; 2]) -> Cell {
         let ([time, turned], [a, b]) = (self.steps, self.ends);
-        let one = 1.0;
         let azimuths = [azimuth, azimuth + turned];
         let (radius, azimuth) = if self.rough {
             // Too short for anything but a straight line to be seen.
@@ -195,7 +194,7 @@ impl Span {
                 quintic(azimuths, [a.turn, b.turn], time),
             )
         };
-        Cell { start, per_time: one / time, radius, azimuth }
+        Cell { start, per_time: 1.0 / time, radius, azimuth }
     }
 }
 
@@ -244,8 +243,7 @@ impl Cell {
 }
 
 fn line([a, b]: [f64; 2]) -> [f64; 6] {
-    let zero = 0.0;
-    [a, b - a, zero, zero, zero, zero]
+    [a, b - a, 0.0, 0.0, 0.0, 0.0]
 }
 
 /// Coefficients of the polynomial with these values, slopes and curvatures at the ends of a time.
