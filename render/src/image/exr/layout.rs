@@ -115,15 +115,8 @@ fn is_color(name: &str) -> bool {
     ["R", "G", "B", "A"].contains(&last)
 }
 
-/// Primaries and white of the channels R, G, B: Rec. 709.
-fn rec709() -> Chromaticities {
-    Chromaticities {
-        red: Vec2(0.64, 0.33),
-        green: Vec2(0.30, 0.60),
-        blue: Vec2(0.15, 0.06),
-        white: Vec2(0.3127, 0.3290),
-    }
-}
+/// Chromaticities (CIE x, y) of red, green, blue and white of Rec. 709, which an EXR has unless it says otherwise.
+pub(super) const REC_709: [[f32; 2]; 4] = [[0.64, 0.33], [0.3, 0.6], [0.15, 0.06], [0.3127, 0.329]];
 
 impl Part {
     fn new(size: (usize, usize), names: &[&str], order: Vec<usize>, style: &Style) -> Self {
@@ -138,7 +131,8 @@ impl Part {
             BlockDescription::ScanLines,
             LineOrder::Increasing,
         );
-        header.shared_attributes.chromaticities = Some(rec709());
+        let [red, green, blue, white] = REC_709.map(|[x, y]| Vec2(x, y));
+        header.shared_attributes.chromaticities = Some(Chromaticities { red, green, blue, white });
         Part { header, order }
     }
 

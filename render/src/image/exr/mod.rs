@@ -13,6 +13,7 @@ use exr::meta::header::LayerAttributes;
 use exr::prelude::{AttributeValue, Error, ReadChannels, ReadLayers, Text, Vec2, read};
 use kerrlight_common::memory;
 use kerrlight_common::toml_file;
+use layout::REC_709;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::io::{Cursor, Read};
@@ -113,9 +114,6 @@ pub struct Header {
     /// Chromaticities of red, green, blue and white, where they are not those of Rec. 709.
     pub foreign_primaries: Option<[[f32; 2]; 4]>,
 }
-
-/// Chromaticities (CIE x, y) of red, green, blue and white of Rec. 709, which an EXR has unless it says otherwise.
-const REC_709: [[f32; 2]; 4] = [[0.64, 0.33], [0.3, 0.6], [0.15, 0.06], [0.3127, 0.329]];
 
 impl Header {
     /// The header of the first layer.
