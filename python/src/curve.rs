@@ -10,13 +10,6 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::convert::Infallible;
 
-/// Adds the functions of this module.
-pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(critical_curve, module)?)?;
-    module.add_function(wrap_pyfunction!(critical_points, module)?)?;
-    module.add_function(wrap_pyfunction!(band, module)?)
-}
-
 /// Names of the numbers of a point; `lambda` is a word of Python.
 const COLUMNS: [&str; 8] = ["r", "lam", "eta", "alpha", "beta", "gamma", "delta", "tau"];
 
@@ -35,7 +28,7 @@ fn curve(spin: f64, place: Place) -> PyResult<(Kerr, Inclination)> {
 
 /// `count` points of the critical curve at equal steps of the angle on the screen.
 #[pyfunction]
-fn critical_curve(
+pub fn critical_curve(
     py: Python<'_>,
     spin: f64,
     place: Place,
@@ -51,7 +44,7 @@ fn critical_curve(
 
 /// The points of the critical curve in these directions of the screen.
 #[pyfunction]
-fn critical_points<'py>(
+pub fn critical_points<'py>(
     py: Python<'py>,
     spin: f64,
     place: Place,
@@ -72,7 +65,7 @@ fn critical_points<'py>(
 
 /// (alpha, beta) of both edges of a lensing band in these directions; NaN where there is none.
 #[pyfunction]
-fn band<'py>(
+pub fn band<'py>(
     py: Python<'py>,
     spin: f64,
     place: Place,

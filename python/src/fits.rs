@@ -4,15 +4,9 @@ use crate::refusal::refused;
 use kerrlight_tomo::fit::settings::Hole;
 use pyo3::prelude::*;
 
-/// Adds the functions of this module.
-pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(known_hole, module)?)?;
-    module.add_function(wrap_pyfunction!(data_key, module)?)
-}
-
 /// Mass (solar masses) and distance (kpc) of Sgr A* or M87*.
 #[pyfunction]
-fn known_hole(name: &str) -> PyResult<(Option<f64>, Option<f64>)> {
+pub fn known_hole(name: &str) -> PyResult<(Option<f64>, Option<f64>)> {
     let Hole { mass_msun, distance_kpc, .. } = match name {
         "Sgr A*" => Hole::sgr_a_star(0.0),
         "M87*" => Hole::m87_star(0.0),
@@ -23,7 +17,7 @@ fn known_hole(name: &str) -> PyResult<(Option<f64>, Option<f64>)> {
 
 /// The dotted key of the file of data that settings name.
 #[pyfunction]
-fn data_key(text: &str) -> PyResult<String> {
+pub fn data_key(text: &str) -> PyResult<String> {
     let table: toml::Table = text.parse().map_err(refused)?;
     let kinds = table.get("data").and_then(toml::Value::as_table);
     let kind = kinds.and_then(|kinds| kinds.keys().next());

@@ -9,11 +9,6 @@ use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use std::convert::Infallible;
 
-/// Adds the class of this module.
-pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Fourier>()
-}
-
 /// A transform to fixed (u, v), in double precision.
 #[pyclass(frozen, module = "kerrlight._core")]
 pub struct Fourier {

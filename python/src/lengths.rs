@@ -9,18 +9,12 @@ use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-/// Adds the functions of this module.
-pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(path_lengths, module)?)?;
-    module.add_function(wrap_pyfunction!(path_points, module)?)
-}
-
 /// Nodes between two samples.
 const NODES: usize = 16;
 
 /// The points of a ray, equidistant in Mino time from the observer to a part of the whole ray.
 #[derive(Clone, Copy, FromPyObject)]
-struct Spacing(usize, f64);
+pub struct Spacing(usize, f64);
 
 impl Spacing {
     /// Mino time of a whole ray, and that between two points.
@@ -32,7 +26,7 @@ impl Spacing {
 
 /// ∫Σ dτ (M) from the observer to each point; ray after ray. Needs an observer at a finite radius. NaN for unresolved rays.
 #[pyfunction]
-fn path_lengths<'py>(
+pub fn path_lengths<'py>(
     py: Python<'py>,
     spin: f64,
     place: Place,
@@ -50,7 +44,7 @@ fn path_lengths<'py>(
 /// Mino time (1/M), radius (M), polar angle, azimuth (radians) and delay (M) of each point, one after the other. NaN for
 /// unresolved rays.
 #[pyfunction]
-fn path_points<'py>(
+pub fn path_points<'py>(
     py: Python<'py>,
     spin: f64,
     place: Place,

@@ -24,22 +24,31 @@ mod representation;
 mod threads;
 mod volume;
 
-use pyo3::prelude::*;
-
 /// The functions of the package.
-#[pymodule(gil_used = false)]
-fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    curve::add(module)?;
-    fits::add(module)?;
-    fourier::add(module)?;
-    lengths::add(module)?;
-    model::add(module)?;
-    observation::add(module)?;
-    observing::add(module)?;
-    orbits::add(module)?;
-    pictures::add(module)?;
-    program::add(module)?;
-    rays::add(module)?;
-    volume::add(module)
+#[pyo3::pymodule(gil_used = false)]
+mod _core {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::{
+        curve::{band, critical_curve, critical_points},
+        fits::{data_key, known_hole},
+        fourier::Fourier,
+        lengths::{path_lengths, path_points},
+        model::{Model, check_voxels},
+        observation::{Visibilities, hours_utc_of_gmst},
+        observing::{array, observe},
+        orbits::{keplerian_redshift, radii, velocity},
+        pictures::{
+            Picture, film, render, same_toml, scene_of_exr, toml_of_json, toml_value_of_json,
+        },
+        program::{call, program},
+        rays::{differentiate, trace},
+        volume::view,
+    };
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
 }

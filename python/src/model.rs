@@ -18,12 +18,6 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 use std::convert::Infallible;
 
-/// Adds the class of this module.
-pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(check_voxels, module)?)?;
-    module.add_class::<Model>()
-}
-
 /// Nodes on rays, and what each gives to its pixel.
 #[pyclass(frozen, module = "kerrlight._core")]
 pub struct Model {

@@ -14,15 +14,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::convert::Infallible;
 
-/// Adds the class of this module.
-pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(hours_utc_of_gmst, module)?)?;
-    module.add_class::<Visibilities>()
-}
-
 /// Hours of UTC since 0 h of a day, of hours of Greenwich mean sidereal time of which `first` is the first one.
 #[pyfunction]
-fn hours_utc_of_gmst<'py>(
+pub fn hours_utc_of_gmst<'py>(
     py: Python<'py>,
     mjd: i32,
     hours: PyReadonlyArray1<'py, f64>,

@@ -17,15 +17,9 @@ use kerrlight_vlbi::source::Source;
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 
-/// Adds the functions of this module.
-pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(array, module)?)?;
-    module.add_function(wrap_pyfunction!(observe, module)?)
-}
-
 /// The stations of a built-in array, or of a text in eht-imaging's format.
 #[pyfunction]
-fn array(name: &str, text: Option<&str>) -> PyResult<Vec<Telescope>> {
+pub fn array(name: &str, text: Option<&str>) -> PyResult<Vec<Telescope>> {
     let array = match text {
         Some(text) => parse(text).map_err(refused)?,
         None => built_in(name).ok_or_else(|| {
@@ -38,7 +32,7 @@ fn array(name: &str, text: Option<&str>) -> PyResult<Vec<Telescope>> {
 /// Plan of an observation: times, array and source.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct Plan {
+pub struct Plan {
     stations: Vec<Telescope>,
     source: String,
     mjd: i32,
@@ -124,7 +118,7 @@ impl Plan {
 /// Observes a movie of images of width × height pixels over a field (µas) with an array: Stokes I, and Q, U and V
 /// where they are given.
 #[pyfunction]
-fn observe(
+pub fn observe(
     py: Python<'_>,
     movie: PyReadonlyArray1<'_, f64>,
     polarized: [Option<PyReadonlyArray1<'_, f64>>; 3],

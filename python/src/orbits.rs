@@ -9,16 +9,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::convert::Infallible;
 
-/// Adds the functions of this module.
-pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(radii, module)?)?;
-    module.add_function(wrap_pyfunction!(keplerian_redshift, module)?)?;
-    module.add_function(wrap_pyfunction!(velocity, module)?)
-}
-
 /// Special radii in M, by name. Refuses spins out of range.
 #[pyfunction]
-fn radii(py: Python<'_>, spin: f64) -> PyResult<Bound<'_, PyDict>> {
+pub fn radii(py: Python<'_>, spin: f64) -> PyResult<Bound<'_, PyDict>> {
     let hole = Kerr::new(spin).map_err(refused)?;
     let dict = PyDict::new(py);
     dict.set_item("horizon", hole.horizon())?;
@@ -34,7 +27,7 @@ fn radii(py: Python<'_>, spin: f64) -> PyResult<Bound<'_, PyDict>> {
 /// Four-velocities in the equatorial plane, four numbers a radius: of circular orbits about +z, and of what plunges from
 /// the innermost stable one with its energy and angular momentum. NaN at and inside the horizon.
 #[pyfunction]
-fn velocity<'py>(
+pub fn velocity<'py>(
     py: Python<'py>,
     spin: f64,
     r: PyReadonlyArray1<'py, f64>,
@@ -52,7 +45,7 @@ fn velocity<'py>(
 
 /// Redshift factors g of circular orbits in the equatorial plane; NaN where there is no orbit.
 #[pyfunction]
-fn keplerian_redshift<'py>(
+pub fn keplerian_redshift<'py>(
     py: Python<'py>,
     spin: f64,
     r: PyReadonlyArray1<'py, f64>,

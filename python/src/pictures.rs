@@ -10,17 +10,6 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 
-/// Adds the functions of this module.
-pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Picture>()?;
-    module.add_function(wrap_pyfunction!(toml_of_json, module)?)?;
-    module.add_function(wrap_pyfunction!(toml_value_of_json, module)?)?;
-    module.add_function(wrap_pyfunction!(same_toml, module)?)?;
-    module.add_function(wrap_pyfunction!(scene_of_exr, module)?)?;
-    module.add_function(wrap_pyfunction!(render, module)?)?;
-    module.add_function(wrap_pyfunction!(film, module)?)
-}
-
 /// A rendered picture.
 #[pyclass(frozen, module = "kerrlight._core")]
 pub struct Picture {
@@ -29,7 +18,7 @@ pub struct Picture {
 
 /// Settings as TOML, from the same settings as JSON.
 #[pyfunction]
-fn toml_of_json(json: &str) -> PyResult<String> {
+pub fn toml_of_json(json: &str) -> PyResult<String> {
     let mut table: toml::Table = serde_json::from_str(json).map_err(refused)?;
     table.iter_mut().for_each(|(_, value)| with_infinities(value));
     toml::to_string(&table).map_err(refused)
@@ -37,7 +26,7 @@ fn toml_of_json(json: &str) -> PyResult<String> {
 
 /// A value as TOML writes it in a line, from the same value as JSON.
 #[pyfunction]
-fn toml_value_of_json(json: &str) -> PyResult<String> {
+pub fn toml_value_of_json(json: &str) -> PyResult<String> {
     let mut value: toml::Value = serde_json::from_str(json).map_err(refused)?;
     with_infinities(&mut value);
     Ok(value.to_string())
@@ -56,20 +45,20 @@ fn with_infinities(value: &mut toml::Value) {
 
 /// Returns whether two texts are the same TOML, whatever their order and their comments.
 #[pyfunction]
-fn same_toml(first: &str, second: &str) -> PyResult<bool> {
+pub fn same_toml(first: &str, second: &str) -> PyResult<bool> {
     let [first, second] = [first, second].map(|text| text.parse::<toml::Table>().map_err(refused));
     Ok(first? == second?)
 }
 
 /// The scene that a picture's file holds.
 #[pyfunction]
-fn scene_of_exr(path: PathBuf) -> PyResult<String> {
+pub fn scene_of_exr(path: PathBuf) -> PyResult<String> {
     kerrlight_cli::pictures::scene_of_exr(&path).map_err(refused)
 }
 
 /// The picture of a scene: its text (TOML; none: the built-in one), the folder of its files, and overrides.
 #[pyfunction]
-fn render(
+pub fn render(
     py: Python<'_>,
     text: Option<String>,
     folder: PathBuf,
@@ -84,7 +73,7 @@ fn render(
 
 /// Its pictures at times in M.
 #[pyfunction]
-fn film(
+pub fn film(
     py: Python<'_>,
     text: Option<String>,
     folder: PathBuf,

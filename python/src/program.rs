@@ -14,12 +14,6 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
-/// Adds the functions of this module.
-pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(program, module)?)?;
-    module.add_function(wrap_pyfunction!(call, module)?)
-}
-
 fn with_ours(launcher: Vec<OsString>) -> Program {
     Program::new().other_representations(representation::find).launched_by(launcher)
 }
@@ -27,7 +21,7 @@ fn with_ours(launcher: Vec<OsString>) -> Program {
 /// Does what a command line says, whose first word is the program's name; `launcher` starts the program again, for
 /// the fits of a comparison. Returns the exit code: 1 where a representation that is written in Python raised.
 #[pyfunction]
-fn program(py: Python<'_>, arguments: Vec<OsString>, launcher: Vec<OsString>) -> u8 {
+pub fn program(py: Python<'_>, arguments: Vec<OsString>, launcher: Vec<OsString>) -> u8 {
     let program = with_ours(launcher);
     let run = AssertUnwindSafe(|| program.run_with(arguments));
     // A representation in Python ends a fit by unwinding to here: its trait has no errors.
@@ -73,7 +67,7 @@ const MOMENT: Duration = Duration::from_millis(50);
 /// Raises what a handler of a signal or the listener raises, after the work has come to where it can be resumed;
 /// `ValueError`, `FitError` or `Busy` with the words of the program otherwise.
 #[pyfunction]
-fn call(
+pub fn call(
     py: Python<'_>,
     arguments: Vec<OsString>,
     launcher: Vec<OsString>,

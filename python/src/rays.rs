@@ -10,12 +10,6 @@ use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Adds the functions of this module.
-pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(trace, module)?)?;
-    module.add_function(wrap_pyfunction!(differentiate, module)?)
-}
-
 /// Place of an observer: inclination, whether that is in degrees, radius (M) and azimuth (radians).
 #[derive(Clone, Copy, FromPyObject)]
 pub struct Place(f64, bool, f64, f64);
@@ -44,7 +38,7 @@ impl Place {
 /// Quantities wanted of rays.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct Wanted {
+pub struct Wanted {
     crossings: usize,
     /// Name of a placement with its numbers.
     samples: (String, usize, f64, f64),
@@ -85,7 +79,7 @@ fn named(name: &str) -> PyResult<Integrator> {
 
 /// Rays at (alpha, beta) of a hole's observer, in columns.
 #[pyfunction]
-fn trace<'py>(
+pub fn trace<'py>(
     py: Python<'py>,
     spin: f64,
     place: Place,
@@ -108,7 +102,7 @@ const FEW: usize = 32;
 
 /// Rays as those of `trace` with `taylor-mino`, and their derivatives.
 #[pyfunction]
-fn differentiate<'py>(
+pub fn differentiate<'py>(
     py: Python<'py>,
     spin: f64,
     place: Place,

@@ -8,18 +8,13 @@ use numpy::{IntoPyArray, PyReadonlyArray1};
 use pyo3::prelude::*;
 use std::convert::Infallible;
 
-/// Adds the functions of this module.
-pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(view, module)?)
-}
-
 /// A box: nodes along x, y and z, and the coordinates (M) of the first and the last of them.
 type Corners = ([usize; 3], [f64; 3], [f64; 3]);
 
 /// ∫ e ds along parallel rays from `angles`, azimuth and elevation in degrees, row by row from the top. `lengths` are the
 /// width of the picture and the radius of a ball that hides what is behind it, M.
 #[pyfunction]
-fn view<'py>(
+pub fn view<'py>(
     py: Python<'py>,
     corners: Corners,
     emission: PyReadonlyArray1<'py, f32>,
