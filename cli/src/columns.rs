@@ -1,6 +1,7 @@
 //! Tables of named columns, as CSV or npz.
 
 use anyhow::Context;
+use kerrlight_common::numpy::write_array;
 use npyz::WriterBuilder;
 use serde_json::json;
 use std::fmt::Write;
@@ -98,16 +99,20 @@ pub fn npz(groups: &[Vec<Column>]) -> anyhow::Result<Vec<u8>> {
     let options =
         zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
     for column in groups.iter().flatten() {
-        let (name, bytes) = match column {
-            Column::Numbers(name, values) => (name, npy(&[values.len()], values.iter().copied())?),
-            Column::Blocks(name, rows) => {
-                let width = rows.first().map_or(0, Vec::len);
-                (name, npy(&[rows.len(), width], rows.iter().flatten().copied())?)
+        let bytes = match column {
+            Column::Numbers(_, values) => {
+                write_array(&[values.len() as u64], values.iter().copied())
             }
-            Column::Counts(name, counts) => (name, npy(&[counts.len()], counts.iter().copied())?),
-            Column::Words(name, words) => (name, npy_words(words)?),
+            Column::Counts(_, counts) => {
+                write_array(&[counts.len() as u64], counts.iter().copied())
+            }
+            Column::Blocks(_, rows) => {
+                let shape = [rows.len(), column.width()].map(|n| n as u64);
+                write_array(&shape, rows.iter().flatten().copied())
+            }
+            Column::Words(_, words) => npy_words(words)?,
         };
-        archive.start_file(npyz::npz::file_name_from_array_name(name), options)?;
+        archive.start_file(npyz::npz::file_name_from_array_name(column.name()), options)?;
         archive.write_all(&bytes)?;
     }
     Ok(archive.finish()?.into_inner())
@@ -125,19 +130,6 @@ pub fn json(groups: &[Vec<Column>]) -> serde_json::Value {
         (column.name().to_owned(), values)
     });
     serde_json::Value::Object(columns.collect())
-}
-
-fn npy<T: npyz::AutoSerialize>(
-    shape: &[usize],
-    values: impl Iterator<Item = T>,
-) -> anyhow::Result<Vec<u8>> {
-    let shape: Vec<u64> = shape.iter().map(|n| *n as u64).collect();
-    let mut bytes = Vec::new();
-    let mut writer =
-        npyz::WriteOptions::new().default_dtype().shape(&shape).writer(&mut bytes).begin_nd()?;
-    writer.extend(values)?;
-    writer.finish()?;
-    Ok(bytes)
 }
 
 fn npy_words(words: &[String]) -> anyhow::Result<Vec<u8>> {
