@@ -87,7 +87,6 @@ impl Page<'_> {
     /// Returns the parts of the page: results, how to read them, how they were measured.
     fn parts(&self, left_out: Vec<String>) -> Vec<Part> {
         let Page { experiment, choice, summary } = self;
-        let part = |heading: &str, text: Vec<String>| Part { heading: heading.to_owned(), text };
         let orders =
             experiment.table.iter().map(|asked| verdicts::of_table(experiment, summary, asked));
         // The first table of qualities is the one that the experiment is about.
@@ -97,10 +96,10 @@ impl Page<'_> {
             false => orders.into_iter().chain(verdicts::of_all(summary)).collect(),
         };
         vec![
-            part("What came out", out),
-            part("Not shown", left_out),
-            part("How to read it", experiment.reading.clone()),
-            part("How it was measured", self.setup()),
+            Part { heading: "What came out", text: out },
+            Part { heading: "Not shown", text: left_out },
+            Part { heading: "How to read it", text: experiment.reading.clone() },
+            Part { heading: "How it was measured", text: self.setup() },
         ]
     }
 

@@ -8,12 +8,11 @@ use kerrlight_tomo::fit::setup::FitData;
 /// Paragraphs under headings, of a fit that compares geometries.
 pub fn parts(file: &FitFile, measured: &FitData) -> Vec<Part> {
     let Some(band) = &file.band else { return Vec::new() };
-    let part = |heading: &str, text: Vec<String>| Part { heading: heading.to_owned(), text };
     vec![
-        part("Data", data(file, measured)),
-        part("Model", model(file, band)),
-        part("Priors", priors(band)),
-        part("What is not concluded", not_concluded(file, band)),
+        Part { heading: "Data", text: data(file, measured) },
+        Part { heading: "Model", text: model(file, band) },
+        Part { heading: "Priors", text: priors(band) },
+        Part { heading: "What is not concluded", text: not_concluded(file, band) },
     ]
 }
 

@@ -82,7 +82,7 @@ fn part(part: &Part) -> String {
     if text.is_empty() {
         text
     } else {
-        format!("<section>\n<h2>{}</h2>\n{text}</section>\n", escape(&part.heading))
+        format!("<section>\n<h2>{}</h2>\n{text}</section>\n", escape(part.heading))
     }
 }
 
@@ -108,9 +108,8 @@ fn one_table(shown: &Table) -> String {
 }
 
 fn results(rows: &[Outcome]) -> String {
-    let cells = |row: &Outcome| {
-        [&row.name, &row.value, &row.unit, &row.meaning].map(|cell| escape(cell)).to_vec()
-    };
+    let cells =
+        |row: &Outcome| [row.name, row.value.as_str(), row.unit, row.meaning].map(escape).to_vec();
     table(&["Quantity", "Value", "Unit", "What it says"].map(str::to_owned), rows.iter().map(cells))
 }
 

@@ -4,7 +4,6 @@
 mod escape;
 mod html;
 mod paged;
-mod panels;
 mod pictures;
 mod plot;
 mod sky;
@@ -16,8 +15,7 @@ mod view;
 pub use escape::escape;
 pub use html::fill;
 pub use pictures::{
-    Figure, Strip, encode, enlarged, frames, images, projections, residuals, slices, slices_with,
-    still,
+    Figure, Strip, encode, enlarged, frames, images, projections, residuals, slices, still,
 };
 pub use plot::{Axis, LinePlot, Marks, Series};
 pub use sky::{SkyPanel, sky};
@@ -92,7 +90,7 @@ pub enum Tone {
 #[derive(Debug)]
 pub struct Part {
     /// The heading.
-    pub heading: String,
+    pub heading: &'static str,
     /// Text under it.
     pub text: Vec<String>,
 }
@@ -127,13 +125,13 @@ pub struct Setting {
 #[derive(Debug)]
 pub struct Outcome {
     /// The quantity.
-    pub name: String,
+    pub name: &'static str,
     /// Its value, with as many digits as are known.
     pub value: String,
     /// Its unit, or nothing.
-    pub unit: String,
+    pub unit: &'static str,
     /// Meaning, for somebody who does not know the name.
-    pub meaning: String,
+    pub meaning: &'static str,
 }
 
 impl Table {

@@ -36,24 +36,11 @@ fn names(shown: &[Shown]) -> String {
 }
 
 /// Slices of volumes along three planes through one point, which is sought in the last of them (the
-/// truth, where there is one); `unit` is that of the emission, `hole_radius` in M.
+/// truth, where there is one), with outlines of another volume; `unit` is that of the emission, `hole_radius` in M.
 ///
 /// # Errors
 /// If there is no volume.
 pub fn slices(
-    shown: &[Shown],
-    through: Through,
-    hole_radius: f64,
-    unit: &str,
-) -> anyhow::Result<Figure> {
-    slices_with(shown, through, hole_radius, None, unit)
-}
-
-/// The same with outlines of another volume.
-///
-/// # Errors
-/// If there is no volume.
-pub fn slices_with(
     shown: &[Shown],
     through: Through,
     hole_radius: f64,

@@ -78,10 +78,6 @@ fn amplitudes() -> LinePlot {
     }
 }
 
-fn outcome(name: &str, value: &str, unit: &str, meaning: &str) -> Outcome {
-    Outcome { name: text(name), value: text(value), unit: text(unit), meaning: text(meaning) }
-}
-
 fn setting(key: &str, value: &str, meaning: &str) -> Setting {
     Setting { key: text(key), value: text(value), meaning: text(meaning) }
 }
@@ -95,7 +91,7 @@ fn report(nodes: usize) -> Report {
     let around = Surroundings { hole_radius: 2.0, axis: XI, ring_radius: 5.0, half_width: 5.5 };
     let figures = vec![
         projections(&shown, &around, unit).unwrap(),
-        slices(&shown, Through::Maximum, 2.0, unit).unwrap(),
+        slices(&shown, Through::Maximum, 2.0, None, unit).unwrap(),
     ];
     Report {
         title: text("Four spots around a hole without spin"),
@@ -111,12 +107,22 @@ fn report(nodes: usize) -> Report {
             text("\"Recovered\" is no fit here: it is the truth, 25 % wider and 20 % fainter."),
         ],
         results: vec![
-            outcome("NRMSE", "0.41", "", "0 is perfect, 1 is what an empty volume has"),
-            outcome("PSNR", "36.2", "dB", "an empty volume has 28.48 dB"),
+            Outcome {
+                name: "NRMSE",
+                value: text("0.41"),
+                unit: "",
+                meaning: "0 is perfect, 1 is what an empty volume has",
+            },
+            Outcome {
+                name: "PSNR",
+                value: text("36.2"),
+                unit: "dB",
+                meaning: "an empty volume has 28.48 dB",
+            },
         ],
         settings: vec![setting("spin", "0", ""), setting("fov", "16", "M")],
         drawings: Vec::new(),
-        parts: vec![Part { heading: text("How <to> read it"), text: vec![text("Slowly.")] }],
+        parts: vec![Part { heading: "How <to> read it", text: vec![text("Slowly.")] }],
         tables: Vec::new(),
         details: vec![Table {
             title: text("All"),

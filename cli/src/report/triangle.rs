@@ -1,9 +1,10 @@
 //! Distributions of several numbers: one by one on the diagonal, pair by pair below it.
 
-use super::panels;
+use kuva::backend::svg::SvgBackend;
 use kuva::plot::Histogram;
 use kuva::plot::line::LinePlot;
 use kuva::plot::scatter::ScatterPlot;
+use kuva::render::figure::Figure;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 
@@ -33,11 +34,19 @@ const TRUTH: &str = "#D55E00";
 impl Triangle {
     /// The picture as text.
     pub fn svg(&self) -> String {
-        panels::triangle(self.variables.len(), PANEL, |row, column| {
-            let panel = if row == column { self.alone(row) } else { self.pair(row, column) };
-            let layout = self.layout(&panel, row, column);
-            (panel, layout)
-        })
+        let n = self.variables.len();
+        let (mut plots, mut layouts, mut structure) = (Vec::new(), Vec::new(), Vec::new());
+        for row in 0..n {
+            for column in 0..=row {
+                let panel = if row == column { self.alone(row) } else { self.pair(row, column) };
+                layouts.push(self.layout(&panel, row, column));
+                plots.push(panel);
+                structure.push(vec![row * n + column]);
+            }
+        }
+        let figure = Figure::new(n, n).with_structure(structure).with_plots(plots);
+        let figure = figure.with_layouts(layouts).with_cell_size(PANEL, PANEL).with_spacing(6.0);
+        SvgBackend::new().render_scene(&figure.render())
     }
 
     fn alone(&self, k: usize) -> Vec<Plot> {

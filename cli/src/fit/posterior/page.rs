@@ -61,8 +61,7 @@ fn figures(
     // Where the mean is bright, not where a single dark node is sure to be dark.
     let at = Through::Point(Through::Maximum.point(&found.ensemble.mean));
     let outlines = Some(Outlines { volume: noise, levels: SIGMAS });
-    let mut first =
-        report::slices_with(&shown, Through::Maximum, hole_radius, outlines, "model units")?;
+    let mut first = report::slices(&shown, Through::Maximum, hole_radius, outlines, "model units")?;
     let [white, blue] = SIGMAS;
     first.caption = format!(
         "{} The mean is above {white} standard deviations inside the white line, above {blue} inside the blue one.",
@@ -70,7 +69,7 @@ fn figures(
     );
     let mut all = vec![first];
     let mut more = |name, volume, unit, what| -> anyhow::Result<()> {
-        let mut next = report::slices(&[Shown { name, volume }], at, hole_radius, unit)?;
+        let mut next = report::slices(&[Shown { name, volume }], at, hole_radius, None, unit)?;
         next.caption = format!("{what} {}", next.caption);
         all.push(next);
         Ok(())

@@ -253,8 +253,11 @@ pub fn last_step(step: u64, of: u64) -> String {
 /// A number of results; none where it is not defined.
 type Number = fn(&Results) -> Option<f64>;
 
-/// Lines of the table of results: numbers with their names, digits, units and meanings.
-const MEANINGS: [(Number, &str, usize, &str, &str); 15] = [
+/// A line of the table of results: a number with its name, digits, unit and meaning.
+type Line = (Number, &'static str, usize, &'static str, &'static str);
+
+/// All of them.
+const MEANINGS: [Line; 15] = [
     (|of| Some(of.loss), "loss", 6, "", "what was minimised, of all data, without penalties"),
     (
         |of| of.validation_chi2_per_datum,
@@ -341,13 +344,9 @@ const MEANINGS: [(Number, &str, usize, &str, &str); 15] = [
 
 /// The same as lines of a table; what is not defined is left out.
 pub fn outcomes(results: &Results) -> Vec<report::Outcome> {
-    let one = |(of, name, digits, unit, meaning): &(Number, &str, usize, &str, &str)| {
-        Some(report::Outcome {
-            name: (*name).to_owned(),
-            value: format!("{:.*}", *digits, of(results).filter(|x| x.is_finite())?),
-            unit: (*unit).to_owned(),
-            meaning: (*meaning).to_owned(),
-        })
+    let one = |(of, name, digits, unit, meaning): Line| {
+        let value = of(results).filter(|x| x.is_finite())?;
+        Some(report::Outcome { name, value: format!("{value:.digits$}"), unit, meaning })
     };
-    MEANINGS.iter().filter_map(one).collect()
+    MEANINGS.into_iter().filter_map(one).collect()
 }

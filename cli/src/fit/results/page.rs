@@ -94,7 +94,7 @@ impl Estimate<'_> {
         let mut figures = vec![
             report::projections(&shown, &around, UNIT)?,
             self.lensed(&found.still)?,
-            report::slices(&shown, Through::Maximum, hole_radius, UNIT)?,
+            report::slices(&shown, Through::Maximum, hole_radius, None, UNIT)?,
         ];
         let n = self.file.screen.pixels;
         let mut rows = vec![report::Strip::new("recovered", &found.movie)?];

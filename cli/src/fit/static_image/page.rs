@@ -96,26 +96,21 @@ impl Found<'_> {
 
     fn outcomes(&self, results: &Results) -> Vec<Outcome> {
         let numbers = RING.iter().zip(MEANINGS).filter_map(|((key, number), meaning)| {
-            let (name, unit, digits, text) = meaning;
+            let (name, unit, digits, meaning) = meaning;
             let (value, error) = of_ring(&self.survey, &self.ring()?, key, *number);
-            Some(Outcome {
-                name: name.to_owned(),
-                value: with_error(value, error, digits),
-                unit: unit.to_owned(),
-                meaning: text.to_owned(),
-            })
+            Some(Outcome { name, value: with_error(value, error, digits), unit, meaning })
         });
         let flux = Outcome {
-            name: "flux".to_owned(),
+            name: "flux",
             value: with_error(results.flux_jy, results.flux_error_jy, 3),
-            unit: "Jy".to_owned(),
-            meaning: "all light of the field; its prior has a part in it".to_owned(),
+            unit: "Jy",
+            meaning: "all light of the field; its prior has a part in it",
         };
         let seconds = Outcome {
-            name: "time".to_owned(),
+            name: "time",
             value: format!("{:.1}", results.seconds),
-            unit: "s".to_owned(),
-            meaning: "wall time of this run".to_owned(),
+            unit: "s",
+            meaning: "wall time of this run",
         };
         let polarized = self.polarized.iter().flat_map(Polarized::outcomes);
         numbers.chain([flux]).chain(polarized).chain([seconds]).collect()

@@ -172,12 +172,8 @@ impl Polarized {
         let one = |number: &Number| {
             let (value, error) = self.value(number);
             let digits = if number.unit.is_empty() { 3 } else { 0 };
-            Outcome {
-                name: number.name.to_owned(),
-                value: with_error(value, error, digits),
-                unit: number.unit.to_owned(),
-                meaning: number.meaning.to_owned(),
-            }
+            let Number { name, unit, meaning, .. } = *number;
+            Outcome { name, value: with_error(value, error, digits), unit, meaning }
         };
         NUMBERS.iter().map(one).collect()
     }

@@ -91,13 +91,12 @@ const LEAST_AGREEMENT: f64 = 0.8;
 impl Found<'_> {
     /// Paragraphs under headings.
     pub fn parts(&self) -> Vec<Part> {
-        let part = |heading: &str, text: Vec<String>| Part { heading: heading.to_owned(), text };
         vec![
-            part("Data", self.data()),
-            part("Model and priors", self.model()),
-            part("How sure it is", self.errors()),
-            part("What is concluded", self.concluded()),
-            part("What is not concluded", self.not_concluded()),
+            Part { heading: "Data", text: self.data() },
+            Part { heading: "Model and priors", text: self.model() },
+            Part { heading: "How sure it is", text: self.errors() },
+            Part { heading: "What is concluded", text: self.concluded() },
+            Part { heading: "What is not concluded", text: self.not_concluded() },
         ]
     }
 
