@@ -74,18 +74,19 @@ impl Movie {
         let plans = f64::from(self.frames.all) * (2 * text.len() + 4096) as f64;
         memory::afford(|| format!("the settings of {} frames", self.frames.all), plans)?;
         let times = self.span.times(self.frames.all, &scene)?;
-        let animations = self.viewing.outputs()?;
-        let files = assets::load(&scene, &source.folder, &animations.files(), self.reach)?;
-        animations.files().iter().try_for_each(|output| output.must_differ_from(&self.scene))?;
+        let gif = self.viewing.gif()?;
+        let outputs: Vec<&Output> = gif.iter().collect();
+        let files = assets::load(&scene, &source.folder, &outputs, self.reach)?;
+        outputs.iter().try_for_each(|output| output.must_differ_from(&self.scene))?;
         let mut film = Raster::new(&scene, files.decoded).with_context(|| source.name.clone())?;
-        if animations.any() && !self.frames.are_all() {
+        if self.viewing.any() && !self.frames.are_all() {
             bail!(
                 "--gif and --png show the whole film: give them with --frames {}",
                 self.frames.all
             );
         }
         // A missing channel is told before the frames are rendered.
-        if animations.any() {
+        if self.viewing.any() {
             self.look.channels(&scene, &film.names())?;
         }
         if let Some(device) = self.device.open()? {
@@ -106,12 +107,11 @@ impl Movie {
             devices::announce(device, &film.beside_device());
         }
         let start = Instant::now();
-        let per_second = self.viewing.frames_per_second();
         let rendering =
-            Rendering::new(&mut film, &mut sequence, &self.output, &self.exr, per_second);
+            Rendering::new(&mut film, &mut sequence, &self.output, &self.exr, self.viewing.fps);
         let rendered = rendering.run().with_context(|| source.name.clone())?;
-        animations.write(&sequence, self.look.look(&scene))?;
-        Ok(self.answer(&sequence, rendered, start.elapsed().as_secs_f64(), &animations.files()))
+        self.viewing.write(&sequence, self.look.look(&scene), gif.as_ref())?;
+        Ok(self.answer(&sequence, rendered, start.elapsed().as_secs_f64(), &outputs))
     }
 
     /// Describes the frames: their number, brightness and place.

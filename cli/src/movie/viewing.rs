@@ -21,17 +21,9 @@ pub struct Viewing {
     png: bool,
     /// Frames per second of the GIF, and in the headers of the EXR files
     #[arg(long, value_name = "N", default_value = "25", value_parser = clap::value_parser!(u16).range(1..=50))]
-    fps: u16,
+    pub fps: u16,
     /// Intensity shown as white [default: 99.8th percentile of the lit pixels of all frames]
     #[arg(long, value_name = "X")]
-    white: Option<f32>,
-}
-
-/// The requested files, checked.
-pub struct Animations {
-    gif: Option<Output>,
-    png: bool,
-    per_second: u16,
     white: Option<f32>,
 }
 
@@ -39,29 +31,12 @@ pub struct Animations {
 const PALETTE_FRAMES: usize = 12;
 
 impl Viewing {
-    /// Frames per second of the film.
-    pub fn frames_per_second(&self) -> u16 {
-        self.fps
-    }
-
-    /// Checks where files are to go.
-    pub fn outputs(&self) -> anyhow::Result<Animations> {
+    /// Checks the exposure, and where the GIF is to go.
+    pub fn gif(&self) -> anyhow::Result<Option<Output>> {
         if let Some(white) = self.white.filter(|white| !(white.is_finite() && *white > 0.0)) {
             bail!("--white {white} is not allowed: a finite number above 0");
         }
-        Ok(Animations {
-            gif: self.gif.as_deref().map(|path| Output::new(path, "gif")).transpose()?,
-            png: self.png,
-            per_second: self.fps,
-            white: self.white,
-        })
-    }
-}
-
-impl Animations {
-    /// The files of their own.
-    pub fn files(&self) -> Vec<&Output> {
-        self.gif.iter().collect()
+        self.gif.as_deref().map(|path| Output::new(path, "gif")).transpose()
     }
 
     /// Returns whether any image or animation is to be made.
@@ -69,8 +44,13 @@ impl Animations {
         self.gif.is_some() || self.png
     }
 
-    /// Draws all frames and writes the requested files.
-    pub fn write(&self, sequence: &Sequence, look: Look) -> anyhow::Result<()> {
+    /// Draws all frames and writes the requested files, the GIF to `output`.
+    pub fn write(
+        &self,
+        sequence: &Sequence,
+        look: Look,
+        output: Option<&Output>,
+    ) -> anyhow::Result<()> {
         if !self.any() {
             return Ok(());
         }
@@ -85,10 +65,10 @@ impl Animations {
         let first = draw(0)?;
         let size = [first.width(), first.height()];
         let mut bytes = Vec::new();
-        let mut gif = match &self.gif {
+        let mut gif = match output {
             Some(_) => {
                 let palette = palette(sequence.len(), draw)?;
-                Some(Gif::new(&mut bytes, size, palette, self.per_second)?)
+                Some(Gif::new(&mut bytes, size, palette, self.fps)?)
             }
             None => None,
         };
@@ -105,7 +85,7 @@ impl Animations {
         bar.finish_and_clear();
         // The encoder writes the end of the file as it goes.
         drop(gif);
-        self.gif.as_ref().map_or(Ok(()), |output| output.write(&bytes))
+        output.map_or(Ok(()), |output| output.write(&bytes))
     }
 }
 
