@@ -32,13 +32,6 @@ pub struct Shown {
     look: Look,
 }
 
-/// Common parts of pictures of one scene.
-struct Common<'a> {
-    legend: String,
-    identifiers: Option<String>,
-    files: &'a str,
-}
-
 /// The text of the scene that an EXR of this program holds.
 ///
 /// # Errors
@@ -71,12 +64,7 @@ impl Shot {
         let raster = Raster::new(&self.scene, files.decoded);
         let raster = raster.with_context(|| self.source.name.clone())?;
         let rendered = raster.render(progress)?;
-        let common = Common {
-            legend: raster.legend(),
-            identifiers: raster.identifiers(),
-            files: &files.identity,
-        };
-        Ok(self.shown(rendered, raster.camera(), &common))
+        Ok(self.shown(rendered, raster.camera(), &raster, &files.identity))
     }
 
     /// Pictures at `times` (of observation, M) that share the first one's unit of intensity.
@@ -91,11 +79,6 @@ impl Shot {
         let files = assets::load(&self.scene, &self.source.folder, &[], Reach::default())?;
         let film = Raster::new(&self.scene, files.decoded);
         let mut film = film.with_context(|| self.source.name.clone())?;
-        let common = Common {
-            legend: film.legend(),
-            identifiers: film.identifiers(),
-            files: &files.identity,
-        };
         let (mut shown, mut factor) = (Vec::with_capacity(times.len()), None);
         for batch in times.chunks(film.batch()) {
             let frames = film.frames(batch, progress)?;
@@ -105,7 +88,7 @@ impl Shot {
             for frame in frames {
                 let camera = film.camera_of(&frame)?;
                 let rendered = film.rendered(frame, factor.unwrap_or(1.0))?;
-                shown.push(self.shown(rendered, camera, &common));
+                shown.push(self.shown(rendered, camera, film, &files.identity));
             }
         }
         Ok(shown)
@@ -119,13 +102,15 @@ impl Shot {
         Ok(memory::afford(what, memory::table(pixels, 40.0))?)
     }
 
-    fn shown(&self, rendered: Rendered, camera: CameraMatrices, common: &Common<'_>) -> Shown {
-        let legend = common.legend.clone();
-        let mut attributes = report::attributes(&self.scene, &self.text, legend, &rendered.summary);
-        if !common.files.is_empty() {
-            attributes.insert("files".to_owned(), common.files.to_owned());
-        }
-        attributes.extend(common.identifiers.iter().map(|ids| ("ids".to_owned(), ids.clone())));
+    fn shown(
+        &self,
+        rendered: Rendered,
+        camera: CameraMatrices,
+        raster: &Raster,
+        files: &str,
+    ) -> Shown {
+        let attributes =
+            report::attributes(&self.scene, &self.text, files, raster, &rendered.summary);
         Shown { rendered, attributes, camera, look: PreviewOptions::default().look(&self.scene) }
     }
 }

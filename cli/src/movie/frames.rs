@@ -224,8 +224,7 @@ impl Sequence {
             let style = Style { frames_per_second: Some(per_second), ..style };
             let Rendered { picture, summary } = film.rendered(frame, factor)?;
             let Plan { scene, text } = &this.plans[*k];
-            let mut attributes = report::attributes(scene, text, film.legend(), &summary);
-            attributes.extend(film.identifiers().map(|ids| ("ids".to_owned(), ids)));
+            let mut attributes = report::attributes(scene, text, "", film, &summary);
             attributes.append(&mut this.settings(*k));
             let bytes = exr::encode_in_style(&picture, &attributes, style);
             let bytes = bytes.context("cannot encode the EXR")?;

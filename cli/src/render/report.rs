@@ -1,15 +1,21 @@
 //! Attributes of a picture: in the file and on the terminal.
 
 use kerrlight_render::image::exr::Attributes;
-use kerrlight_render::picture::Summary;
+use kerrlight_render::picture::{Raster, Summary};
 use kerrlight_render::scene::Scene;
 use serde_json::{Value, json};
 
 /// Returns the settings of the picture and its totals: `text` is the scene as it was given,
-/// `legend` describes the channels.
-pub fn attributes(scene: &Scene, text: &str, legend: String, summary: &Summary) -> Attributes {
+/// `files` the identity of the files that it names.
+pub fn attributes(
+    scene: &Scene,
+    text: &str,
+    files: &str,
+    raster: &Raster,
+    summary: &Summary,
+) -> Attributes {
     let entry = |name: &str, value: String| (name.to_owned(), value);
-    [
+    let mut all = Attributes::from([
         entry("version", env!("CARGO_PKG_VERSION").to_owned()),
         entry("scene", text.to_owned()),
         entry("scene_resolved", scene.to_toml()),
@@ -22,9 +28,14 @@ pub fn attributes(scene: &Scene, text: &str, legend: String, summary: &Summary) 
         entry("image_error", summary.image_error.to_string()),
         entry("rays", summary.rays.to_string()),
         entry("unresolved_rays", summary.unresolved.to_string()),
-        entry("channels", legend),
-    ]
-    .into()
+        entry("channels", raster.legend()),
+    ]);
+    all.extend(raster.identifiers().map(|ids| entry("ids", ids)));
+    all.extend(raster.device().map(|device| entry("device", device.name().to_owned())));
+    if !files.is_empty() {
+        all.extend([entry("files", files.to_owned())]);
+    }
+    all
 }
 
 /// Names the unit of a pixel's size: M, or the picture plane of a camera.

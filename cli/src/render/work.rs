@@ -42,15 +42,8 @@ impl Work<'_> {
             Ok(summary) => summary,
             Err(error) => return Err(self.failed(error, partial)),
         };
-        let mut attributes =
-            report::attributes(self.scene, self.text, self.raster.legend(), &summary);
-        if !self.files.is_empty() {
-            attributes.insert("files".to_owned(), self.files.to_owned());
-        }
-        attributes.extend(self.raster.identifiers().map(|ids| ("ids".to_owned(), ids)));
-        if let Some(device) = self.raster.device() {
-            attributes.insert("device".to_owned(), device.name().to_owned());
-        }
+        let attributes =
+            report::attributes(self.scene, self.text, self.files, self.raster, &summary);
         exr.write_with(|file| {
             let journal = &mut partial.journal;
             let look = look.as_mut();
