@@ -62,7 +62,7 @@ pub struct Convert {
     #[arg(long, value_name = "LEAKAGE.csv")]
     leakage: Option<PathBuf>,
     /// The source, where the input does not tell where it is: sgra, m87, or hours and degrees
-    #[arg(long, value_name = "sgra|m87|RA,DEC", value_parser = arguments::source)]
+    #[arg(long, value_name = "sgra|m87|RA,DEC")]
     source: Option<Source>,
     /// The stations, where the input does not tell where they are: EHT2017, ngEHT or a file
     #[arg(long, value_name = "ARRAY")]

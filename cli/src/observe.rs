@@ -42,12 +42,20 @@ pub struct Observe {
     #[command(flatten)]
     observing: Observing,
     /// Shape of a pixel
-    #[arg(long, value_name = "PULSE", default_value = "triangle")]
-    pulse: PulseName,
+    #[arg(long, value_name = "PULSE", default_value = "triangle", value_parser = arguments::named([
+        ("delta", "A point", Pulse::Delta),
+        ("rectangle", "A square", Pulse::Rectangle),
+        ("triangle", "A pyramid twice as wide as the pixel, eht-imaging's default", Pulse::Triangle),
+    ]))]
+    pulse: Pulse,
     /// Fourier transform: the sum over pixels, a fast transform, or which of them is expected to be
     /// faster
-    #[arg(long, value_name = "TRANSFORM", default_value = "auto")]
-    transform: TransformName,
+    #[arg(long, value_name = "TRANSFORM", default_value = "auto", value_parser = arguments::named([
+        ("auto", "The faster one for these pixels and visibilities", Method::Cheaper(ACCURACY)),
+        ("direct", "The sum over pixels", Method::Direct),
+        ("fast", "Fast Fourier transform and a kernel, within 1e-12 of the flux", Method::Fast(ACCURACY)),
+    ]))]
+    transform: Method,
     /// Noise that is added; errors are those of thermal noise in any case
     #[arg(long, value_name = "NOISE", default_value = "none")]
     noise: Noise,
@@ -85,26 +93,6 @@ enum Noise {
     Thermal,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum TransformName {
-    /// The faster one for these pixels and visibilities
-    Auto,
-    /// The sum over pixels
-    Direct,
-    /// Fast Fourier transform and a kernel, within 1e-12 of the flux
-    Fast,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum PulseName {
-    /// A point
-    Delta,
-    /// A square
-    Rectangle,
-    /// A pyramid twice as wide as the pixel, eht-imaging's default
-    Triangle,
-}
-
 impl Observe {
     /// Observes.
     pub fn run(&self) -> anyhow::Result<Answer> {
@@ -130,7 +118,7 @@ impl Observe {
             eprintln!("warning: {}: {warning}", self.shown());
         }
         let fill =
-            simulate::fill_stokes(&mut observation, &movie, self.pulse(), &frames_h, self.method());
+            simulate::fill_stokes(&mut observation, &movie, self.pulse, &frames_h, self.transform);
         let transform = fill.with_context(|| self.shown())?;
         self.corruptions().apply(&mut observation, seed)?;
         observation.history = self.history(said, transform);
@@ -215,22 +203,6 @@ impl Observe {
                 bail!("--seed is needed for noise or gains: it makes them repeatable")
             }
             None => Ok(0),
-        }
-    }
-
-    fn method(&self) -> Method {
-        match self.transform {
-            TransformName::Auto => Method::Cheaper(ACCURACY),
-            TransformName::Direct => Method::Direct,
-            TransformName::Fast => Method::Fast(ACCURACY),
-        }
-    }
-
-    fn pulse(&self) -> Pulse {
-        match self.pulse {
-            PulseName::Delta => Pulse::Delta,
-            PulseName::Rectangle => Pulse::Rectangle,
-            PulseName::Triangle => Pulse::Triangle,
         }
     }
 

@@ -2,17 +2,13 @@
 
 use crate::output;
 use anyhow::{Context, anyhow, bail};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use kerrlight_vlbi::array::{self, Array};
 use kerrlight_vlbi::earth::{Frame, SourcePosition, Ut1};
 use kerrlight_vlbi::schedule::{Clock, Schedule, Setup};
 use kerrlight_vlbi::source::Source;
 use std::path::Path;
-
-/// `sgra`, `m87`, or right ascension in hours and declination in degrees.
-pub fn source(text: &str) -> Result<Source, String> {
-    text.parse()
-}
 
 /// Two numbers as `a-b`; each may have a sign.
 pub fn range(text: &str) -> Result<[f64; 2], String> {
@@ -44,20 +40,21 @@ pub fn array_near(name: &str, folder: &Path) -> anyhow::Result<Array> {
     array::parse(&output::read_text(&path)?).with_context(|| format!("array {shown}"))
 }
 
-/// Earth-orientation model.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum FrameName {
-    /// Catalogue coordinates as if they were of date, mean sidereal time (eht-imaging's way)
-    Catalogue,
-    /// Precession and nutation to date
-    OfDate,
+/// Values of an option by their names, with what its help says of them.
+pub fn named<T: Copy + Send + Sync + 'static, const N: usize>(
+    all: [(&'static str, &'static str, T); N],
+) -> impl TypedValueParser<Value = T> {
+    let names = all.map(|(name, help, _)| PossibleValue::new(name).help(help));
+    PossibleValuesParser::new(names).map(move |name| {
+        all.iter().find(|(known, ..)| *known == name).expect("one of the names above").2
+    })
 }
 
 /// When, where to, and with what receivers.
 #[derive(Debug, Clone, Args)]
 pub struct Observing {
     /// Source: sgra, m87, or right ascension in hours and declination in degrees
-    #[arg(long, value_name = "sgra|m87|RA,DEC", value_parser = source)]
+    #[arg(long, value_name = "sgra|m87|RA,DEC")]
     pub source: Source,
     /// Day (modified Julian date) whose 0 h UTC hours count from
     #[arg(long, value_name = "DAY", value_parser = clap::value_parser!(i32).range(41317..=90000))]
@@ -91,8 +88,11 @@ pub struct Observing {
           allow_hyphen_values = true)]
     pub elevation: [f64; 2],
     /// Earth-orientation model
-    #[arg(long, value_name = "FRAME", default_value = "catalogue")]
-    pub frame: FrameName,
+    #[arg(long, value_name = "FRAME", default_value = "catalogue", value_parser = named([
+        ("catalogue", "Catalogue coordinates as if they were of date, mean sidereal time (eht-imaging's way)", Frame::Catalogue),
+        ("of-date", "Precession and nutation to date", Frame::OfDate),
+    ]))]
+    pub frame: Frame,
     /// UT1 - UTC in seconds, instead of the built-in table's (1999 to September 2026)
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     pub ut1_utc: Option<f64>,
@@ -123,10 +123,7 @@ impl Observing {
             integration_s: self.tint,
             elevation_deg: self.elevation,
             ut1,
-            frame: match self.frame {
-                FrameName::Catalogue => Frame::Catalogue,
-                FrameName::OfDate => Frame::OfDate,
-            },
+            frame: self.frame,
         })
     }
 
