@@ -1,13 +1,17 @@
 //! Cases of an experiment: every combination of levels and seeds.
 
-use super::experiment::Experiment;
+use super::experiment::{Experiment, Level};
 use super::labels::called;
-use super::recipe::{Choice, Recipe};
+use super::recipe::{Choice, Recipe, Stamp, Variant, picked};
 use super::source::Source;
-use anyhow::{anyhow, bail};
+use crate::changed::Changed;
+use crate::{fit, keys, paths, plain};
+use anyhow::{Context, anyhow, bail};
+use kerrlight_tomo::fit::settings::merge;
 use std::collections::HashSet;
+use std::path::Path;
 use std::sync::Arc;
-use toml::Table;
+use toml::{Table, Value};
 
 /// One fit of an experiment: a combination of levels, and a seed.
 #[derive(Clone)]
@@ -17,6 +21,12 @@ pub struct Case {
     /// Its seed.
     pub seed: u64,
 }
+
+/// Combinations that are all checked before any is run; of more, each level is checked once.
+const CHECKED: usize = 1000;
+
+/// A seed that stands nowhere else in settings.
+const MARK: u64 = 4_203_716_935_288_541_207;
 
 /// Status of a case.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,49 +47,126 @@ impl Case {
     pub fn settings(&self) -> Result<String, String> {
         match self.error() {
             Some(error) => Err(error.to_owned()),
-            None => self.recipe.text(self.at(), self.seed).map_err(|e| crate::plain::reasons(&e)),
+            None => self.text(self.seed).map_err(|error| plain::reasons(&error)),
         }
     }
 
     /// The settings of its fit, right or wrong; none where they cannot be put together.
     pub fn table(&self) -> Option<Table> {
-        self.recipe.table(self.at(), self.seed).ok()
+        self.table_of(self.seed).ok()
     }
 
     /// Returns the error in its settings.
     pub fn error(&self) -> Option<&str> {
-        self.recipe.error(self.at())
+        let check = || self.check().err().map(|error| plain::reasons(&error));
+        self.variant().error.get_or_init(check).as_deref()
     }
 
-    /// The same, of too many combinations of levels only where a level is new; the run of a case finds the rest.
+    fn check(&self) -> anyhow::Result<()> {
+        let (path, text) = (self.path()?, self.text(1)?);
+        let name = path.display().to_string();
+        let (own, by) = (self.recipe.source.fit_text(path)?, "the settings of the case");
+        let changed = Changed { name: &name, own: &own, text: &text, by };
+        fit::check(&changed, &self.recipe.choice.registry)
+    }
+
+    /// The same, of too many combinations of levels only where a level is new, as each check takes a third of a millisecond;
+    /// the run of a case finds the rest.
     pub fn early_error(&self) -> Option<&str> {
-        self.recipe.early_error(self.at())
+        let is_checked = self.recipe.variants.len() <= CHECKED || self.variant().is_new;
+        if is_checked { self.error() } else { self.variant().error.get()?.as_deref() }
     }
 
-    /// A measure of its time against that of others of its kind.
+    /// A measure of its time against that of others of its kind: rays that the steps of its fit look at, all together.
     pub fn cost(&self) -> f64 {
-        self.recipe.cost(self.at())
+        let cost = || self.table_of(1).map_or(0.0, |settings| cost(&settings));
+        *self.variant().cost.get_or_init(cost)
     }
 
     /// A name for a folder: levels, seed, and a checksum of the settings.
     pub fn slug(&self) -> String {
-        let sum = self.recipe.sum(self.at(), self.seed);
-        format!("{}seed{}_{sum:08x}", self.recipe.words(self.at()), self.seed)
+        let words = picked(&self.recipe.words, self.chosen());
+        let words = words.fold(String::new(), |all, word| all + word + "_");
+        format!("{words}seed{}_{:08x}", self.seed, self.sum())
+    }
+
+    /// CRC-32 of the settings; 0 where there are none.
+    fn sum(&self) -> u32 {
+        let text = |seed: u64| self.text(seed).unwrap_or_default();
+        let stamp = self.variant().stamp.get_or_init(|| Stamp::of(&text(MARK), &MARK.to_string()));
+        let Stamp::Around([before, behind]) = stamp else {
+            return crc32fast::hash(text(self.seed).as_bytes());
+        };
+        // The CRC-32 of joined texts follows from those of the parts: only the seed is hashed.
+        let [mut sum, behind] = [before, behind]
+            .map(|(crc, length)| crc32fast::Hasher::new_with_initial_len(*crc, *length));
+        sum.update(self.seed.to_string().as_bytes());
+        sum.combine(&behind);
+        sum.finalize()
+    }
+
+    /// The settings as text, with any seed: cases of a combination differ in nothing else.
+    fn text(&self, seed: u64) -> anyhow::Result<String> {
+        let text = toml::to_string(&self.merged(seed)?).context("settings")?;
+        // The command line comes last: it overrides levels and the quick look.
+        self.recipe.choice.set.iter().try_fold(text, |text, assignment| {
+            fit::assigned(&text, &paths::from_here(assignment, None)?)
+        })
+    }
+
+    /// The same as a table.
+    fn table_of(&self, seed: u64) -> anyhow::Result<Table> {
+        if self.recipe.choice.set.is_empty() {
+            return self.merged(seed);
+        }
+        Ok(self.text(seed)?.parse()?)
+    }
+
+    /// Settings without those of the command line.
+    fn merged(&self, seed: u64) -> anyhow::Result<Table> {
+        let experiment = &self.recipe.experiment;
+        let mut table = self.recipe.fit(self.path()?)?;
+        merge(&mut table, &experiment.set);
+        for (_, level) in self.picked() {
+            for key in &level.remove {
+                remove(&mut table, key).with_context(|| format!("level {:?}", level.name))?;
+            }
+            merge(&mut table, &level.set);
+        }
+        if self.recipe.choice.quick {
+            merge(&mut table, &experiment.quick.set);
+        }
+        table.insert("seed".to_owned(), Value::Integer(seed.cast_signed()));
+        Ok(table)
+    }
+
+    /// The file of the fit that it changes.
+    fn path(&self) -> anyhow::Result<&Path> {
+        let last = self.picked().filter_map(|(_, level)| level.fit.as_deref()).last();
+        last.or(self.recipe.experiment.fit.as_deref())
+            .ok_or_else(|| anyhow!("neither the experiment nor a level names a fit"))
+    }
+
+    /// Factors with its levels.
+    fn picked(&self) -> impl Iterator<Item = (&str, &Level)> {
+        let names = self.recipe.experiment.factor.iter().map(|factor| factor.name.as_str());
+        names.zip(picked(&self.recipe.levels, self.chosen()))
     }
 
     /// Its level of each factor.
     pub fn levels(&self) -> impl Iterator<Item = (&str, &str)> {
-        self.recipe.levels(self.at()).map(|(factor, level)| (factor, level.name.as_str()))
+        self.picked().map(|(factor, level)| (factor, level.name.as_str()))
     }
 
     /// Its level of each factor, by number.
     pub fn chosen(&self) -> &[u32] {
-        self.recipe.chosen(self.at())
+        &self.variant().chosen
     }
 
     /// The number of a level, with that of its factor.
     pub fn place(&self, factor: &str, level: &str) -> Option<(usize, u32)> {
-        self.recipe.place(factor, level)
+        let at = self.recipe.experiment.factor.iter().position(|f| f.name == factor)?;
+        Some((at, self.recipe.levels[at].iter().position(|l| l.name == level)? as u32))
     }
 
     /// Its level of a factor.
@@ -89,7 +176,7 @@ impl Case {
 
     /// Returns the place of its level of a factor on an axis of numbers.
     pub fn number(&self, factor: &str) -> Option<f64> {
-        self.recipe.levels(self.at()).find(|(name, _)| *name == factor)?.1.number
+        self.picked().find(|(name, _)| *name == factor)?.1.number
     }
 
     /// `scene 1, grid, seed 2`.
@@ -101,8 +188,8 @@ impl Case {
         format!("{levels}, seed {}", self.seed)
     }
 
-    fn at(&self) -> usize {
-        self.variant as usize
+    fn variant(&self) -> &Variant {
+        &self.recipe.variants[self.variant as usize]
     }
 }
 
@@ -113,7 +200,7 @@ pub fn expand(
     choice: &Choice,
 ) -> anyhow::Result<Vec<Case>> {
     let (recipe, seeds) = recipe(experiment, source, choice)?;
-    if recipe.len() == 0 {
+    if recipe.variants.is_empty() {
         bail!("no case is left");
     }
     let of = |seed: u64, variant: usize| Case {
@@ -121,8 +208,8 @@ pub fn expand(
         variant: variant as u32,
         seed,
     };
-    let of = &of;
-    Ok((1..=seeds).flat_map(|seed| (0..recipe.len()).map(move |k| of(seed, k))).collect())
+    let (of, variants) = (&of, recipe.variants.len());
+    Ok((1..=seeds).flat_map(|seed| (0..variants).map(move |k| of(seed, k))).collect())
 }
 
 /// Cases of which each stands for all that differ from it in the seed alone.
@@ -176,10 +263,39 @@ fn recipe(
     Ok((Arc::new(Recipe::new(experiment, source, choice, only)?), seeds))
 }
 
+fn remove(table: &mut Table, key: &str) -> anyhow::Result<()> {
+    let missing = || anyhow!("there is no {key} to remove");
+    match key.split_once('.') {
+        None => table.remove(key).map(drop).ok_or_else(missing),
+        Some((first, rest)) => match table.get_mut(first) {
+            Some(Value::Table(inner)) => remove(inner, rest),
+            _ => Err(missing()),
+        },
+    }
+}
+
+/// Rays that steps look at: a measure of its time against that of others of its kind.
+fn cost(settings: &Table) -> f64 {
+    let number = |key: &str| -> Option<f64> {
+        let value = keys::at(settings, key)?;
+        value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
+    };
+    let side = number("screen.pixels").or_else(|| number("image.pixels")).unwrap_or(1.0);
+    let frames =
+        number("simulation.observation.scans").or_else(|| number("simulation.movie.frames"));
+    let rays = match number("training.batch.pixels") {
+        Some(pixels) => pixels,
+        None => {
+            let of_step = number("training.batch.frames").or(frames).unwrap_or(1.0);
+            of_step * side * side
+        }
+    };
+    number("training.steps").unwrap_or(1.0) * rays
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     const TEXT: &str = r#"
         title = "t"
