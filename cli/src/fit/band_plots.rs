@@ -3,11 +3,8 @@
 use crate::report::{Axis, LinePlot, Marks, Series};
 use kerrlight_tomo::recovery::results::BandResults;
 
-/// Values with their probabilities.
-type Shares = [[f64; 2]];
-
-/// The shares of a quantity.
-type SharesOf = fn(&BandResults) -> &Shares;
+/// Values of a quantity with their probabilities.
+type SharesOf = fn(&BandResults) -> &[[f64; 2]];
 
 /// Quantities with probabilities: their place, words, unit.
 const QUANTITIES: [(SharesOf, &str, &str); 4] = [
@@ -26,7 +23,7 @@ const CURVES: usize = 6;
 
 /// The probability of each value of the geometry, one curve for each run that is named.
 pub fn of_runs(runs: &[(String, BandResults)], caption: &str) -> Vec<LinePlot> {
-    let plot = |(of, words, unit): (fn(&BandResults) -> &Shares, &str, &str)| {
+    let plot = |(of, words, unit): (SharesOf, &str, &str)| {
         let curve = |(name, results): &(String, BandResults)| {
             let points = of(results).to_vec();
             (points.len() > 1).then(|| Series::new(name, points, Marks::Joined))

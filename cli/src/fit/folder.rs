@@ -108,11 +108,6 @@ impl Folder {
         output::read(&path).map(Some)
     }
 
-    /// Writes a checkpoint in place of the last one.
-    pub fn save(&self, bytes: &[u8]) -> anyhow::Result<()> {
-        self.file(CHECKPOINT)?.write(bytes)
-    }
-
     /// Keeps what a search has found in a file.
     pub fn keep(&self, name: &str, found: &impl Serialize) -> anyhow::Result<()> {
         self.file(name)?.write(sealed(serde_json::to_value(found)?).as_bytes())

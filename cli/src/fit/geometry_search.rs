@@ -19,20 +19,8 @@ pub fn chosen(folder: &Folder, file: &FitFile) -> anyhow::Result<Option<Choice>>
     Ok(Some(Choice::Geometry { geometry, resolution: results.resolution.into() }))
 }
 
-/// Geometries of one of the coarse searches at most.
-pub fn each(file: &FitFile) -> anyhow::Result<usize> {
-    Ok(searches(file)?[1])
-}
-
-/// Geometries of all searches at most.
-pub fn planned(file: &FitFile) -> anyhow::Result<u64> {
-    let [searches, each, fine] = searches(file)?;
-    Ok((searches * each + fine) as u64)
-}
-
-/// Coarse searches, geometries of each, and geometries of the fine one.
-fn searches(file: &FitFile) -> anyhow::Result<[usize; 3]> {
-    let Some(unknown) = file.unknown_geometry()? else { return Ok([0; 3]) };
-    let search = &unknown.search;
-    Ok([search.starts, search.coarse.trials, search.fine.trials])
+/// Coarse searches, geometries of each, and geometries of the fine one, at most.
+pub fn planned(file: &FitFile) -> [usize; 3] {
+    let search = file.unknown_geometry().ok().flatten().map(|unknown| unknown.search);
+    search.map_or([0; 3], |of| [of.starts, of.coarse.trials, of.fine.trials])
 }

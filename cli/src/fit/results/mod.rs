@@ -93,7 +93,9 @@ impl Estimate<'_> {
             self.folder.file("emission.csv")?.write(changes.table().as_bytes())?;
         }
         self.scene(trainer, state, &movie, &light)?;
-        let still = self.still_view().at(self.time_of_still(), trainer, state)?;
+        let Self { file, instrument, motion, measured, .. } = *self;
+        let view = PreviewView { file, instrument, motion, truth: measured.truth.as_ref() };
+        let still = view.at(self.time_of_still(), trainer, state)?;
         self.curve_table(&seen)?;
         let gains = self.gains(&movie, &seen)?;
         let found = Found {
@@ -157,19 +159,12 @@ impl Estimate<'_> {
             Ok(archive.finish()?)
         })
     }
-}
 
-impl Estimate<'_> {
     /// The width of the field, where it is known.
     fn field(&self) -> Option<(&'static str, Vec<f64>)> {
         let sky = setup::sky(self.file).ok()?;
         let n = self.file.screen.pixels as f64;
         Some(("field_uas", vec![sky.pixel_rad / MICROARCSECOND * n]))
-    }
-
-    fn still_view(&self) -> PreviewView<'_> {
-        let Self { file, instrument, motion, measured, .. } = *self;
-        PreviewView { file, instrument, motion, truth: measured.truth.as_ref() }
     }
 
     /// Returns the time of the still image, M: at the reference time, or in the middle of the data if that lies outside

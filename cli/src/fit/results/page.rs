@@ -6,7 +6,9 @@ use super::leakage::Leakage;
 use super::medium;
 use super::numbers::{Results, last_step, outcomes};
 use super::over_time::Changes;
+use super::plots;
 use super::quiescent::Quiescent;
+use super::residuals;
 use super::verdict;
 use super::{Estimate, Found};
 use crate::fit::SETTINGS;
@@ -39,8 +41,9 @@ impl Estimate<'_> {
         }
         plots.push(self.light_curve(&found.movie)?);
         plots.extend(found.changes.as_ref().map(Changes::plot));
-        plots.extend(self.amplitudes(found)?);
-        plots.extend(self.residual_plots(found));
+        let gains = found.gains.as_ref();
+        plots.extend(plots::amplitudes(&self.evidence(), &found.movie, gains)?);
+        plots.extend(residuals::plots(&found.judged, self.measured));
         plots.extend(found.gains.iter().flat_map(Gains::plots));
         plots.extend(found.leakage.as_ref().map(Leakage::plot));
         let details = found.gains.as_ref().map(Gains::details);

@@ -1,8 +1,8 @@
 //! Data and model as curves.
 
+use super::Estimate;
 use super::gains::Gains;
 use super::verdict::Evidence;
-use super::{Estimate, Found};
 use crate::report::{Axis, LinePlot, Marks, Series};
 use kerrlight_common::frames::Frames;
 
@@ -28,14 +28,9 @@ impl Estimate<'_> {
             series,
         })
     }
-
-    /// Amplitudes of the data and of the model, with the data's errors.
-    pub fn amplitudes(&self, found: &Found<'_>) -> anyhow::Result<Option<LinePlot>> {
-        amplitudes(&self.evidence(), &found.movie, found.gains.as_ref())
-    }
 }
 
-/// Amplitudes of the data and of images of all frames with these gains.
+/// Amplitudes of the data, with their errors, and of images of all frames with these gains.
 pub fn amplitudes(
     evidence: &Evidence<'_>,
     movie: &Frames<f32>,

@@ -11,11 +11,6 @@ use num_complex::Complex;
 use std::collections::HashMap;
 
 impl Estimate<'_> {
-    /// Residuals over time and over baselines.
-    pub fn residual_plots(&self, found: &Found<'_>) -> Vec<LinePlot> {
-        plots(&found.judged, self.measured)
-    }
-
     /// Returns the map of light in images or visibilities that the model lacks; nothing where data know no places.
     pub fn residual_map(&self, found: &Found<'_>) -> anyhow::Result<Option<Figure>> {
         let n = self.file.screen.pixels;

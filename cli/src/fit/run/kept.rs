@@ -97,7 +97,8 @@ impl<'a> Kept<'a> {
         let settings = &self.problem.settings;
         match at {
             At::Geometry { .. } => {
-                progress::counting(geometry_search::planned(settings).unwrap_or(0), "trial")
+                let [searches, each, fine] = geometry_search::planned(settings);
+                progress::counting((searches * each + fine) as u64, "trial")
             }
             At::Band(_) => {
                 let count = settings.band.as_ref().map_or(0, |band| {
@@ -120,7 +121,7 @@ impl<'a> Kept<'a> {
         let settings = &self.problem.settings;
         match at {
             At::Geometry { search, of, trials, least } => {
-                let each = geometry_search::each(settings).unwrap_or(0);
+                let [_, each, _] = geometry_search::planned(settings);
                 bar.set_position((search * each + trials) as u64);
                 bar.set_message(format!("search {} of {of}, least chi2/2 {least:.5e}", search + 1));
             }
@@ -341,7 +342,8 @@ impl Progress for Kept<'_> {
 
     fn save(&mut self, state: &State<f32>) -> Result<(), Error> {
         let bytes = checkpoint::encode(state, self.text)?;
-        self.folder.save(&bytes).map_err(kept)?;
+        let file = self.folder.file(folder::CHECKPOINT);
+        file.and_then(|file| file.write(&bytes)).map_err(kept)?;
         // From the first checkpoint on there is a state to save: a signal waits for the step.
         if state.now.step == 0 {
             self.end();

@@ -2,7 +2,7 @@
 
 use super::numbers::with_error;
 use crate::fit::held_out::losses;
-use crate::fit::results::leakage::{Leakage, LeakageResults};
+use crate::fit::results::leakage::Leakage;
 use crate::report::{LinePlot, Outcome};
 use anyhow::Context;
 use kerrlight_imaging::settings::{StaticImageFile, StaticPolarization};
@@ -160,11 +160,6 @@ impl Polarized {
             [(key.clone(), Some(value)), (format!("{key}_error"), error)]
         };
         NUMBERS.iter().flat_map(one).collect()
-    }
-
-    /// The leakage of stations for results.json, where it was solved for.
-    pub fn leakage(&self) -> Option<LeakageResults> {
-        self.leakage.as_ref().map(Leakage::results)
     }
 
     /// The page's numbers.

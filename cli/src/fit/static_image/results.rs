@@ -6,7 +6,7 @@ use super::polarized::{Polarized, PolarizedNumbers};
 use crate::fit::closures::{self, ClosureResults};
 use crate::fit::inputs::InputFile;
 use crate::fit::results::gains::{GainResults, Gains};
-use crate::fit::results::leakage::LeakageResults;
+use crate::fit::results::leakage::{Leakage, LeakageResults};
 use crate::fit::results::verdict::VerdictResults;
 use crate::session;
 use crate::usage::usage;
@@ -210,7 +210,7 @@ impl Found<'_> {
             held_out: self.survey.held.iter().map(held).collect(),
             gains: self.gains.as_ref().map(Gains::results),
             polarization: polarized.map(PolarizedNumbers::from),
-            leakage: polarized.and_then(Polarized::leakage),
+            leakage: polarized.and_then(|of| of.leakage.as_ref()).map(Leakage::results),
             shapes: self.shapes.iter().map(ShapeNumbers::from).collect(),
             images_with_ring: WithRing { count: with, of },
             ring: self.ring().map(|ring| RingPlace {
