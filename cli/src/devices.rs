@@ -174,10 +174,9 @@ mod graphics {
 
 #[cfg(not(feature = "gpu"))]
 mod graphics {
-    use super::{FitDevice, Listed};
+    use super::Listed;
     use anyhow::bail;
-    use kerrlight_geodesic::RayDevice;
-    use std::sync::Arc;
+    pub use open as open_for_fits;
 
     pub const ABSENT: &str = "graphics devices are not looked for: this kerrlight was built \
                               without them\n(cargo build --release --features gpu)\n";
@@ -186,15 +185,7 @@ mod graphics {
         Vec::new()
     }
 
-    pub fn open(name: Option<&str>) -> anyhow::Result<Arc<dyn RayDevice>> {
-        absent(name)
-    }
-
-    pub fn open_for_fits(name: Option<&str>) -> anyhow::Result<FitDevice> {
-        absent(name)
-    }
-
-    fn absent<T>(name: Option<&str>) -> anyhow::Result<T> {
+    pub fn open<T>(name: Option<&str>) -> anyhow::Result<T> {
         bail!(
             "--device {}: this kerrlight was built without graphics devices, only `cpu` is there: \
              build it with `cargo build --release --features gpu`",

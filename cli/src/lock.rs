@@ -48,12 +48,7 @@ impl Lock {
 
     /// Takes the lock of a file, which is made if there is none; nothing if another process has it.
     pub fn of_file(path: &Path) -> anyhow::Result<Option<Self>> {
-        let file = open(path)?;
-        Ok(match file.try_lock() {
-            Err(TryLockError::WouldBlock) => None,
-            // Not every file system has locks.
-            Ok(()) | Err(TryLockError::Error(_)) => Some(Lock(file)),
-        })
+        Ok(of_file(path)?.map(Lock))
     }
 
     /// Returns whether a process has the lock of a file.
@@ -82,6 +77,14 @@ impl Lock {
             }
         }
     }
+}
+
+/// A file that is locked and made if there is none, to be read and written; nothing if another process has its lock.
+pub fn of_file(path: &Path) -> anyhow::Result<Option<File>> {
+    let file = open(path)?;
+    // Not every file system has locks.
+    let is_held = matches!(file.try_lock(), Err(TryLockError::WouldBlock));
+    Ok((!is_held).then_some(file))
 }
 
 fn open(path: &Path) -> anyhow::Result<File> {

@@ -3,7 +3,7 @@
 use anyhow::bail;
 use kerrlight_common::memory::{self, Scratch, shown};
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::fmt::Write;
+use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -213,26 +213,11 @@ fn there(block: *mut u8, size: usize) -> *mut u8 {
     block
 }
 
-/// Text of at most so many bytes, without an allocation.
-struct Text {
-    bytes: [u8; 320],
-    length: usize,
-}
-
-impl Write for Text {
-    fn write_str(&mut self, text: &str) -> std::fmt::Result {
-        let end = (self.length + text.len()).min(self.bytes.len());
-        self.bytes[self.length..end].copy_from_slice(&text.as_bytes()[..end - self.length]);
-        self.length = end;
-        Ok(())
-    }
-}
-
 /// Ends the program with what was wanted and what there is; nothing may be allocated here.
 #[cold]
 fn exhausted(size: usize, taken: usize) -> ! {
     let mib = |bytes: usize| bytes as f64 / 1048576.0;
-    let mut text = Text { bytes: [0; 320], length: 0 };
+    let mut text = Cursor::new([0u8; 320]);
     let limit = LIMIT.load(Ordering::Relaxed);
     let _ = write!(text, "error: out of memory: {:.0} MiB more are needed, and ", mib(size));
     let _ = write!(text, "{:.0} MiB of ", mib(taken));
@@ -241,7 +226,7 @@ fn exhausted(size: usize, taken: usize) -> ! {
         limit => writeln!(text, "{:.0} MiB are taken (--memory sets how much may be)", mib(limit)),
     };
     crate::output::remove_unfinished();
-    end(&text.bytes[..text.length])
+    end(&text.get_ref()[..text.position() as usize])
 }
 
 #[cfg(unix)]
@@ -253,7 +238,7 @@ fn end(text: &[u8]) -> ! {
 
 #[cfg(not(unix))]
 fn end(text: &[u8]) -> ! {
-    let _ = std::io::Write::write_all(&mut std::io::stderr(), text);
+    let _ = std::io::stderr().write_all(text);
     std::process::exit(2)
 }
 

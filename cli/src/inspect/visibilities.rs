@@ -39,17 +39,9 @@ pub fn describe(name: &str, format: Format, observation: &Observation) -> Answer
 fn counts(observation: &Observation) -> [usize; 2] {
     let rows = &observation.rows;
     let times: BTreeSet<u64> = rows.iter().map(|row| row.time_h.to_bits()).collect();
-    let baselines: BTreeSet<[u16; 2]> = rows
-        .iter()
-        .map(|row| {
-            // A baseline is the same in either order of its stations.
-            if row.stations[0] < row.stations[1] {
-                row.stations
-            } else {
-                row.swapped(observation.basis).stations
-            }
-        })
-        .collect();
+    // A baseline is the same in either order of its stations.
+    let sorted = |[a, b]: [u16; 2]| [a.min(b), a.max(b)];
+    let baselines: BTreeSet<[u16; 2]> = rows.iter().map(|row| sorted(row.stations)).collect();
     [times.len(), baselines.len()]
 }
 

@@ -1,9 +1,10 @@
 //! The journal of a picture under way: beside the EXR, until that is whole.
 
+use crate::lock;
 use crate::output::Output;
 use anyhow::{Context, bail};
 use kerrlight_render::picture::{Found, Journal, Raster};
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::File;
 use std::path::PathBuf;
 
 /// A journal with its file, which no other process may use.
@@ -23,17 +24,9 @@ impl Partial {
             return Ok(Partial { path: None, journal });
         };
         let shown = path.display();
-        let mut options = OpenOptions::new();
-        let file = options.read(true).write(true).create(true).truncate(false).open(&path);
-        let file = file.with_context(|| format!("cannot open {shown}"))?;
-        match file.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => {
-                bail!("{shown} is in use: another kerrlight renders {}", output.shown().display())
-            }
-            // Not every file system has locks.
-            Err(TryLockError::Error(_)) => {}
-        }
+        let Some(file) = lock::of_file(&path)? else {
+            bail!("{shown} is in use: another kerrlight renders {}", output.shown().display())
+        };
         let (journal, found) =
             Journal::open(file, identity, raster.bands()).with_context(|| {
                 format!("{shown} (the state of an interrupted run); remove it or write elsewhere")
