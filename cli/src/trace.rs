@@ -133,8 +133,8 @@ impl Trace {
         memory::afford(what, memory::table(table.rays.len() as f64, f64::from(each)))?;
         let blocks = table.blocks();
         let traced = blocks.par_iter().map(|rays| self.trace(table.in_degrees, rays, &request));
-        let tables: anyhow::Result<_> = traced.collect();
-        let traced = Traced { tables: tables.with_context(|| name.clone())? };
+        let traced: anyhow::Result<Vec<RayTable>> = traced.collect();
+        let traced = traced.with_context(|| name.clone())?;
         let groups = self.columns(&table, &traced);
         let rows = table.rays.len();
         let Some(output) = output else { return Ok(Answer::table("rays", groups, rows)) };
@@ -224,17 +224,17 @@ impl Trace {
         Ok(self.integrator.trace(&hole, &observer, &alpha, &beta, self.tolerance, request)?)
     }
 
-    fn columns(&self, table: &Table, traced: &Traced) -> Vec<Vec<Column>> {
+    fn columns(&self, table: &Table, traced: &[RayTable]) -> Vec<Vec<Column>> {
         let rays = &table.rays;
         let number = |name: &str, value: &dyn Fn(usize) -> f64| {
             Column::Numbers(name.to_owned(), (0..rays.len()).map(value).collect())
         };
         let result = |name: &str, value: &dyn Fn(&RayTable, usize) -> f64| {
-            Column::Numbers(name.to_owned(), traced.rays().map(|(t, k)| value(t, k)).collect())
+            Column::Numbers(name.to_owned(), each(traced).map(|(t, k)| value(t, k)).collect())
         };
         let inclination_name = if table.in_degrees { DEGREES } else { RADIANS };
-        let outcomes = traced.rays().map(|(t, k)| t.outcome[k].name().to_owned()).collect();
-        let counts = traced.rays().map(|(t, k)| u64::from(t.crossing_count[k])).collect();
+        let outcomes = each(traced).map(|(t, k)| t.outcome[k].name().to_owned()).collect();
+        let counts = each(traced).map(|(t, k)| u64::from(t.crossing_count[k])).collect();
         let mut groups: Vec<Vec<Column>> = vec![
             vec![number("spin", &|k| rays[k].spin)],
             vec![number(inclination_name, &|k| rays[k].inclination)],
@@ -268,28 +268,21 @@ impl Trace {
     }
 }
 
-/// Tables of blocks of rays, in the order of the input.
-struct Traced {
-    tables: Vec<RayTable>,
-}
-
-impl Traced {
-    /// Each ray: the table that it is in, and its number there.
-    fn rays(&self) -> impl Iterator<Item = (&RayTable, usize)> {
-        self.tables.iter().flat_map(|table| (0..table.len()).map(move |k| (table, k)))
-    }
+/// Each ray of tables of blocks: the table that it is in, and its number there.
+fn each(traced: &[RayTable]) -> impl Iterator<Item = (&RayTable, usize)> {
+    traced.iter().flat_map(|table| (0..table.len()).map(move |k| (table, k)))
 }
 
 /// The columns of each ray's first `width` points, filled up with NaN; those that were not
 /// requested are left out.
 fn points(
-    traced: &Traced,
+    traced: &[RayTable],
     width: usize,
     prefix: &str,
     of: impl Fn(&RayTable) -> &Points,
 ) -> Vec<Column> {
     let block = |name: &str, row: &dyn Fn(&Points, Range<usize>) -> Vec<f64>| {
-        let rows = traced.rays().map(|(table, k)| {
+        let rows = each(traced).map(|(table, k)| {
             let points = of(table);
             let mut row = row(points, points.of(k));
             row.resize(width, f64::NAN);
@@ -304,7 +297,7 @@ fn points(
         block("phi", &|p, at| p.azimuth[at].to_vec()),
         block("delay", &|p, at| p.delay[at].to_vec()),
     ];
-    let has = |wanted: &dyn Fn(&Points) -> bool| traced.tables.iter().any(|t| wanted(of(t)));
+    let has = |wanted: &dyn Fn(&Points) -> bool| traced.iter().any(|t| wanted(of(t)));
     if has(&|p| !p.momentum.is_empty()) {
         columns.push(block("p_r", &|p, at| p.momentum[at].iter().map(|m| m[1]).collect()));
         columns.push(block("p_theta", &|p, at| p.momentum[at].iter().map(|m| m[2]).collect()));

@@ -44,7 +44,7 @@ impl Uv {
             plot.write(plots::coverage(&observation, &title))?;
         }
         eprintln!("{count} points; {}", self.observing.history(&self.array).join("; "));
-        let outputs = output.iter().chain(plot.as_ref().map(PlotFile::output));
+        let outputs = output.iter().chain(plot.as_ref().map(|plot| &plot.output));
         let files = answer::written(outputs);
         let answer = match files[..] {
             [] if !self.pipes() => Answer::table("points", table, count),

@@ -55,9 +55,9 @@ impl Inspect {
         let (format, observation) = files::decode(&output::read(&self.file)?).with_context(name)?;
         let answer = visibilities::describe(&name(), format, &observation);
         let Some(plot) = plot else { return Ok(answer) };
-        plot.must_differ_from(&self.file)?;
+        plot.output.must_differ_from(&self.file)?;
         plot.write(plots::amplitudes(&observation, &observation.source))?;
-        Ok(answer.outputs([plot.output()]))
+        Ok(answer.outputs([&plot.output]))
     }
 }
 

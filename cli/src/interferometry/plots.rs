@@ -14,7 +14,7 @@ const INTERVALS: usize = 8;
 
 /// A picture to be written, PNG or SVG by the ending of its name.
 pub struct PlotFile {
-    output: Output,
+    pub output: Output,
     is_svg: bool,
 }
 
@@ -30,11 +30,6 @@ impl PlotFile {
         Ok(PlotFile { output: Output::new(path, "")?, is_svg })
     }
 
-    /// Refuses to take the place of a file that is read.
-    pub fn must_differ_from(&self, input: &Path) -> anyhow::Result<()> {
-        self.output.must_differ_from(input)
-    }
-
     /// Draws and writes.
     pub fn write(&self, (plots, layout): (Vec<Plot>, Layout)) -> anyhow::Result<()> {
         let bytes = if self.is_svg {
@@ -44,11 +39,6 @@ impl PlotFile {
         };
         self.output.write(&bytes)
     }
-
-    /// Returns its output.
-    pub fn output(&self) -> &Output {
-        &self.output
-    }
 }
 
 /// (u, v) of all baselines in both senses, coloured by time.
@@ -57,14 +47,13 @@ pub fn coverage(observation: &Observation, title: &str) -> (Vec<Plot>, Layout) {
         let [u, v] = row.uv.map(|x| x / 1e9);
         [(row.time_h, (u, v)), (row.time_h, (-u, -v))]
     });
-    let plots = by_time(points.collect(), 2.0);
+    let plots = by_time(points.collect());
     let reach = observation
         .rows
         .iter()
         .fold(0.0, |most: f64, row| most.max(row.uv[0].abs()).max(row.uv[1].abs()))
         .max(1.0);
     let half = 1.05 * reach / 1e9;
-    let plots = plots.into_iter().map(Plot::from).collect::<Vec<_>>();
     let layout = Layout::auto_from_plots(&plots)
         .with_title(title)
         .with_x_label("u (Gλ)")
@@ -85,7 +74,7 @@ pub fn amplitudes(observation: &Observation, title: &str) -> (Vec<Plot>, Layout)
         // The axis of amplitudes is logarithmic.
         .filter(|(_, i)| i.visibility.norm() > 0.0)
         .map(|(row, i)| (row.time_h, (row.uv[0].hypot(row.uv[1]) / 1e9, i.visibility.norm())));
-    let plots = by_time(points.collect(), 2.0).into_iter().map(Plot::from).collect::<Vec<_>>();
+    let plots = by_time(points.collect());
     let layout = Layout::auto_from_plots(&plots)
         .with_title(title)
         .with_x_label("baseline (Gλ)")
@@ -98,7 +87,7 @@ pub fn amplitudes(observation: &Observation, title: &str) -> (Vec<Plot>, Layout)
 }
 
 /// Points by the interval of time that they are in.
-fn by_time(points: Vec<(f64, (f64, f64))>, size: f64) -> Vec<ScatterPlot> {
+fn by_time(points: Vec<(f64, (f64, f64))>) -> Vec<Plot> {
     let times = || points.iter().map(|(time, _)| *time);
     let first = times().fold(f64::INFINITY, f64::min);
     let last = times().fold(f64::NEG_INFINITY, f64::max);
@@ -117,13 +106,12 @@ fn by_time(points: Vec<(f64, (f64, f64))>, size: f64) -> Vec<ScatterPlot> {
         // The brightest yellow is hard to see on white.
         let [r, g, b] = colors[k * 900 / (INTERVALS - 1)];
         let from = first + k as f64 * width;
-        plots.push(
-            ScatterPlot::new()
-                .with_data(inside)
-                .with_size(size)
-                .with_color(format!("#{r:02x}{g:02x}{b:02x}"))
-                .with_legend(format!("{from:.1}–{:.1} h", from + width)),
-        );
+        let marks = ScatterPlot::new()
+            .with_data(inside)
+            .with_size(2.0)
+            .with_color(format!("#{r:02x}{g:02x}{b:02x}"))
+            .with_legend(format!("{from:.1}–{:.1} h", from + width));
+        plots.push(marks.into());
     }
     plots
 }
