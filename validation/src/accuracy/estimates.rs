@@ -6,9 +6,7 @@
 
 use super::Oracle;
 use super::rays::{Angle, Draw, beside_critical_curve, in_disc, log_uniform};
-use kerrlight_geodesic::{
-    Error, Integrator, Kerr, Placement, Points, RayTable, Request, Uncertainty,
-};
+use kerrlight_geodesic::{Error, Integrator, Kerr, Placement, RayTable, Request, Uncertainty};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
@@ -164,16 +162,6 @@ pub enum At {
     Crossings,
 }
 
-/// Every integrator at 1e-6, 1e-9 and 1e-12; the closed form has no tolerance.
-pub fn settings() -> Vec<(Integrator, f64)> {
-    let mut settings = Vec::new();
-    for integrator in Integrator::ALL {
-        let digits: &[i32] = if *integrator == Integrator::Elliptic { &[14] } else { &[6, 9, 12] };
-        settings.extend(digits.iter().map(|digits| (*integrator, 10f64.powi(-digits))));
-    }
-    settings
-}
-
 /// One quantity of one row.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Held {
@@ -270,18 +258,11 @@ fn judge(
     Ok(truth.map(columns))
 }
 
-fn point(points: &Points, k: usize) -> [f64; 4] {
-    [points.radius[k], points.theta[k], points.azimuth[k], points.delay[k]]
-}
-
 fn samples(table: &RayTable, horizon: f64, oracle: &Oracle) -> Option<Uncertainty> {
     let points = &table.samples;
     // Azimuth and delay have no limit at the horizon itself.
     let counts = |k: &usize| points.radius[*k] > horizon * (1.0 + 2e-8);
-    (0..points.len())
-        .filter(counts)
-        .map(|k| oracle.judge(points.mino_time[k], point(points, k)))
-        .reduce(Uncertainty::max)
+    (0..points.len()).filter(counts).map(|k| oracle.judge(points, k)).reduce(Uncertainty::max)
 }
 
 fn crossings(table: &RayTable, oracle: &Oracle) -> Result<Option<Uncertainty>, ()> {
@@ -292,7 +273,7 @@ fn crossings(table: &RayTable, oracle: &Oracle) -> Result<Option<Uncertainty>, (
     if before_end.abs_diff(table.crossing_count[0] as usize) > 0 {
         return Err(());
     }
-    let judged = |k: usize| oracle.compare(&oracle.at_exactly(times[k]), point(points, k));
+    let judged = |k: usize| oracle.compare(times[k], points, k);
     Ok((0..points.len()).map(judged).reduce(Uncertainty::max))
 }
 

@@ -12,9 +12,10 @@ use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Kind of difficulty that rays are chosen for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Kind {
     /// Impact parameters of the hole's size.
+    #[default]
     Strong,
     /// Impact parameters from 1e-12 to 1e6 M.
     AnyScale,
@@ -40,7 +41,7 @@ impl Kind {
 }
 
 /// Counts of the outcomes of the rays of one kind.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Tally {
     /// The kind.
     pub kind: Kind,
@@ -65,21 +66,6 @@ pub struct Tally {
 }
 
 impl Tally {
-    fn new(kind: Kind) -> Self {
-        Tally {
-            kind,
-            rays: 0,
-            fates: [0; 2],
-            unresolved: [0; 2],
-            wrong_fates: 0,
-            wrong_crossings: 0,
-            not_finite: 0,
-            bounded: 0,
-            worst: None,
-            example: None,
-        }
-    }
-
     fn add(mut self, o: &Self) -> Self {
         self.rays += o.rays;
         for k in 0..2 {
@@ -142,7 +128,7 @@ pub fn run(
 
 /// Tallies of no rays.
 fn nothing() -> Vec<Tally> {
-    Kind::ALL.map(Tally::new).to_vec()
+    Kind::ALL.map(|kind| Tally { kind, ..Tally::default() }).to_vec()
 }
 
 fn add(all: Vec<Tally>, more: &[Tally]) -> Vec<Tally> {
@@ -284,7 +270,7 @@ fn errors(table: &RayTable, oracle: &Oracle) -> (Uncertainty, bool) {
             // Azimuth and delay have no limit at the horizon, where the last sample lies.
             let last = points.mino_time[k] >= table.mino_total[0] * (1.0 - 1e-12);
             if !last && finite {
-                worst = worst.max(oracle.judge(points.mino_time[k], at));
+                worst = worst.max(oracle.judge(points, k));
             }
         }
     }

@@ -16,3 +16,14 @@ pub mod rays;
 pub mod sweep;
 
 pub use oracle::Oracle;
+
+use kerrlight_geodesic::Integrator;
+
+/// Every integrator with tolerances of so many digits; the closed form has no tolerance.
+pub fn settings(digits: &[i32]) -> Vec<(Integrator, f64)> {
+    let each = |integrator: &Integrator| {
+        let digits: &[i32] = if *integrator == Integrator::Elliptic { &[14] } else { digits };
+        digits.iter().map(|digits| (*integrator, 10f64.powi(-digits))).collect::<Vec<_>>()
+    };
+    Integrator::ALL.iter().flat_map(each).collect()
+}

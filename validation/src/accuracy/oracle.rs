@@ -2,7 +2,7 @@
 
 use super::rays::Draw;
 use kerrlight_geodesic::{
-    Double, Error, Kerr, Outcome, Path, PathPoint, Quantities, Uncertainty, trace_series,
+    Double, Error, Kerr, Outcome, Path, PathPoint, Points, Quantities, Uncertainty, trace_series,
 };
 use std::f64::consts::TAU;
 
@@ -33,8 +33,8 @@ impl Oracle {
     }
 
     /// The position at a Mino time.
-    pub fn at(&self, mino_time: f64) -> PathPoint<Double> {
-        self.path.at(Double::from(mino_time))
+    pub fn at(&self, mino_time: impl Into<Double>) -> PathPoint<Double> {
+        self.path.at(mino_time.into())
     }
 
     /// Mino times of the crossings of the equatorial plane, with all digits.
@@ -42,29 +42,21 @@ impl Oracle {
         self.path.equatorial_crossings().collect()
     }
 
-    /// The position at a Mino time with all its digits.
-    pub fn at_exactly(&self, mino_time: Double) -> PathPoint<Double> {
-        self.path.at(mino_time)
+    /// The errors of the k-th point at its Mino time.
+    pub fn judge(&self, points: &Points, k: usize) -> Uncertainty {
+        self.compare(points.mino_time[k], points, k)
     }
 
-    /// The errors of a position (r, θ, φ, delay) at a Mino time.
-    pub fn judge(&self, mino_time: f64, position: [f64; 4]) -> Uncertainty {
-        self.compare(&self.at(mino_time), position)
-    }
-
-    /// The errors of a position (r, θ, φ, delay) that should be `truth`; whole turns of φ do not count.
-    pub fn compare(
-        &self,
-        truth: &PathPoint<Double>,
-        [r, theta, azimuth, delay]: [f64; 4],
-    ) -> Uncertainty {
+    /// The errors of the k-th point, which should be that at a Mino time; whole turns of φ do not count.
+    pub fn compare(&self, mino_time: impl Into<Double>, points: &Points, k: usize) -> Uncertainty {
+        let truth = self.at(mino_time);
         let miss = |x: f64, truth: Double| (Double::from(x) - truth).hi;
-        let turn = miss(azimuth, truth.azimuth);
+        let turn = miss(points.azimuth[k], truth.azimuth);
         Uncertainty {
-            radius: miss(r, truth.radius()).abs() / r,
-            theta: miss(theta, truth.theta()).abs(),
+            radius: miss(points.radius[k], truth.radius()).abs() / points.radius[k],
+            theta: miss(points.theta[k], truth.theta()).abs(),
             azimuth: (turn - TAU * (turn / TAU).round()).abs(),
-            delay: miss(delay, truth.delay).abs(),
+            delay: miss(points.delay[k], truth.delay).abs(),
         }
     }
 }

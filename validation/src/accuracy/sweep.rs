@@ -1,7 +1,7 @@
 //! Integrator × tolerance × spin × class of ray.
 
-use super::Oracle;
 use super::rays::{Class, Draw, draw};
+use super::{Oracle, settings};
 use kerrlight_geodesic::{Error, Integrator, Kerr, Placement, RayTable, Request, Uncertainty};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -26,16 +26,7 @@ pub struct Sweep {
 impl Sweep {
     /// The whole sweep, with this many rays of every class and spin, eight observers each.
     pub fn full(rays: usize, seed: u64) -> Self {
-        let mut settings = Vec::new();
-        for integrator in Integrator::ALL {
-            // The closed form has no tolerance.
-            let digits: &[i32] = if *integrator == Integrator::Elliptic {
-                &[14]
-            } else {
-                &[4, 6, 8, 10, 12, 13, 14]
-            };
-            settings.extend(digits.iter().map(|digits| (*integrator, 10f64.powi(-digits))));
-        }
+        let settings = settings(&[4, 6, 8, 10, 12, 13, 14]);
         let spins = vec![0.0, 0.5, 0.94, -0.94, 0.998, 1.0];
         Sweep { settings, spins, observers: 8, rays: rays.div_ceil(8), seed }
     }
@@ -163,8 +154,7 @@ fn judged(table: &RayTable, class: Class, spin: f64, oracle: &Oracle) -> Judged 
     let mut truth = Uncertainty::default();
     for k in 0..samples.len() {
         if counts(class, spin, samples.radius[k]) {
-            let at = [samples.radius[k], samples.theta[k], samples.azimuth[k], samples.delay[k]];
-            truth = truth.max(oracle.judge(samples.mino_time[k], at));
+            truth = truth.max(oracle.judge(samples, k));
         }
     }
     let right_fate = table.outcome[0] == oracle.outcome();
