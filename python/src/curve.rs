@@ -13,9 +13,16 @@ use std::convert::Infallible;
 /// Names of the numbers of a point; `lambda` is a word of Python.
 const COLUMNS: [&str; 8] = ["r", "lam", "eta", "alpha", "beta", "gamma", "delta", "tau"];
 
-fn columns(py: Python<'_>, rows: Vec<[f64; 8]>) -> PyResult<Bound<'_, PyDict>> {
+/// Names of the coordinates of both edges of a band.
+const EDGES: [&str; 4] = ["inner_alpha", "inner_beta", "outer_alpha", "outer_beta"];
+
+fn columns<'py, const N: usize>(
+    py: Python<'py>,
+    names: [&str; N],
+    rows: Vec<[f64; N]>,
+) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
-    for (k, name) in COLUMNS.iter().enumerate() {
+    for (k, name) in names.into_iter().enumerate() {
         let column: Vec<f64> = rows.iter().map(|row| row[k]).collect();
         dict.set_item(name, column.into_pyarray(py))?;
     }
@@ -39,7 +46,7 @@ pub fn critical_curve(
         let points = CriticalCurve::new(&hole, inclination).points(count);
         Ok::<_, Infallible>(points.map(|point| point.numbers()).collect())
     };
-    columns(py, detached(py, work)?)
+    columns(py, COLUMNS, detached(py, work)?)
 }
 
 /// The points of the critical curve in these directions of the screen.
@@ -60,7 +67,7 @@ pub fn critical_points<'py>(
         };
         Ok::<_, Infallible>(angles.iter().map(point).collect())
     };
-    columns(py, detached(py, work)?)
+    columns(py, COLUMNS, detached(py, work)?)
 }
 
 /// (alpha, beta) of both edges of a lensing band in these directions; NaN where there is none.
@@ -77,20 +84,12 @@ pub fn band<'py>(
     let none = (f64::NAN, f64::NAN);
     let work = || {
         let band = LensingBand::new(&hole, inclination, order);
-        let edges = angles.iter().map(|angle| {
+        let edges = |angle: &f64| {
             interrupt::check();
-            (band.inner(*angle), band.outer(*angle))
-        });
-        Ok::<_, Infallible>(edges.map(|(inner, outer)| [inner, outer.unwrap_or(none)]).collect())
+            let [inner, outer] = [band.inner(*angle), band.outer(*angle).unwrap_or(none)];
+            [inner.0, inner.1, outer.0, outer.1]
+        };
+        Ok::<_, Infallible>(angles.iter().map(edges).collect())
     };
-    let rows: Vec<[(f64, f64); 2]> = detached(py, work)?;
-    let dict = PyDict::new(py);
-    for (k, name) in ["inner", "outer"].iter().enumerate() {
-        for (c, axis) in ["alpha", "beta"].iter().enumerate() {
-            let value = |row: &[(f64, f64); 2]| if c == 0 { row[k].0 } else { row[k].1 };
-            let column: Vec<f64> = rows.iter().map(value).collect();
-            dict.set_item(format!("{name}_{axis}"), column.into_pyarray(py))?;
-        }
-    }
-    Ok(dict)
+    columns(py, EDGES, detached(py, work)?)
 }

@@ -1,7 +1,7 @@
 //! The forward model: from emission on nodes, or on voxels, to images, with its adjoint.
 
 use crate::call::detached;
-use crate::model_settings::Settings;
+use crate::model_settings::{Refusal, Settings};
 use crate::rays::Place;
 use crate::refusal::refused;
 use kerrlight_geodesic::{Kerr, interrupt};
@@ -44,7 +44,7 @@ impl Model {
         place: &kerrlight_geodesic::Observer,
         [alpha, beta]: [&[f64]; 2],
         settings: Settings,
-    ) -> Result<Self, Box<dyn std::error::Error + Send + Sync>> {
+    ) -> Result<Self, Refusal> {
         let stokes = settings.stokes()?;
         let mut lines = Sightlines::trace(hole, place, alpha, beta, &settings.request())?;
         if lines.rays() == 0 {

@@ -5,6 +5,9 @@ use kerrlight_render::polarization::{PolarizationLaw, StokesParameter};
 use kerrlight_tomo::fit::{Motion, Region, Sampling, SightlineRequest};
 use pyo3::prelude::*;
 
+/// Reason why there is no such model.
+pub type Refusal = Box<dyn std::error::Error + Send + Sync>;
+
 /// Settings of a forward model, beside hole, observer and screen.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -43,13 +46,9 @@ impl Settings {
     }
 
     /// Returns the motion of matter about a hole of this spin.
-    pub fn motion(
-        &self,
-        spin: f64,
-        axis: Axis,
-    ) -> Result<Motion, Box<dyn std::error::Error + Send + Sync>> {
+    pub fn motion(&self, spin: f64, axis: Axis) -> Result<Motion, Refusal> {
         let law: Velocity =
-            serde_json::from_str(&self.velocity).map_err(|e| Refused(format!("velocity: {e}")))?;
+            serde_json::from_str(&self.velocity).map_err(|e| format!("velocity: {e}"))?;
         Ok(Motion {
             // Matter that turns about a tilted axis ξ is dragged by the part a·ξ_z of the spin.
             velocity: law.angular(0, spin * axis.vector()[2])?,
@@ -61,26 +60,22 @@ impl Settings {
     }
 
     /// The law of polarised light with the wanted parameters.
-    pub fn stokes(&self) -> Result<Option<(PolarizationLaw, Vec<StokesParameter>)>, Refused> {
+    pub fn stokes(&self) -> Result<Option<(PolarizationLaw, Vec<StokesParameter>)>, Refusal> {
         let Some((law, names)) = &self.polarization else { return Ok(None) };
         if let Some(power) = self.redshift_power {
-            return Err(Refused(format!(
+            return Err(format!(
                 "redshift_power = {power} is not allowed together with polarization, whose redshift_power it is"
-            )));
+            )
+            .into());
         }
-        let law = serde_json::from_str(law).map_err(|e| Refused(format!("polarization: {e}")))?;
+        let law = serde_json::from_str(law).map_err(|e| format!("polarization: {e}"))?;
         Ok(Some((law, names.iter().map(|name| parameter(name)).collect::<Result<_, _>>()?)))
     }
 }
 
-/// Settings that contradict each other, or say nothing.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct Refused(pub String);
-
-fn parameter(name: &str) -> Result<StokesParameter, Refused> {
+fn parameter(name: &str) -> Result<StokesParameter, String> {
     let modelled = [StokesParameter::I, StokesParameter::Q, StokesParameter::U];
     modelled.into_iter().find(|known| known.name() == name).ok_or_else(|| {
-        Refused(format!("stokes = \"{name}\" is not allowed: some of \"I\", \"Q\" and \"U\""))
+        format!("stokes = \"{name}\" is not allowed: some of \"I\", \"Q\" and \"U\"")
     })
 }
