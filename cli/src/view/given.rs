@@ -1,9 +1,9 @@
 //! Subject of the page, as one object.
 
-use super::matter::{self, Volumes};
+use super::matter::{self, SPOTS, Volumes};
 use super::run_folder::Measured;
 use super::subject::Subject;
-use super::{left_out, sky, still};
+use super::{sky, still};
 use crate::render::preview::PreviewOptions;
 use anyhow::Context;
 use kerrlight_common::units::SPEED_OF_LIGHT;
@@ -44,8 +44,22 @@ pub fn of(subject: &Subject, volumes: &Volumes) -> anyhow::Result<Value> {
         "piece": piece,
         "most": most,
         "data": subject.measured.as_ref().map(data),
-        "left_out": left_out::of(subject, volumes.falls),
+        "left_out": left_out(subject, volumes.falls),
     }))
+}
+
+/// Names of what is left out, as scene files have them.
+fn left_out(subject: &Subject, falls: bool) -> Vec<String> {
+    let Scene { mesh, volume, spot, effects, .. } = &subject.scene;
+    let parts = [
+        (!mesh.is_empty(), "[[mesh]]".to_owned()),
+        (falls, "[[volume]] number 0, whose matter falls".to_owned()),
+        (volume.len() > 1, format!("[[volume]] but the first of {}", volume.len())),
+        (spot.len() > SPOTS, format!("[[spot]] but the first {SPOTS} of {}", spot.len())),
+        (effects.half_orbits.is_some(), "effects.half_orbits: all images are there".to_owned()),
+        (effects.polarization, "effects.polarization: light is that without it".to_owned()),
+    ];
+    parts.into_iter().filter_map(|(is, name)| is.then_some(name)).collect()
 }
 
 /// The keys of a scene's text, with the tables that they stand in.

@@ -1,6 +1,5 @@
 //! Matter that fills space, as the page takes it: volumes, how they turn, and spots.
 
-use super::left_out::SPOTS;
 use super::subject::Subject;
 use kerrlight_geodesic::Kerr;
 use kerrlight_render::dynamics::{AngularVelocity, Axis, Velocity};
@@ -8,6 +7,9 @@ use kerrlight_render::emission::spot::SpotModel;
 use kerrlight_render::scene::{Rotation, Spot, VolumeSource};
 use kerrlight_render::volume::{Volume, VolumeFile};
 use serde_json::{Value, json};
+
+/// Spots that the page has room for.
+pub const SPOTS: usize = 8;
 
 /// A volume as a texture of half floats.
 pub struct Texture {

@@ -1,7 +1,6 @@
 //! `kerrlight view`: a scene, or what a fit has recovered, in a page on which one flies around it.
 
 mod given;
-mod left_out;
 mod matter;
 mod page;
 mod run_folder;
