@@ -9,7 +9,7 @@ use super::over_time::Changes;
 use super::plots;
 use super::quiescent::Quiescent;
 use super::residuals;
-use super::verdict;
+use super::verdict::{self, DataVerdict};
 use super::{Estimate, Found};
 use crate::fit::SETTINGS;
 use crate::fit::curves::{loss_plot, psnr_plot};
@@ -46,23 +46,13 @@ impl Estimate<'_> {
         plots.extend(residuals::plots(&found.judged, self.measured));
         plots.extend(found.gains.iter().flat_map(Gains::plots));
         plots.extend(found.leakage.as_ref().map(Leakage::plot));
-        let details = found.gains.as_ref().map(Gains::details);
-        let leakage = found.leakage.as_ref().map(Leakage::details);
         let report = Report {
             title: self.file.title.clone(),
             notice: Some(verdict::notice(&found.judged)),
             summary: self.summary(found, results),
             parts: band_words::parts(self.file, self.measured),
             results: outcomes(results),
-            details: [
-                Some(verdict::table(&found.judged)),
-                verdict::parts::by_station(&found.judged),
-                details,
-                leakage,
-            ]
-            .into_iter()
-            .flatten()
-            .collect(),
+            details: details(&found.judged, gains, found.leakage.as_ref()),
             view: Some(self.view(found)),
             figures: self.figures(found)?,
             plots,
@@ -226,6 +216,17 @@ impl Estimate<'_> {
         lines.extend(closeness.map(|of| of.sentences(&file.axis)).into_iter().flatten());
         lines
     }
+}
+
+/// Tables of residuals, and of gains and leakage where they are solved for.
+pub fn details(
+    judged: &DataVerdict,
+    gains: Option<&Gains>,
+    leakage: Option<&Leakage>,
+) -> Vec<report::Table> {
+    let residuals = [Some(verdict::table(judged)), verdict::parts::by_station(judged)];
+    let solved = [gains.map(Gains::details), leakage.map(Leakage::details)];
+    residuals.into_iter().chain(solved).flatten().collect()
 }
 
 /// Every setting with its meaning; those that the run's file leaves out are called assumed.

@@ -7,7 +7,7 @@ use super::results::Results;
 use crate::fit::held_out::losses;
 use crate::fit::results::gains::Gains;
 use crate::fit::results::leakage::Leakage;
-use crate::fit::results::page::settings;
+use crate::fit::results::page::{details, settings};
 use crate::fit::results::verdict::{self, Evidence};
 use crate::fit::results::{plots, residuals};
 use crate::report::{LinePlot, Outcome, Report, Table};
@@ -65,16 +65,10 @@ impl Found<'_> {
         all_plots.extend(self.held_out());
         all_plots.extend(self.polarized.as_ref().and_then(Polarized::held_out));
         all_plots.extend(self.gains.iter().flat_map(Gains::plots));
-        let details = self.gains.as_ref().map(Gains::details);
         let leakage = self.polarized.as_ref().and_then(|polarized| polarized.leakage.as_ref());
         all_plots.extend(leakage.map(Leakage::plot));
-        let leakage = leakage.map(Leakage::details);
-        let details = [
-            Some(verdict::table(&self.judged)),
-            verdict::parts::by_station(&self.judged),
-            details,
-            leakage,
-        ];
+        let mut details = details(&self.judged, self.gains.as_ref(), leakage);
+        details.extend([self.shapes_table(), self.images_table()]);
         let report = Report {
             title: self.file.title.clone(),
             notice: Some(verdict::notice(&self.judged)),
@@ -85,9 +79,7 @@ impl Found<'_> {
             results: self.outcomes(results),
             figures: [figure].into_iter().chain(polarized).collect(),
             plots: all_plots,
-            details: (details.into_iter().flatten())
-                .chain([self.shapes_table(), self.images_table()])
-                .collect(),
+            details,
             settings: settings(self.file, StaticImageFile::keys(), self.folder)?,
             ..Report::default()
         };
