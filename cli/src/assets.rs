@@ -64,10 +64,13 @@ pub fn load(
         let _ = writeln!(identity.borrow_mut(), "{} bytes, CRC-32 {checksum:08x}", bytes.len());
         anyhow::Ok(bytes)
     };
-    let panorama = |path: PathBuf| {
-        loaded("sky.image.path", &path, &read, Panorama::decode, Panorama::warnings)
+    let sky = match &scene.sky {
+        Some(Sky::Image(image)) => {
+            let (key, path) = ("sky.image.path", folder.join(&image.path));
+            Some(loaded(key, &path, &read, Panorama::decode, Panorama::warnings)?)
+        }
+        _ => None,
     };
-    let sky = sky_path(scene, folder).map(panorama).transpose()?;
     let meshes = scene.mesh.iter().enumerate().map(|(k, mesh)| {
         let path = folder.join(&mesh.path);
         let name = || format!("`mesh.{k}.path` {}", path.display());
@@ -103,14 +106,6 @@ pub fn load(
 /// Tells what of a file is not shown as it says.
 fn warn(name: &str, warnings: &[String]) {
     warnings.iter().for_each(|what| eprintln!("warning: {name}: {what}"));
-}
-
-/// Returns the path of the picture of a `[sky.image]`.
-fn sky_path(scene: &Scene, folder: &Path) -> Option<PathBuf> {
-    match &scene.sky {
-        Some(Sky::Image(image)) => Some(folder.join(&image.path)),
-        _ => None,
-    }
 }
 
 /// Reads and decodes what a key of the scene names, and tells its warnings.

@@ -10,7 +10,7 @@ use crate::progress;
 use anyhow::Context;
 use clap::Args;
 use kerrlight_validation::accuracy::sweep::{self, Sweep};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `kerrlight accuracy`.
 #[derive(Debug, Args)]
@@ -44,7 +44,8 @@ impl Accuracy {
         if self.hard.is_some() {
             kerrlight_geodesic::Tracer::new(self.tolerance).context("--tolerance")?;
         }
-        make_folder(&self.output)?;
+        std::fs::create_dir_all(&self.output)
+            .with_context(|| format!("cannot make {}", self.output.display()))?;
         match self.hard {
             Some(rays) => hard::run(self, rays),
             None => self.sweep(),
@@ -64,12 +65,12 @@ impl Accuracy {
             true
         })?;
         bar.finish_and_clear();
-        let figure = picture::figure(&rows)?;
+        let (drawing, bitmap) = picture::figure(&rows)?;
         csv.write(&table::csv(&rows)?)?;
         let document = table::json(&rows, &sweep);
         json.write(&serde_json::to_vec_pretty(&document)?)?;
-        svg.write(figure.svg.as_bytes())?;
-        png.write(&figure.png)?;
+        svg.write(drawing.as_bytes())?;
+        png.write(&bitmap)?;
         let answer = Answer::text(table::summary(&rows)).outputs([&csv, &json, &svg, &png]);
         Ok(answer.with_all(serde_json::to_value(&document)?))
     }
@@ -78,8 +79,4 @@ impl Accuracy {
     fn place(&self, name: &str, extension: &str) -> anyhow::Result<Output> {
         Output::new(&self.output.join(name), extension)
     }
-}
-
-fn make_folder(path: &Path) -> anyhow::Result<()> {
-    std::fs::create_dir_all(path).with_context(|| format!("cannot make {}", path.display()))
 }

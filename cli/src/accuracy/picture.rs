@@ -10,23 +10,17 @@ use kuva::render::figure::Figure;
 use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
 
-/// The picture in both formats.
-pub struct Picture {
-    pub svg: String,
-    pub png: Vec<u8>,
-}
-
 /// Samples of the rays whose time is shown.
 const SAMPLES: f64 = 100.0;
 
 /// Colours that the colour-blind tell apart (Okabe & Ito 2008).
 const COLORS: [&str; 5] = ["#999999", "#E69F00", "#009E73", "#0072B2", "#D55E00"];
 
-/// Two panels: rays anywhere, and rays next to the critical curve.
+/// Two panels as SVG and as PNG: rays anywhere, and rays next to the critical curve.
 ///
 /// # Errors
 /// If the bitmap cannot be drawn.
-pub fn figure(rows: &[Row]) -> anyhow::Result<Picture> {
+pub fn figure(rows: &[Row]) -> anyhow::Result<(String, Vec<u8>)> {
     // Next to the critical curve one ray in a hundred has no digits left in any arithmetic.
     let panels = [(Class::Generic, 1, "99 % of rays"), (Class::NearCritical, 0, "the median ray")];
     let drawn = panels.map(|(class, quantile, of)| panel(rows, class, quantile, of));
@@ -40,7 +34,7 @@ pub fn figure(rows: &[Row]) -> anyhow::Result<Picture> {
     let svg = kuva::backend::svg::SvgBackend::new().render_scene(&scene);
     let png = kuva::backend::png::PngBackend::new().with_scale(1.5).render_scene(&scene);
     let png = png.map_err(|error| anyhow!("cannot draw: {error}"))?;
-    Ok(Picture { svg, png })
+    Ok((svg, png))
 }
 
 /// Correct digits at a quantile of one class against time, a line an integrator.

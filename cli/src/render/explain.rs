@@ -33,22 +33,18 @@ pub fn before(scene: &Scene, raster: &Raster) -> anyhow::Result<Answer> {
     for part in Part::ALL {
         let each = trial.spent(part).as_secs_f64() / tried as f64;
         let whole = each * rays / threads as f64;
-        text += &line(part, each, whole);
+        let name = part.name();
+        text += &format!("  {name:<9}{:>9.3} us a ray {whole:>9.2} s\n", each * 1e6);
         let steps: Vec<_> = plan.steps.iter().filter(|step| step.part == part).collect();
         for step in &steps {
             text += &format!("    {} {}\n", if step.done { "+" } else { "-" }, step.what);
         }
         let steps: Vec<_> =
             steps.iter().map(|step| json!({"what": step.what, "done": step.done})).collect();
-        let name = part.name();
         parts.push(json!({"part": name, "us_a_ray": each * 1e6, "seconds": whole, "steps": steps}));
     }
     let answer = Answer::text(text).with("rays", rays).with("ring_rays", rings);
     Ok(answer.with("threads", threads).with("estimated_from", tried).with("parts", parts))
-}
-
-fn line(part: Part, each: f64, whole: f64) -> String {
-    format!("  {:<9}{:>9.3} us a ray {whole:>9.2} s\n", part.name(), each * 1e6)
 }
 
 /// The costs of some rays, and how many these are: fewer where rays are slow.

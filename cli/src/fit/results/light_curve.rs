@@ -24,15 +24,8 @@ impl Estimate<'_> {
         Ok((count > 0).then(|| chi2 / count as f64))
     }
 
-    /// Writes data and model, if the data are a light curve.
-    pub fn curve_table(&self, seen: &Frames<f32>) -> anyhow::Result<()> {
-        match self.curve_text(seen)? {
-            Some(text) => self.folder.file(TABLE)?.write(text.as_bytes()),
-            None => Ok(()),
-        }
-    }
-
-    fn curve_text(&self, seen: &Frames<f32>) -> anyhow::Result<Option<String>> {
+    /// The table of data and model, if the data are a light curve.
+    pub fn curve_table(&self, seen: &Frames<f32>) -> anyhow::Result<Option<String>> {
         let Some(curve) = &self.measured.curve else { return Ok(None) };
         let seen = seen.to_vec()?;
         let mut text = "time_utc_h,time_m,fitted".to_owned();
@@ -103,7 +96,7 @@ impl Estimate<'_> {
             }
             None => "",
         };
-        let text = self.curve_text(frames)?.unwrap_or_default();
+        let text = self.curve_table(frames)?.unwrap_or_default();
         let mut plots = vec![LinePlot {
             title: "Stokes light curves".to_owned(),
             caption: format!(

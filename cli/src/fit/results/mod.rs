@@ -96,7 +96,9 @@ impl Estimate<'_> {
         let Self { file, instrument, motion, measured, .. } = *self;
         let view = PreviewView { file, instrument, motion, truth: measured.truth.as_ref() };
         let still = view.at(self.time_of_still(), trainer, state)?;
-        self.curve_table(&seen)?;
+        if let Some(table) = self.curve_table(&seen)? {
+            self.folder.file(LIGHT_CURVE)?.write(table.as_bytes())?;
+        }
         let gains = self.gains(&movie, &seen)?;
         let found = Found {
             volume,

@@ -7,6 +7,7 @@ use kerrlight_tomo::fit::settings::AxisSearch;
 use kerrlight_tomo::fit::{Loss, Outcome};
 use kerrlight_tomo::recovery::{Now, compare};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
 impl Kept<'_> {
     /// Logs what a step has done, and tells of what is unusual.
@@ -35,11 +36,8 @@ impl Kept<'_> {
 
     fn line(&self, of: Now<'_, '_>, loss: &Loss) -> Value {
         let Now { settings, measured, true_volume, trainer, state, .. } = of;
-        let map = |names: Vec<&str>, values: &[f64]| -> serde_json::Map<String, Value> {
-            let pairs = names.into_iter().zip(values);
-            pairs.map(|(name, value)| (name.to_owned(), json!(value))).collect()
-        };
-        let chi2 = map(trainer.objective.names(), &loss.terms);
+        let chi2 = trainer.objective.names().into_iter().zip(&loss.terms);
+        let chi2: BTreeMap<&str, &f64> = chi2.collect();
         let now = &state.now;
         let mut line = json!({
             "step": now.step,
