@@ -88,7 +88,7 @@ impl Shot {
             for frame in frames {
                 let camera = film.camera_of(&frame)?;
                 let rendered = film.rendered(frame, factor.unwrap_or(1.0))?;
-                shown.push(self.shown(rendered, camera, film, &files.identity));
+                shown.push(self.shown(rendered, camera, &film, &files.identity));
             }
         }
         Ok(shown)

@@ -189,9 +189,8 @@ fn exact_all_text_is_escaped() {
     page.summary = vec![text(bad)];
     let notice = page.notice.as_mut().unwrap();
     (notice.headline, notice.text) = (text(bad), vec![text(bad)]);
-    let [setting, outcome] = [&mut page.settings[0].key, &mut page.results[0].meaning];
-    (*setting, *outcome) = (text(bad), text(bad));
-    (page.parts[0].heading, page.details[0].links[0]) = (text(bad), text(bad));
+    (page.settings[0].key, page.details[0].links[0]) = (text(bad), text(bad));
+    (page.results[0].meaning, page.parts[0].heading) = (bad, bad);
     page.figures[0].alt = text(bad);
     page.figures[0].caption = text(bad);
     for plot in &mut page.plots {
