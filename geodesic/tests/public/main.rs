@@ -4,6 +4,7 @@ mod capi;
 mod derivatives;
 mod footprint;
 mod hard;
+mod kerr_schild;
 mod misuse;
 mod nodes;
 mod parallel_transport;
