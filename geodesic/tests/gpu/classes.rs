@@ -55,19 +55,25 @@ fn picture(spin: f64, view: View, count: usize, mut draw: impl FnMut() -> (f64, 
     Picture { hole: hole(spin), view, x, y }
 }
 
+/// Pictures of all these spins and inclinations.
+fn pictures(
+    spins: &[f64],
+    degrees: &[f64],
+    count: usize,
+    mut draw: impl FnMut() -> (f64, f64),
+) -> Vec<Picture> {
+    let all = spins.iter().flat_map(|spin| degrees.iter().map(move |degrees| (*spin, *degrees)));
+    all.map(|(spin, degrees)| picture(spin, screen(degrees), count, &mut draw)).collect()
+}
+
 pub fn classes() -> Vec<Class> {
     vec![generic(), polar(), near(), far(), near_critical(), horizon(), cameras()]
 }
 
 fn generic() -> Class {
     let mut random = Random::new(1);
-    let mut pictures = Vec::new();
-    for spin in SPINS {
-        for degrees in [5.0, 17.0, 60.0, 85.0, 90.0] {
-            let draw = || (random.within(-15.0, 15.0), random.within(-15.0, 15.0));
-            pictures.push(picture(spin, screen(degrees), 200, draw));
-        }
-    }
+    let draw = || (random.within(-15.0, 15.0), random.within(-15.0, 15.0));
+    let pictures = pictures(&SPINS, &[5.0, 17.0, 60.0, 85.0, 90.0], 200, draw);
     Class { name: "generic", pictures, allowed: [5e-7, 1e-5], flagged: 0.0 }
 }
 
@@ -110,15 +116,8 @@ fn near() -> Class {
 /// Rays that pass at a distance.
 fn far() -> Class {
     let mut random = Random::new(4);
-    let mut pictures = Vec::new();
-    for spin in [0.0, 0.9] {
-        for degrees in [20.0, 80.0] {
-            let mut draw =
-                || 10f64.powf(random.within(1.0, 5.0)) * random.within(-1.0, 1.0).signum();
-            let (x, y) = (0..200).map(|_| (draw(), draw())).unzip();
-            pictures.push(Picture { hole: hole(spin), view: screen(degrees), x, y });
-        }
-    }
+    let mut draw = || 10f64.powf(random.within(1.0, 5.0)) * random.within(-1.0, 1.0).signum();
+    let pictures = pictures(&[0.0, 0.9], &[20.0, 80.0], 200, || (draw(), draw()));
     Class { name: "far", pictures, allowed: [5e-7, 1e-5], flagged: 0.0 }
 }
 
@@ -160,13 +159,8 @@ fn near_critical() -> Class {
 /// Rays well inside the critical curve, whose last crossings lie next to the horizon.
 fn horizon() -> Class {
     let mut random = Random::new(6);
-    let mut pictures = Vec::new();
-    for spin in [0.0, 0.5, 0.94, 0.998] {
-        for degrees in [30.0, 80.0] {
-            let draw = || (random.within(-2.0, 3.0), random.within(-2.0, 2.0));
-            pictures.push(picture(spin, screen(degrees), 200, draw));
-        }
-    }
+    let draw = || (random.within(-2.0, 3.0), random.within(-2.0, 2.0));
+    let pictures = pictures(&[0.0, 0.5, 0.94, 0.998], &[30.0, 80.0], 200, draw);
     Class { name: "horizon", pictures, allowed: [5e-7, 1e-4], flagged: 0.0 }
 }
 

@@ -25,35 +25,34 @@ fn device() -> Option<Arc<GpuTracer>> {
     opened.as_ref().ok().cloned()
 }
 
-fn print(class: &Class, errors: &mut Errors) {
-    let steps = quantile(&mut errors.steps, 0.5);
-    let most = quantile(&mut errors.steps, 1.0);
-    let Errors { rays, flagged, wrong, .. } = errors;
-    println!(
-        "{}: {rays} rays, {flagged} flagged, {wrong} wrong, {steps} steps ({most} at most)",
-        class.name
-    );
-    for (name, values) in errors.columns() {
-        let [half, most, all] = [0.5, 0.99, 1.0].map(|share| quantile(values, share));
-        println!("    {name:8} {half:8.1e} {most:8.1e} {all:8.1e}");
+/// Prints the errors of a class that half of them, 99 in 100 and all keep, and compares the first two.
+fn judge(name: &str, columns: &mut [(&'static str, &mut Vec<f64>)], allowed: [f64; 2]) {
+    let of = |values: &mut Vec<f64>| [0.5, 0.99, 1.0].map(|share| quantile(values, share));
+    let all: Vec<_> = columns.iter_mut().map(|(column, values)| (*column, of(values))).collect();
+    for (column, [half, most, all]) in &all {
+        println!("    {column:8} {half:8.1e} {most:8.1e} {all:8.1e}");
+    }
+    for (column, errors) in all {
+        for (error, allowed) in errors.into_iter().zip(allowed) {
+            assert!(error <= allowed, "{name}: {column}: {error:e}");
+        }
     }
 }
 
 #[test]
 fn code_errors_by_class() {
     let Some(tracer) = device() else { return };
-    for class in classes() {
+    for Class { name, pictures, allowed, flagged: most } in classes() {
         let mut errors = Errors::default();
-        class.pictures.iter().for_each(|picture| compare(&tracer, picture, &mut errors));
-        print(&class, &mut errors);
-        assert_eq!(errors.wrong, 0, "{}: fates", class.name);
-        assert!(errors.flagged as f64 <= class.flagged * errors.rays as f64, "{}", class.name);
-        for (name, values) in errors.columns() {
-            for (share, allowed) in [0.5, 0.99].into_iter().zip(class.allowed) {
-                let error = quantile(values, share);
-                assert!(error <= allowed, "{}: {name}, {share}: {error:e}", class.name);
-            }
-        }
+        pictures.iter().for_each(|picture| compare(&tracer, picture, &mut errors));
+        let [steps, all] = [0.5, 1.0].map(|share| quantile(&mut errors.steps, share));
+        let Errors { rays, flagged, wrong, .. } = errors;
+        println!(
+            "{name}: {rays} rays, {flagged} flagged, {wrong} wrong, {steps} steps ({all} at most)"
+        );
+        judge(name, &mut errors.columns(), allowed);
+        assert_eq!(wrong, 0, "{name}: fates");
+        assert!(flagged as f64 <= most * rays as f64, "{name}");
     }
 }
 
@@ -61,23 +60,12 @@ fn code_errors_by_class() {
 fn code_paths_are_those_of_the_processor() {
     let Some(tracer) = device() else { return };
     for class in classes() {
-        let mut errors = paths::compare(&tracer, &class);
-        println!(
-            "{}: {} rays, {} unknown, {} wrong",
-            class.name, errors.rays, errors.unknown, errors.wrong
-        );
-        for (name, values) in errors.columns() {
-            let [half, most, all] = [0.5, 0.99, 1.0].map(|share| quantile(values, share));
-            println!("    {name:8} {half:8.1e} {most:8.1e} {all:8.1e}");
-        }
-        assert_eq!(errors.wrong, 0, "{}: fates and events", class.name);
-        assert!(errors.unknown as f64 <= class.flagged * errors.rays as f64, "{}", class.name);
-        for (name, values) in errors.columns() {
-            for (share, allowed) in [(0.5, 2e-7), (0.99, 5e-6)] {
-                let error = quantile(values, share);
-                assert!(error <= allowed, "{}: {name}, {share}: {error:e}", class.name);
-            }
-        }
+        let (name, mut errors) = (class.name, paths::compare(&tracer, &class));
+        let paths::Errors { rays, unknown, wrong, .. } = errors;
+        println!("{name}: {rays} rays, {unknown} unknown, {wrong} wrong");
+        judge(name, &mut errors.columns(), [2e-7, 5e-6]);
+        assert_eq!(wrong, 0, "{name}: fates and events");
+        assert!(unknown as f64 <= class.flagged * rays as f64, "{name}");
     }
 }
 

@@ -99,20 +99,18 @@ fn samples<T: Elementary>(path: &Path<T>, times: &[f64]) -> Vec<[T; 5]> {
     times.iter().map(|time| quantities(&path.at(T::constant(*time)))).collect()
 }
 
-/// Derivatives of everything by five-point differences of 28-digit rays: for a step `h` they leave
-/// out h⁴ times a fifth derivative, and 1e-28/h of rounding. What is left is the rounding of the
-/// dual numbers themselves, a few hundred units in the last place at most.
-fn differences(
-    case: &Case,
+/// Five-point differences of lists of numbers along each of the four parameters: for a step `h` they
+/// leave out h⁴ times a fifth derivative, and the rounding of the numbers over h.
+fn differences<T: Elementary, const N: usize>(
     h: f64,
-    take: impl Fn(&Path<Double>) -> Vec<[Double; 5]>,
-) -> Vec<[[f64; 4]; 5]> {
-    let mut slopes = vec![[[0.0; 4]; 5]; take(&moved_path(case, 0, 0.0)).len()];
+    at: impl Fn(usize, f64) -> Vec<[T; N]>,
+) -> Vec<[[f64; 4]; N]> {
+    let mut slopes = vec![[[0.0; 4]; N]; at(0, 0.0).len()];
     for k in 0..4 {
-        let at = [1.0, -1.0, 2.0, -2.0].map(|steps| take(&moved_path(case, k, steps * h)));
+        let at = [1.0, -1.0, 2.0, -2.0].map(|steps| at(k, steps * h));
         for (p, slope) in slopes.iter_mut().enumerate() {
             for (q, slope) in slope.iter_mut().enumerate() {
-                let [up, down, up2, down2] = [0, 1, 2, 3].map(|side| at[side][p][q]);
+                let [up, down, up2, down2] = [0, 1, 2, 3].map(|side: usize| at[side][p][q]);
                 let (one, two) = ((up - down).value(), (up2 - down2).value());
                 slope[k] = (8.0 * one - two) / (12.0 * h);
             }
@@ -134,6 +132,8 @@ fn compare(what: &str, value: f64, exact: &[f64; 4], expected: &[f64; 4], tolera
     worst
 }
 
+/// Compares with differences of rays of 28 digits: what is left is the rounding of the dual numbers
+/// themselves, a few hundred units in the last place at most.
 fn check(case: &Case, h: f64, tolerance: f64) -> f64 {
     let path = dual_path(case);
     assert!(matches!(path.outcome(), Outcome::Captured | Outcome::Escaped));
@@ -142,7 +142,10 @@ fn check(case: &Case, h: f64, tolerance: f64) -> f64 {
     let label = format!("a {} i {} ({}, {})", case.spin, case.degrees, case.alpha, case.beta);
     let mut worst = 0.0f64;
     let found = [crossings(&path), samples(&path, &times)];
-    let expected = [differences(case, h, crossings), differences(case, h, |p| samples(p, &times))];
+    let expected = [
+        differences(h, |k, step| crossings(&moved_path(case, k, step))),
+        differences(h, |k, step| samples(&moved_path(case, k, step), &times)),
+    ];
     for (kind, (found, expected)) in ["crossing", "sample"].iter().zip(found.iter().zip(&expected))
     {
         assert_eq!(found.len(), expected.len(), "{label}");
@@ -233,32 +236,6 @@ fn traced(case: &Case, place: Place, request: &Request) -> kerrlight_geodesic::R
     traced.unwrap()
 }
 
-/// Five-point differences of all columns with h = 2e-3.
-fn column_differences(
-    case: &Case,
-    place: [f64; 4],
-    request: &Request,
-    crossings: bool,
-) -> Vec<[[f64; 4]; 7]> {
-    let h = 2e-3;
-    let at = |k: usize, steps: f64| {
-        let mut place = place;
-        place[k] += steps * h;
-        columns(&traced(case, place, request), crossings)
-    };
-    let mut slopes = vec![[[0.0; 4]; 7]; at(0, 0.0).len()];
-    for k in 0..4 {
-        let at = [1.0, -1.0, 2.0, -2.0].map(|steps| at(k, steps));
-        for (p, slopes) in slopes.iter_mut().enumerate() {
-            for (q, slope) in slopes.iter_mut().enumerate() {
-                let [up, down, up2, down2] = [0, 1, 2, 3].map(|side: usize| at[side][p][q]);
-                slope[k] = (8.0 * (up - down) - (up2 - down2)) / (12.0 * h);
-            }
-        }
-    }
-    slopes
-}
-
 /// The column API on every placement: the derivative of a point moves with its label. Five-point
 /// differences of doubles with h = 2e-3 leave out 1e-11 of a fifth derivative and 1e-12 of
 /// rounding; what an order of magnitude more of either gives is the tolerance.
@@ -292,7 +269,11 @@ fn exact_columns_of_derivatives_on_every_placement() {
         let found = derivatives::trace(&hole, &observer, &alpha, &beta, 1e-14, &request).unwrap();
         assert_eq!(found.values.uncertainty.len(), 1);
         for crossings in [true, false] {
-            let expected = column_differences(case, place, &request, crossings);
+            let expected = differences(2e-3, |k, step| {
+                let mut place = place;
+                place[k] += step;
+                columns(&traced(case, place, &request), crossings)
+            });
             let values = columns(&found.values, crossings);
             assert!(values.len() == expected.len() && (crossings || !expected.is_empty()));
             let plain = columns(&traced(case, place, &request), crossings);
