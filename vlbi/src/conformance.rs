@@ -126,3 +126,18 @@ pub(super) fn data_term<T: Float>(
     let rest = norm::<T, _>(&moved::<T, _>(&sum, &gradient, -1.5));
     assert!(rest <= tolerance * norm::<T, _>(&gradient), "{name}: weights are off by {rest}");
 }
+
+/// χ² of a model by its degrees of freedom; the squares of residuals, one for each, add up to it within `tolerance`.
+pub(super) fn reduced_chi2(
+    name: &str,
+    term: &dyn DataTerm<f64>,
+    model: &[Complex<f64>],
+    tolerance: f64,
+) -> f64 {
+    let value = term.value_and_gradient(model, 0.0, &mut vec![Complex::default(); model.len()]);
+    let residuals = term.residuals(model);
+    assert_eq!(residuals.len(), term.degrees_of_freedom(), "{name}");
+    let squares: f64 = residuals.iter().map(|residual| residual.value.powi(2)).sum();
+    assert!((squares - value).abs() <= tolerance * value, "{name}: {squares} {value}");
+    value / residuals.len() as f64
+}

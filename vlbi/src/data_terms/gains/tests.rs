@@ -1,7 +1,6 @@
 //! The term of free gains beside those that gains cannot touch.
 
-use super::super::polarized::tests::off;
-use super::super::tests::{observation, of_precision};
+use super::super::tests::{observation, of_precision, off, truth};
 use super::*;
 use crate::array::Station;
 use crate::conformance;
@@ -15,7 +14,7 @@ use rand_pcg::Pcg64Mcg;
 fn scan(seed: u64, snr: f64) -> (Observation, Vec<Complex64>) {
     let mut observation = observation(1, snr, seed);
     observation.stations = (0..7).map(|k| Station::named(&format!("S{k}"))).collect();
-    let truth = observation.rows.iter().map(|row| row.products[0]).collect();
+    let truth = truth(&observation);
     let errors = GainErrors { scan_amplitude: 0.15, random_phases: true, ..GainErrors::default() };
     apply_gains(&mut observation, &errors, seed);
     add_thermal_noise(&mut observation, seed);
@@ -51,13 +50,8 @@ fn exact_degrees_of_freedom() {
             GainTerm::amplitudes(&data, &priors(true)).unwrap(),
         ];
         for (sum, term) in sums.iter_mut().zip(terms) {
-            let term: &dyn DataTerm<f64> = &term;
-            let value = term.value_and_gradient(&truth, 0.0, &mut vec![Complex64::default(); 21]);
-            let residuals = term.residuals(&truth);
-            assert_eq!(residuals.len(), term.degrees_of_freedom());
-            let squares: f64 = residuals.iter().map(|r| r.value * r.value).sum();
-            assert!((squares - value).abs() < 1e-8 * value, "{squares} {value}");
-            *sum += value / term.degrees_of_freedom() as f64 / f64::from(count as u32);
+            let chi2 = conformance::reduced_chi2("gains", &term, &truth, 1e-8);
+            *sum += chi2 / f64::from(count as u32);
         }
     }
     assert!(sums.iter().all(|chi2| (0.95..1.05).contains(chi2)), "{sums:?}");
@@ -115,10 +109,7 @@ fn exact_tangents_touch_the_least_chi2() {
             slopes.iter().zip(&near_slopes).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         assert!(apart < 1e-6 * largest, "{apart:e} {largest:e}");
         conformance::data_term::<f64>("tangent", &tangent, &off(&model), 1e-3, 1e-7);
-        let degrees = DataTerm::<f64>::degrees_of_freedom(&tangent);
-        let residuals = DataTerm::<f64>::residuals(&tangent, &model);
-        let sum: f64 = residuals.iter().map(|r| r.value * r.value).sum();
-        assert!((sum / near - 1.0).abs() < 1e-9 && residuals.len() == degrees, "{sum} {near}");
+        conformance::reduced_chi2("tangent", &tangent, &model, 1e-9);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Products of feeds with leakage and gains.
 
-use super::super::tests::of_precision;
+use super::super::tests::{of_precision, off};
 use super::*;
 use crate::array::built_in;
 use crate::conformance;
@@ -50,13 +50,6 @@ fn priors(data: &Observation) -> GainPriors {
     GainPriors { free_phases: true, amplitude_sigma: vec![0.1; data.stations.len()] }
 }
 
-/// A model that is off by 10 %.
-pub fn off(truth: &[Complex64]) -> Vec<Complex64> {
-    let mut random = Pcg64Mcg::seed_from_u64(12);
-    let mut part = || 0.1 * random.random_range(-1.0..1.0);
-    truth.iter().map(|v| v + Complex64::new(part(), part())).collect()
-}
-
 /// Central differences in both precisions, with gains and without.
 #[test]
 fn exact_gradients_of_products() {
@@ -79,13 +72,7 @@ fn exact_chi_squared_of_the_truth() {
     let priors = priors(&data);
     let value = |data: &Observation, leakage: Option<&SharedLeakage>| {
         let term = PolarizedTerm::new(data, Some(&priors), leakage).unwrap();
-        let n = DataTerm::<f64>::degrees_of_freedom(&term);
-        let mut gradient = vec![Complex64::default(); truth.len()];
-        let squares: f64 = term.residuals(&truth).iter().map(|r| r.value * r.value).sum();
-        let value = term.value_and_gradient(&truth, 1.0, &mut gradient);
-        assert!((value / squares - 1.0).abs() < 1e-9, "{value} {squares}");
-        assert_eq!(term.residuals(&truth).len(), n);
-        value / n as f64
+        conformance::reduced_chi2("products", &term, &truth, 1e-9)
     };
     // What is left is the prior of gains that are off by as much as it allows.
     assert!(value(&data, Some(&leakage)) < 1.0);

@@ -1,16 +1,12 @@
-use super::super::polarized::tests::{off, scan};
-use super::super::tests::of_precision;
+use super::super::polarized::tests::scan;
+use super::super::tests::{of_precision, off};
 use super::*;
 use crate::conformance;
 use crate::noise::{add_thermal_noise, apply_leakage};
 
 fn chi_squared(data: &Observation, model: &[Complex64]) -> f64 {
     let term = RatioTerm::new(data, 0.0).unwrap();
-    let value = term.value_and_gradient(model, 0.0, &mut vec![Complex64::default(); model.len()]);
-    let squares: f64 = term.residuals(model).iter().map(|r| r.value * r.value).sum();
-    assert!((value - squares).abs() <= 1e-12 * squares);
-    assert_eq!(term.residuals(model).len(), DataTerm::<f64>::degrees_of_freedom(&term));
-    value / DataTerm::<f64>::degrees_of_freedom(&term) as f64
+    conformance::reduced_chi2("ratios", &term, model, 1e-12)
 }
 
 /// Central differences in both precisions.
