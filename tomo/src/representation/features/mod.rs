@@ -3,7 +3,7 @@
 mod kernels;
 mod layout;
 #[cfg(test)]
-mod tests;
+pub(in crate::representation) mod tests;
 
 use super::grid::cells::{Geometry, check_box};
 use super::grid::scatter::Scatter;

@@ -1,7 +1,57 @@
 use super::*;
 use crate::representation::conformance::{Subject, check};
+use kerrlight_geodesic::Dual;
 
-/// Interpolation as a sum over all nodes of products of hat functions, and its derivative.
+/// A number with its derivative along a direction.
+pub(in crate::representation) type Number = Dual<f64, 1>;
+
+pub(in crate::representation) fn number(value: f64, slope: f64) -> Number {
+    Dual { value, slope: [slope] }
+}
+
+/// Numbers with their derivatives.
+pub(in crate::representation) fn numbers(
+    values: &[f64],
+    slopes: &[f64],
+) -> impl Iterator<Item = Number> {
+    values.iter().zip(slopes).map(|(value, slope)| number(*value, *slope))
+}
+
+/// The hat function of one of so many nodes from `low` to `high`.
+pub(in crate::representation) fn hat(
+    [low, high]: [f64; 2],
+    nodes: usize,
+    node: usize,
+    at: Number,
+) -> Number {
+    let spacing = (high - low) / (nodes - 1) as f64;
+    let u = (at.value - low) / spacing - node as f64;
+    let slope = if u.abs() < 1.0 { -u.signum() * at.slope[0] / spacing } else { 0.0 };
+    number((1.0 - u.abs()).max(0.0), slope)
+}
+
+/// Sum over all nodes of a parameter times the functions of the node along each axis.
+pub(in crate::representation) fn sum_of_products(
+    [nx, ny, nz]: [usize; 3],
+    parameters: &mut dyn Iterator<Item = Number>,
+    of: impl Fn(usize, usize) -> Number,
+) -> Number {
+    (0..nx * ny * nz).zip(parameters).fold(number(0.0, 0.0), |sum, (node, p)| {
+        sum + p * of(0, node / (ny * nz)) * of(1, node / nz % ny) * of(2, node % nz)
+    })
+}
+
+pub(in crate::representation) fn activated(activation: Activation, x: Number) -> (f64, f64) {
+    let (x, dx) = (x.value, x.slope[0]);
+    let sigmoid = 1.0 / (1.0 + (-x).exp());
+    match activation {
+        Activation::Sigmoid => (sigmoid, dx * sigmoid * (1.0 - sigmoid)),
+        Activation::Softplus => (x.max(0.0) + (-x.abs()).exp().ln_1p(), dx * sigmoid),
+        Activation::Linear => (x, dx),
+    }
+}
+
+/// Interpolation, and its derivative.
 pub(in crate::representation) fn plain(
     settings: &GridSettings,
     p: &[f64],
@@ -9,31 +59,12 @@ pub(in crate::representation) fn plain(
     at: &[f64],
     dat: &[f64],
 ) -> (f64, f64) {
-    if (0..3).any(|k| at[k] < settings.low[k] || at[k] > settings.high[k]) {
+    let GridSettings { nodes, low, high, activation, .. } = settings;
+    if (0..3).any(|k| at[k] < low[k] || at[k] > high[k]) {
         return (0.0, 0.0);
     }
-    let spacing = |k: usize| (settings.high[k] - settings.low[k]) / (settings.nodes[k] - 1) as f64;
-    let hat = |k: usize, node: usize| {
-        let u = (at[k] - settings.low[k]) / spacing(k) - node as f64;
-        let inside = u.abs() < 1.0;
-        let slope = if inside { -u.signum() * dat[k] / spacing(k) } else { 0.0 };
-        ((1.0 - u.abs()).max(0.0), slope)
-    };
-    let [nx, ny, nz] = settings.nodes;
-    let (mut sum, mut change) = (0.0, 0.0);
-    for node in 0..nx * ny * nz {
-        let (x, dx) = hat(0, node / (ny * nz));
-        let (y, dy) = hat(1, node / nz % ny);
-        let (z, dz) = hat(2, node % nz);
-        sum += p[node] * x * y * z;
-        change += dp[node] * x * y * z + p[node] * (dx * y * z + x * dy * z + x * y * dz);
-    }
-    let sigmoid = 1.0 / (1.0 + (-sum).exp());
-    match settings.activation {
-        Activation::Sigmoid => (sigmoid, change * sigmoid * (1.0 - sigmoid)),
-        Activation::Softplus => (sum.exp().ln_1p(), change * sigmoid),
-        Activation::Linear => (sum, change),
-    }
+    let of = |k: usize, node| hat([low[k], high[k]], nodes[k], node, number(at[k], dat[k]));
+    activated(*activation, sum_of_products(*nodes, &mut numbers(p, dp), of))
 }
 
 fn settings(activation: Activation) -> GridSettings {

@@ -1,66 +1,42 @@
 use super::*;
 use crate::representation::Activation;
 use crate::representation::conformance::{Subject, check};
+use crate::representation::features::tests::layer;
+use crate::representation::grid::tests::{Number, activated, number, numbers};
+use kerrlight_geodesic::Elementary;
 
 /// The network and its derivative along a direction, layer by layer with plain loops.
 fn plain(settings: &NetworkSettings, p: &[f64], dp: &[f64], at: &[f64], dat: &[f64]) -> (f64, f64) {
-    let (x, dx) = encode(settings, at, dat);
-    let (mut h, mut dh, mut offset) = (x.clone(), dx.clone(), 0);
-    for layer in 1..=settings.hidden_layers + 1 {
-        let outputs = if layer > settings.hidden_layers { 1 } else { settings.width };
-        let inputs = h.len();
-        let bias = offset + inputs * outputs;
-        let of = |o: usize| {
-            let w = |k: usize| offset + k * outputs + o;
-            let z = (0..inputs).map(|k| h[k] * p[w(k)]).sum::<f64>() + p[bias + o];
-            let dz = (0..inputs).map(|k| dh[k] * p[w(k)] + h[k] * dp[w(k)]).sum::<f64>();
-            (z, dz + dp[bias + o])
-        };
-        let z: Vec<(f64, f64)> = (0..outputs).map(of).collect();
-        offset = bias + outputs;
-        if layer > settings.hidden_layers {
-            return activate(settings, z[0]);
-        }
-        let positive = |(z, dz): &(f64, f64)| if *z > 0.0 { (*z, *dz) } else { (0.0, 0.0) };
-        (h, dh) = z.iter().map(positive).unzip();
-        if settings.skip_after == Some(layer) {
+    let (x, mut p) = (encode(settings, at, dat), numbers(p, dp));
+    let mut h = x.clone();
+    for k in 1..=settings.hidden_layers {
+        h = layer(&mut p, &h, settings.width, false);
+        if settings.skip_after == Some(k) {
             h.extend(&x);
-            dh.extend(&dx);
         }
     }
-    unreachable!("the last layer returns")
+    let last = layer(&mut p, &h, 1, true)[0];
+    activated(settings.activation, last + number(settings.shift, 0.0))
 }
 
-fn encode(settings: &NetworkSettings, at: &[f64], dat: &[f64]) -> (Vec<f64>, Vec<f64>) {
+fn encode(settings: &NetworkSettings, at: &[f64], dat: &[f64]) -> Vec<Number> {
     let scale = |k: usize| match (settings.dimension, k) {
         (4, 0) => settings.time_scale,
         _ => settings.length_scale,
     };
-    let scaled = |v: &[f64]| v.iter().enumerate().map(|(k, v)| v / scale(k)).collect::<Vec<_>>();
-    let (x, dx) = (scaled(at), scaled(dat));
-    let (mut gamma, mut change) = (x.clone(), dx.clone());
+    let scaled = |(k, x): (usize, Number)| x / number(scale(k), 0.0);
+    let x: Vec<Number> = numbers(at, dat).enumerate().map(scaled).collect();
+    let mut gamma = x.clone();
     if let (4, Some(span)) = (settings.dimension, settings.time_span) {
-        (gamma[0], change[0]) = (at[0] / span, dat[0] / span);
+        gamma[0] = number(at[0] / span, dat[0] / span);
     }
     for shift in [0.0, core::f64::consts::FRAC_PI_2] {
         for j in 0..settings.degree {
-            let factor = f64::from(1 << j);
-            gamma.extend(x.iter().map(|x| (factor * x + shift).sin()));
-            change
-                .extend(x.iter().zip(&dx).map(|(x, dx)| factor * dx * (factor * x + shift).cos()));
+            let [factor, shift] = [f64::from(1 << j), shift].map(|x| number(x, 0.0));
+            gamma.extend(x.iter().map(|x| (factor * *x + shift).sin_cos().0));
         }
     }
-    (gamma, change)
-}
-
-fn activate(settings: &NetworkSettings, (z, dz): (f64, f64)) -> (f64, f64) {
-    let z = z + settings.shift;
-    let sigmoid = 1.0 / (1.0 + (-z).exp());
-    match settings.activation {
-        Activation::Sigmoid => (sigmoid, dz * sigmoid * (1.0 - sigmoid)),
-        Activation::Softplus => (z.max(0.0) + (-z.abs()).exp().ln_1p(), dz * sigmoid),
-        Activation::Linear => (z, dz),
-    }
+    gamma
 }
 
 fn conforms(settings: NetworkSettings) {

@@ -1,6 +1,8 @@
 use super::*;
 use crate::fit::linear::Voxels;
+use crate::representation::Activation;
 use crate::representation::conformance::{Subject, check};
+use crate::representation::grid::tests::{activated, number, numbers, sum_of_products};
 
 const LOW: [f64; 3] = [-5.0, -4.0, -3.5];
 const HIGH: [f64; 3] = [5.0, 4.5, 3.0];
@@ -37,18 +39,9 @@ fn plain(degree: Degree, p: &[f64], dp: &[f64], at: &[f64], dat: &[f64]) -> (f64
     let of = |k: usize, node: usize| {
         let u = (at[k] - LOW[k]) / spacing(k) - node as f64;
         let (value, slope) = spline(degree.number(), u);
-        (value, slope * dat[k] / spacing(k))
+        number(value, slope * dat[k] / spacing(k))
     };
-    let [nx, ny, nz] = NODES;
-    let (mut sum, mut change) = (0.0, 0.0);
-    for node in 0..nx * ny * nz {
-        let (x, dx) = of(0, node / (ny * nz));
-        let (y, dy) = of(1, node / nz % ny);
-        let (z, dz) = of(2, node % nz);
-        sum += p[node] * x * y * z;
-        change += dp[node] * x * y * z + p[node] * (dx * y * z + x * dy * z + x * y * dz);
-    }
-    (sum, change)
+    activated(Activation::Linear, sum_of_products(NODES, &mut numbers(p, dp), of))
 }
 
 #[test]
