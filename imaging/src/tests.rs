@@ -113,6 +113,27 @@ least_radius_uas = 5.0
 most_radius_uas = 45.0
 "#;
 
+/// Compares a gradient with differences of fourth order along some of the numbers.
+pub(super) fn assert_slopes(
+    x: &[f64],
+    h: f64,
+    numbers: &[usize],
+    value: impl Fn(&[f64], &mut [f64]) -> f64,
+) {
+    let mut gradient = vec![0.0; x.len()];
+    value(x, &mut gradient);
+    let scale = gradient.iter().fold(0.0f64, |most, g| most.max(g.abs()));
+    for k in numbers.iter().copied() {
+        let at = |step: f64| {
+            let mut x = x.to_vec();
+            x[k] += step;
+            value(&x, &mut vec![0.0; x.len()])
+        };
+        let found = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
+        assert!((found - gradient[k]).abs() < 1e-6 * scale, "{k}: {found} {}", gradient[k]);
+    }
+}
+
 /// Rows without values of a night of M87* at the array of 2017, and hours of UTC of its scans.
 pub(super) fn night() -> (Observation, Vec<f64>) {
     let source: Source = "m87".parse().unwrap();
@@ -232,20 +253,8 @@ fn exact_gradients_of_the_loss() {
     let shape = ring(grid, [43.0, 18.0], [0.5, 0.0], [0.5, 165.0]);
     let mut x = problem.parameters_of(&shape.iter().map(|x| x + 0.05).collect::<Vec<_>>());
     x[1024] = 0.02;
-    let mut gradient = vec![0.0; x.len()];
-    problem.value_and_gradient(&x, &mut gradient);
-    let scale = gradient.iter().fold(0.0f64, |most, g| most.max(g.abs()));
-    for k in [0, 200, 456, 530, 600, 1023, 1024] {
-        let value = |step: f64| {
-            let mut x = x.clone();
-            x[k] += step;
-            problem.value_and_gradient(&x, &mut vec![0.0; x.len()])
-        };
-        let h = 1e-4;
-        let found =
-            (8.0 * (value(h) - value(-h)) - (value(2.0 * h) - value(-2.0 * h))) / (12.0 * h);
-        assert!((found - gradient[k]).abs() < 1e-6 * scale, "{k}: {found} {}", gradient[k]);
-    }
+    let numbers = [0, 200, 456, 530, 600, 1023, 1024];
+    assert_slopes(&x, 1e-4, &numbers, |x, gradient| problem.value_and_gradient(x, gradient));
 }
 
 /// A ring is found from closures and amplitudes with gains: its diameter within three stated errors and 2 µas, its
