@@ -20,11 +20,27 @@ use kerrlight_common::simd::Float;
 use kerrlight_geodesic::vector::{distance, norm};
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use kerrlight_render::dynamics::{AngularVelocity, Axis, Injection, Velocity};
+use kerrlight_render::scene::apply_override;
+use kerrlight_vlbi::array::built_in;
 use kerrlight_vlbi::data_terms::{DataTerm, Residual};
 use kerrlight_vlbi::operator::{Dtft, ImageGrid, Pulse, Transform};
 use num_complex::Complex;
 
 const SIDE: usize = 9;
+
+/// Settings with changes.
+fn changed(text: &str, changes: &[&str]) -> String {
+    let change = |text: String, change: &&str| apply_override(&text, change).unwrap();
+    changes.iter().fold(text.to_owned(), change)
+}
+
+/// The instrument of settings, and what they simulate.
+fn simulated(file: &settings::FitFile) -> (setup::Instrument, setup::FitData) {
+    let instrument = setup::Instrument::new(file).unwrap();
+    let array = file.observation().map(|seen| built_in(&seen.array).unwrap());
+    let measured = setup::FitData::simulated(file, &instrument, array.as_ref()).unwrap();
+    (instrument, measured)
+}
 
 fn lines(delay: bool, momentum: bool) -> (Kerr, Sightlines) {
     let hole = Kerr::new(0.6).unwrap();

@@ -1,9 +1,8 @@
 //! A polarised flare seen through leaking feeds.
 
+use super::{changed, simulated};
 use crate::fit::settings::FitFile;
-use crate::fit::setup::{self, FitData, Instrument};
-use kerrlight_render::scene::apply_override;
-use kerrlight_vlbi::array::built_in;
+use crate::fit::setup::{self, Instrument};
 
 const FLARE: &str = include_str!("../../../../scenes/fits/polarized_flare.toml");
 
@@ -17,18 +16,7 @@ fn file(set: &[&str]) -> FitFile {
         "simulation.truth.spot.0.sigma=1.0",
         "instrument.leakage.rounds=5",
     ];
-    let text = small
-        .iter()
-        .chain(set)
-        .fold(FLARE.to_owned(), |text, assignment| apply_override(&text, assignment).unwrap());
-    FitFile::parse(&text).unwrap()
-}
-
-fn simulated(file: &FitFile) -> (Instrument, FitData) {
-    let instrument = Instrument::new(file).unwrap();
-    let array = built_in(&file.observation().unwrap().array).unwrap();
-    let measured = FitData::simulated(file, &instrument, Some(&array)).unwrap();
-    (instrument, measured)
+    FitFile::parse(&changed(FLARE, &[&small, set].concat())).unwrap()
 }
 
 /// Gradients of the loss with respect to parameters, against central differences.

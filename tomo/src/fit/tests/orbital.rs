@@ -1,11 +1,12 @@
 //! Light curves as data, simulated and measured, and geometries weighed by them.
 
+use super::{changed, simulated};
+use crate::Error;
 use crate::fit::Observable;
 use crate::fit::journal::Forgetful;
 use crate::fit::settings::{DataFiles, FitFile, Steps};
-use crate::fit::setup::{self, FitData, Instrument};
+use crate::fit::setup::{self, BandScan, FitData, Instrument};
 use kerrlight_render::polarization::StokesParameter;
-use kerrlight_render::scene::apply_override;
 use kerrlight_vlbi::files::{light_curve_to_csv, parse_light_curve};
 use kerrlight_vlbi::light_curve::{Flux, LightCurve, Sample};
 
@@ -13,16 +14,19 @@ const PUBLISHED: &str = include_str!("../../../../scenes/fits/orbital_polarimetr
 const TEXTBOOK: &str = include_str!("../../../../scenes/fits/orbital_polarimetry_textbook.toml");
 
 fn file(text: &str, set: &[&str]) -> FitFile {
-    let text = set
-        .iter()
-        .fold(text.to_owned(), |text, assignment| apply_override(&text, assignment).unwrap());
-    FitFile::parse(&text).unwrap()
+    FitFile::parse(&changed(text, set)).unwrap()
 }
 
-fn simulated(file: &FitFile) -> (Instrument, FitData) {
-    let instrument = Instrument::new(file).unwrap();
-    let measured = FitData::simulated(file, &instrument, None).unwrap();
-    (instrument, measured)
+fn scan(file: &FitFile, measured: &FitData, goes_on: bool) -> Result<Option<BandScan>, Error> {
+    let settings = file.band.as_ref().unwrap();
+    setup::scan_band(file, measured, settings, &Forgetful, &|_| goes_on)
+}
+
+/// What settings simulate, and the band in it.
+fn scanned(file: &FitFile) -> Result<(FitData, BandScan), Error> {
+    let measured = FitData::simulated(file, &Instrument::new(file)?, None)?;
+    let found = scan(file, &measured, true)?.unwrap();
+    Ok((measured, found))
 }
 
 /// I has the mean that is asked for, Q and U the errors, and both laws are polarised as they say.
@@ -65,10 +69,7 @@ fn exact_geometries_of_the_published_test() {
     let band = file.band.as_mut().unwrap();
     band.inclinations_deg = Steps { from: 12.0, to: 40.0, step: 28.0 };
     band.radii = Steps { from: 8.0, to: 12.0, step: 2.0 };
-    let (_, measured) = simulated(&file);
-    let settings = file.band.clone().unwrap();
-    let found =
-        setup::scan_band(&file, &measured, &settings, &Forgetful, &|_| true).unwrap().unwrap();
+    let (measured, found) = scanned(&file).unwrap();
     assert_eq!(found.geometries.len(), 4);
     let best = &found.geometries[found.best];
     assert_eq!((best.inclination_deg, best.rotation_factor), (12.0, 1.0));
@@ -81,9 +82,7 @@ fn exact_geometries_of_the_published_test() {
     assert!((azimuth - 230.0).abs() < 8.0, "{azimuth}");
     let degrees = [found.azimuth.low, found.azimuth.high].map(f64::to_degrees);
     assert!((1.0..40.0).contains(&(degrees[1] - degrees[0])), "{degrees:?}");
-    assert!(
-        setup::scan_band(&file, &measured, &settings, &Forgetful, &|_| false).unwrap().is_none()
-    );
+    assert!(scan(&file, &measured, false).unwrap().is_none());
 }
 
 /// Data whose position angles are turned are those of a spin whose position angle is.
@@ -106,14 +105,13 @@ fn exact_position_angles_of_the_spin() {
     if let Some(law) = &mut file.polarization {
         law.turn_deg = 0.0;
     }
-    let settings = file.band.clone().unwrap();
-    let found =
-        setup::scan_band(&file, &measured, &settings, &Forgetful, &|_| true).unwrap().unwrap();
+    let found = scan(&file, &measured, true).unwrap().unwrap();
     assert_eq!(found.geometries[found.best].position_angle_deg, 40.0, "{:?}", found.geometries);
     // The fit that follows turns its images as well.
     let turned = setup::in_band_geometry(&file, 12.0, 40.0);
     assert_eq!(turned.observer.position_angle_deg.value(), 40.0);
-    let refused = setup::check_band(&turned, &measured, &settings).unwrap_err().to_string();
+    let settings = file.band.as_ref().unwrap();
+    let refused = setup::check_band(&turned, &measured, settings).unwrap_err().to_string();
     assert!(refused.starts_with("observer.position_angle_deg = 40"), "{refused}");
 }
 
@@ -202,11 +200,7 @@ fn exact_a_flare_before_a_background() {
         let band = file.band.as_mut().unwrap();
         band.inclinations_deg = Steps { from: 12.0, to: 52.0, step: 20.0 };
         band.radii = Steps { from: 8.0, to: 12.0, step: 2.0 };
-        let (_, measured) = simulated(&file);
-        let settings = file.band.clone().unwrap();
-        let found =
-            setup::scan_band(&file, &measured, &settings, &Forgetful, &|_| true).unwrap().unwrap();
-        (measured, found)
+        scanned(&file).unwrap()
     };
     let (measured, found) = scan(0.3);
     let best = &found.geometries[found.best];
@@ -230,25 +224,8 @@ fn exact_a_flare_before_a_background() {
 #[test]
 fn regress_backgrounds_that_mean_nothing_are_refused() {
     let says = |set: &str| {
-        let text = ["screen.pixels=8", "band.nodes=8", set]
-            .iter()
-            .fold(PUBLISHED.to_owned(), |text, assignment| {
-                apply_override(&text, assignment).unwrap()
-            });
-        let file = match FitFile::parse(&text) {
-            Ok(file) => file,
-            Err(error) => return error.to_string(),
-        };
-        let instrument = Instrument::new(&file).unwrap();
-        let measured = match FitData::simulated(&file, &instrument, None) {
-            Ok(measured) => measured,
-            Err(error) => return error.to_string(),
-        };
-        let settings = file.band.clone().unwrap();
-        setup::scan_band(&file, &measured, &settings, &Forgetful, &|_| true)
-            .err()
-            .unwrap()
-            .to_string()
+        let file = FitFile::parse(&changed(PUBLISHED, &["screen.pixels=8", "band.nodes=8", set]));
+        file.and_then(|file| scanned(&file)).err().unwrap().to_string()
     };
     let of = |constant: &str, variation: &str, minutes: &str| {
         says(&format!(
