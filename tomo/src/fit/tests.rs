@@ -28,6 +28,25 @@ use num_complex::Complex;
 
 const SIDE: usize = 9;
 
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// x + h d.
+pub(super) fn moved(x: &[f64], along: &[f64], h: f64) -> Vec<f64> {
+    x.iter().zip(along).map(|(x, d)| x + h * d).collect()
+}
+
+/// The same along a single one of the numbers.
+pub(super) fn beside(x: &[f64], k: usize, h: f64) -> Vec<f64> {
+    x.iter().enumerate().map(|(j, x)| if j == k { x + h } else { *x }).collect()
+}
+
+/// A central difference.
+pub(super) fn slope(h: f64, mut at: impl FnMut(f64) -> f64) -> f64 {
+    (at(h) - at(-h)) / (2.0 * h)
+}
+
 /// Settings with changes.
 fn changed(text: &str, changes: &[&str]) -> String {
     let change = |text: String, change: &&str| apply_override(&text, change).unwrap();
@@ -187,24 +206,19 @@ impl Case<'_> {
         let gradients = Gradients { parameters: &mut slopes, axis: Some(&mut of_axis) };
         let value = self.loss(&parameters, axis, gradients);
         assert!((value - self.value(&parameters, axis)).abs() < 1e-13 * value);
-        let h = 1e-5;
+        let compare = |difference: f64, slopes: &[f64], way: &[f64]| {
+            let (product, size) = (dot(slopes, way), dot(slopes, slopes).sqrt());
+            assert!((difference - product).abs() < 1e-7 * size.max(1.0), "{difference} {product}");
+        };
         for seed in 1..4 {
             let way: Vec<f64> =
                 (0..slopes.len()).map(|k| (k as f64 * 0.7 * f64::from(seed)).cos()).collect();
-            let at =
-                |h: f64| parameters.iter().zip(&way).map(|(x, d)| x + h * d).collect::<Vec<_>>();
-            let difference = (self.value(&at(h), axis) - self.value(&at(-h), axis)) / (2.0 * h);
-            let product: f64 = slopes.iter().zip(&way).map(|(s, d)| s * d).sum();
-            let size: f64 = slopes.iter().map(|s| s * s).sum::<f64>().sqrt();
-            assert!((difference - product).abs() < 1e-7 * size.max(1.0), "{difference} {product}");
+            let difference = slope(1e-5, |h| self.value(&moved(&parameters, &way, h), axis));
+            compare(difference, &slopes, &way);
         }
         for way in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.3]].map(|way| axis.tangent(way)) {
-            let at = |h: f64| axis.moved(way.map(|x| h * x));
-            let ends = [at(h), at(-h)].map(|axis| self.value(&parameters, axis));
-            let product: f64 = of_axis.iter().zip(way).map(|(s, d)| s * d).sum();
-            let difference = (ends[0] - ends[1]) / (2.0 * h);
-            let size = of_axis.iter().map(|s| s * s).sum::<f64>().sqrt();
-            assert!((difference - product).abs() < 1e-7 * size.max(1.0), "{difference} {product}");
+            let turned = |h: f64| axis.moved(way.map(|x| h * x));
+            compare(slope(1e-5, |h| self.value(&parameters, turned(h))), &of_axis, &way);
         }
     }
 }
@@ -278,9 +292,8 @@ fn exact_gradient_of_a_grid_is_that_of_its_values() {
     let mut slopes = vec![0.0; parameters.len()];
     case.loss(&parameters, axis, Gradients { parameters: &mut slopes, axis: None });
     let way: Vec<f64> = (0..slopes.len()).map(|k| (k as f64 * 0.7).cos()).collect();
-    let at = |h: f64| parameters.iter().zip(&way).map(|(x, d)| x + h * d).collect::<Vec<_>>();
-    let difference = (case.value(&at(1e-5), axis) - case.value(&at(-1e-5), axis)) / 2e-5;
-    let product: f64 = slopes.iter().zip(&way).map(|(s, d)| s * d).sum();
+    let difference = slope(1e-5, |h| case.value(&moved(&parameters, &way, h), axis));
+    let product = dot(&slopes, &way);
     assert!((difference - product).abs() < 1e-7 * product.abs(), "{difference} {product}");
 }
 

@@ -156,6 +156,7 @@ fn births(factor: f64, x: &[f64], prices: &[f64], slopes: &mut [f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::tests::{beside, slope};
 
     fn change(allowed: Allowed) -> Change {
         let knots = Knots { first: 0.0, spacing: 2.0, count: 3, allowed };
@@ -170,12 +171,9 @@ mod tests {
             let mut slopes = [0.0; 6];
             change.penalty(&x, 0.1, 1.0, &[], &mut slopes);
             for k in 0..6 {
-                let at = |step: f64| {
-                    let mut x = x;
-                    x[k] += step;
-                    change.penalty(&x, 0.1, 1.0, &[], &mut [0.0; 6])
-                };
-                let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
+                let difference = slope(1e-6, |h| {
+                    change.penalty(&beside(&x, k, h), 0.1, 1.0, &[], &mut [0.0; 6])
+                });
                 assert!((difference - slopes[k]).abs() < 1e-8, "{allowed:?} {k}");
             }
         }

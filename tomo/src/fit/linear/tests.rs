@@ -3,6 +3,7 @@ use super::data::{Data, Weighted};
 use super::operator::Operator;
 use super::ray_weights::Walk;
 use super::*;
+use crate::fit::tests::{dot, moved, slope};
 use crate::fit::{
     Batch, Field, ForwardModel, FrameTerm, ImageTerm, Motion, Region, Regulariser, Sampling,
     SightlineRequest, Sightlines,
@@ -62,7 +63,7 @@ fn axis() -> Axis {
     Axis::new([0.3, -0.2, 0.9]).unwrap()
 }
 
-fn normal(count: usize, seed: u64) -> Vec<f64> {
+pub(super) fn normal(count: usize, seed: u64) -> Vec<f64> {
     let mut random = Pcg64::seed_from_u64(seed);
     (0..count).map(|_| random.sample::<f64, _>(StandardNormal)).collect()
 }
@@ -155,14 +156,13 @@ fn is_transposed(
     let count = count as f64;
     let x = random(operator.active.count(), 1);
     let seen = images(&operator.active.expand(&x));
-    let square: f64 = seen.iter().map(|pixel| pixel * pixel).sum();
+    let square = dot(&seen, &seen);
     let (value, gradient) = operator.value_and_gradient(&data, &x, false);
     assert!((value * count / square - 1.0).abs() < 1e-12, "{value} {square}");
     // ⟨y, Aᵀ A x⟩ = ⟨A y, A x⟩.
     let y = random(x.len(), 2);
     let others = images(&operator.active.expand(&y));
-    let forward: f64 = others.iter().zip(&seen).map(|(a, b)| a * b).sum();
-    let back: f64 = gradient.iter().zip(&y).map(|(g, y)| 0.5 * count * g * y).sum();
+    let (forward, back) = (dot(&others, &seen), 0.5 * count * dot(&gradient, &y));
     assert!((back / forward - 1.0).abs() < 1e-12, "{back} {forward}");
     // Over all nodes, without the matrix, it is the same.
     let (_, everywhere) = operator.value_and_gradient(&data, &x, true);
@@ -174,7 +174,6 @@ fn is_transposed(
 /// The least value over the box by coordinate descent on the normal equations, run to the last digit: independent of
 /// operator, steps and scaling.
 fn reference(columns: &[Vec<f64>], data: &[f64], upper: f64) -> (Vec<f64>, f64) {
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let squares: Vec<f64> = columns.iter().map(|column| dot(column, column)).collect();
     let (mut x, mut rest) = (vec![0.0f64; columns.len()], data.to_vec());
     for _ in 0..20_000 {

@@ -17,13 +17,11 @@ fn check(trainer: &mut Trainer<'_, f64>, parameters: &[f64], step: u64, turned: 
     assert!((loss.total - data - more).abs() < 1e-12 * loss.total && more > 0.0);
     let way: Vec<f64> = (0..slopes.len()).map(|k| (k as f64 * 0.7).cos()).collect();
     let turn = if turned { axis.tangent([0.2, 1.0, 0.3]) } else { [0.0; 3] };
-    let mut at = |h: f64| {
-        let moved: Vec<f64> = parameters.iter().zip(&way).map(|(x, d)| x + h * d).collect();
+    let difference = slope(1e-5, |h| {
         let axis = axis.moved(turn.map(|x| h * x));
-        trainer.loss(Place { parameters: &moved, axis, occupancy: None, step }, &mut [0.0; 3]).total
-    };
-    let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let parameters = &moved(parameters, &way, h);
+        trainer.loss(Place { parameters, axis, occupancy: None, step }, &mut [0.0; 3]).total
+    });
     let product = dot(&slopes, &way) + dot(&of_axis, &turn);
     assert!((difference - product).abs() < 1e-7 * product.abs(), "{difference} {product}");
 }

@@ -52,14 +52,12 @@ fn exact_gradient_beside_a_quiescent_image_by_differences() {
     let own = parameters.len() - SIDE * SIDE;
     for range in [0..own, own..parameters.len()] {
         let way = |k: usize| if range.contains(&k) { (k as f64 * 0.7).cos() } else { 0.0 };
-        let mut at = |h: f64| {
-            let moved: Vec<f64> =
-                parameters.iter().enumerate().map(|(k, x)| x + h * way(k)).collect();
-            let place = Place { parameters: &moved, axis, occupancy: None, step: 2 };
-            trainer.loss(place, &mut [0.0; 3]).total
-        };
-        let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
-        let product: f64 = slopes.iter().enumerate().map(|(k, g)| g * way(k)).sum();
+        let way: Vec<f64> = (0..parameters.len()).map(way).collect();
+        let difference = slope(1e-5, |h| {
+            let parameters = &moved(&parameters, &way, h);
+            trainer.loss(Place { parameters, ..place }, &mut [0.0; 3]).total
+        });
+        let product = dot(&slopes, &way);
         assert!((difference / product - 1.0).abs() < 1e-6, "{difference} {product}");
     }
 }

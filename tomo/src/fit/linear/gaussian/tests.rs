@@ -1,4 +1,6 @@
 use super::*;
+use crate::fit::linear::tests::normal;
+use crate::fit::tests::{dot, moved};
 use crate::representation::Degree;
 
 fn law(roughness: Roughness, correlation_length: f64) -> Matern {
@@ -21,11 +23,6 @@ fn covariances(field: &GaussianField, node: [usize; 3]) -> Vec<f64> {
     let all = Modes::new(field.shape).sum(&all.collect::<Vec<f64>>());
     let here = field.spread[(node[0] * ny + node[1]) * nz + node[2]];
     all.iter().zip(&field.spread).map(|(x, spread)| x * here * spread).collect()
-}
-
-fn random(count: usize, seed: u64) -> Vec<f64> {
-    let mut random = Pcg64::seed_from_u64(seed);
-    (0..count).map(|_| random.sample::<f64, _>(StandardNormal)).collect()
 }
 
 /// Largest error of the covariance with the middle of the grid, in several directions and far from the edges, in units of
@@ -105,9 +102,9 @@ fn exact_draws_become_white_again() {
         let voxels = Voxels { nodes: [6, 5, 7], ..Voxels::cube(6, 4.0, Degree::Cubic) };
         let field = GaussianField::new(law(roughness, 1.7), &voxels).unwrap();
         let draw = field.drawn(5);
-        let noise: f64 = random(field.count(), 5).iter().map(|x| x * x).sum();
+        let noise = normal(field.count(), 5);
         let value = field.value_and_gradient(&draw, 1.0, &mut vec![0.0; field.count()]);
-        assert!((value / noise - 1.0).abs() < 1e-11, "{value} {noise}");
+        assert!((value / dot(&noise, &noise) - 1.0).abs() < 1e-11, "{value}");
     }
 }
 
@@ -117,16 +114,14 @@ fn exact_slopes_and_second_derivatives_are_differences() {
     for roughness in [Roughness::Half, Roughness::FiveHalves] {
         let field = GaussianField::new(law(roughness, 3.0), &voxels).unwrap();
         let field = field.clone().about(field.drawn(1));
-        let (x, along) = (random(125, 2), random(125, 3));
+        let (x, along) = (normal(125, 2), normal(125, 3));
         let at = |step: f64| {
-            let moved: Vec<f64> = x.iter().zip(&along).map(|(x, d)| x + step * d).collect();
             let mut slopes = vec![0.0; 125];
-            (field.value_and_gradient(&moved, 0.7, &mut slopes), slopes)
+            (field.value_and_gradient(&moved(&x, &along, step), 0.7, &mut slopes), slopes)
         };
-        let dot = |a: &[f64]| a.iter().zip(&along).map(|(a, b)| a * b).sum::<f64>();
         let ([up, down], (_, slopes)) = ([at(1e-4), at(-1e-4)], at(0.0));
         let difference = (up.0 - down.0) / 2e-4;
-        assert!((dot(&slopes) / difference - 1.0).abs() < 1e-6, "{difference}");
+        assert!((dot(&slopes, &along) / difference - 1.0).abs() < 1e-6, "{difference}");
         let mut bent = vec![0.0; 125];
         field.add_curvature(&along, 0.7, &mut bent);
         for (bent, (up, down)) in bent.iter().zip(up.1.iter().zip(&down.1)) {

@@ -55,13 +55,10 @@ fn exact_slopes_of_the_logarithm_are_differences() {
                 let (white, along) = (normal(count, 1), normal(count, 2));
                 let mut slopes = vec![0.0; count];
                 posterior.value_and_gradient(&white, &mut slopes);
-                let mut at = |step: f64| {
-                    let moved = white.iter().zip(&along).map(|(x, d)| x + step * d);
-                    let moved: Vec<f64> = moved.collect();
-                    posterior.value_and_gradient(&moved, &mut vec![0.0; count])
-                };
-                let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
-                let slope: f64 = slopes.iter().zip(&along).map(|(a, b)| a * b).sum();
+                let difference = slope(1e-5, |h| {
+                    posterior.value_and_gradient(&moved(&white, &along, h), &mut vec![0.0; count])
+                });
+                let slope = dot(&slopes, &along);
                 assert!((slope / difference - 1.0).abs() < 1e-6, "{slope} {difference}");
             });
         });
@@ -76,7 +73,6 @@ fn exact_white_numbers_and_slopes_are_transposed() {
     let voxels = Voxels { nodes: [6, 5, 7], ..voxels() };
     let field = GaussianField::at_nodes(law, &voxels).unwrap();
     let (z, y) = (normal(210, 1), normal(210, 2));
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let (there, back) = (dot(&y, &field.of_white(&z)), dot(&field.to_white(&y), &z));
     assert!((there / back - 1.0).abs() < 1e-10, "{there} {back}");
 }

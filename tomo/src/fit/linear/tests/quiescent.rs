@@ -57,10 +57,6 @@ fn images(model: &ForwardModel<f64>, x: &[f64]) -> Vec<f64> {
     movie
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
 /// ⟨A x, y⟩ = ⟨x, Aᵀ y⟩ with rows that are kept and with walks, where some voxels count or all; and A x are the images of
 /// the representation.
 #[test]
@@ -101,8 +97,7 @@ fn exact_slopes_beside_a_quiescent_image() {
         let direction = random(problem.unknowns(), 2);
         let (mut gradient, h) = (Vec::new(), 1e-5);
         let mut at = |s: f64| {
-            let moved: Vec<f64> = x.iter().zip(&direction).map(|(x, d)| x + s * d).collect();
-            let value = objective.value_and_gradient(&moved, &mut gradient);
+            let value = objective.value_and_gradient(&moved(&x, &direction, s), &mut gradient);
             (value, dot(&gradient, &direction))
         };
         let (after, before, (_, slope)) = (at(h), at(-h), at(0.0));

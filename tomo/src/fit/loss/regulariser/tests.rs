@@ -1,6 +1,7 @@
 //! Values of fields that are known, gradients by differences.
 
 use super::*;
+use crate::fit::tests::{dot, moved, slope};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -17,15 +18,13 @@ fn random(seed: u64) -> Vec<f64> {
 fn exact_gradients_are_central_differences() {
     let (values, along) = (random(1), random(2));
     for regulariser in ALL {
-        let at = |step: f64| -> f64 {
-            let moved: Vec<f64> = values.iter().zip(&along).map(|(x, d)| x + step * d).collect();
-            regulariser.value_and_gradient(&moved, SHAPE, 1.7, &mut vec![0.0; moved.len()])
-        };
         let mut gradient = vec![0.0; values.len()];
         regulariser.value_and_gradient(&values, SHAPE, 1.7, &mut gradient);
-        let slope: f64 = gradient.iter().zip(&along).map(|(g, d)| g * d).sum();
-        let step = 1e-5;
-        let difference = (at(step) - at(-step)) / (2.0 * step);
+        let difference = slope(1e-5, |h| {
+            let moved = moved(&values, &along, h);
+            regulariser.value_and_gradient(&moved, SHAPE, 1.7, &mut vec![0.0; moved.len()])
+        });
+        let slope = dot(&gradient, &along);
         let error = (slope - difference).abs() / slope.abs();
         assert!(error < 1e-7, "{regulariser:?}: {slope} {difference}");
     }
