@@ -47,6 +47,14 @@ pub(super) fn slope(h: f64, mut at: impl FnMut(f64) -> f64) -> f64 {
     (at(h) - at(-h)) / (2.0 * h)
 }
 
+/// All images of a field.
+pub(super) fn images(model: &ForwardModel<f64>, field: Field<'_, f64>) -> Vec<f64> {
+    let frames: Vec<usize> = (0..model.frames()).collect();
+    let mut movie = vec![0.0; frames.len() * model.pixels()];
+    model.movie(field, &frames, &mut Batch::default(), &mut Workspace::new(), &mut movie);
+    movie
+}
+
 /// Settings with changes.
 fn changed(text: &str, changes: &[&str]) -> String {
     let change = |text: String, change: &&str| apply_override(&text, change).unwrap();

@@ -4,12 +4,11 @@ use super::*;
 use crate::fit::RingRays;
 use crate::fit::forward::pixel_rays::PixelRays;
 use crate::fit::linear::{Change, StopRule, Weighted};
-use crate::fit::tests::Blobs;
+use crate::fit::tests::{Blobs, images};
 use crate::fit::{
     Batch, Field, ForwardModel, FrameTerm, ImageTerm, Motion, Observable, Redshift, Region,
 };
-use crate::representation::Degree;
-use crate::representation::{Representation, Workspace};
+use crate::representation::{Degree, Representation};
 use core::f64::consts::{FRAC_PI_2, PI};
 use kerrlight_render::dynamics::{AngularVelocity, Axis};
 use rand::{RngExt, SeedableRng};
@@ -56,14 +55,6 @@ fn parameters(blobs: Blobs) -> (Blobs, Vec<f64>) {
     let mut parameters = vec![0.0; Representation::parameters(&blobs)];
     blobs.initialise(5, &mut parameters);
     (blobs, parameters)
-}
-
-fn images(forward: &ForwardModel<f64>, field: Field<'_, f64>) -> Vec<f64> {
-    let frames: Vec<usize> = (0..forward.frames()).collect();
-    let mut movie = vec![0.0; frames.len() * forward.pixels()];
-    let (mut batch, mut workspace) = (Batch::default(), Workspace::new());
-    forward.movie(field, &frames, &mut batch, &mut workspace, &mut movie);
-    movie
 }
 
 #[test]

@@ -3,13 +3,12 @@ use super::data::{Data, Weighted};
 use super::operator::Operator;
 use super::ray_weights::Walk;
 use super::*;
-use crate::fit::tests::{dot, moved, slope};
+use crate::fit::tests::{beside, dot, images, moved, slope};
 use crate::fit::{
-    Batch, Field, ForwardModel, FrameTerm, ImageTerm, Motion, Region, Regulariser, Sampling,
+    Field, ForwardModel, FrameTerm, ImageTerm, Motion, Region, Regulariser, Sampling,
     SightlineRequest, Sightlines,
 };
-use crate::representation::Degree;
-use crate::representation::{Knots, Workspace};
+use crate::representation::{Degree, Knots};
 use core::ops::ControlFlow;
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use kerrlight_render::dynamics::{AngularVelocity, Axis, Velocity};
@@ -105,10 +104,13 @@ pub(in crate::fit) fn movie_about(
     x: &[f64],
 ) -> Vec<f64> {
     let grid = voxels.field().unwrap();
-    let field = Field { representation: &grid, parameters: x, axis, occupancy: None };
-    let mut movie = vec![0.0; FRAMES.len() * model.pixels()];
-    model.movie(field, &FRAMES, &mut Batch::default(), &mut Workspace::new(), &mut movie);
-    movie
+    images(model, Field { representation: &grid, parameters: x, axis, occupancy: None })
+}
+
+/// Images of each node alone.
+fn columns(model: &ForwardModel<f64>, voxels: &Voxels) -> Vec<Vec<f64>> {
+    let dark = vec![0.0; voxels.count()];
+    (0..dark.len()).map(|k| movie(model, voxels, &beside(&dark, k, 1.0))).collect()
 }
 
 fn operator<'a>(
@@ -197,16 +199,10 @@ fn reference(columns: &[Vec<f64>], data: &[f64], upper: f64) -> (Vec<f64>, f64) 
 #[test]
 fn exact_solution_and_gap_of_a_dense_problem() {
     let (model, voxels, upper) = (forward_model(), Voxels::cube(5, 5.0, Degree::Linear), 0.8);
-    let unit = |k: usize| {
-        let mut x = vec![0.0; voxels.count()];
-        x[k] = 1.0;
-        movie(&model, &voxels, &x)
-    };
-    let columns: Vec<Vec<f64>> = (0..voxels.count()).map(unit).collect();
     let mut pixels = movie(&model, &voxels, &random(voxels.count(), 7));
     let noise = random(pixels.len(), 8);
     pixels.iter_mut().zip(noise).for_each(|(pixel, n)| *pixel += 2.0 * (n - 0.5));
-    let (_, least) = reference(&columns, &pixels, upper);
+    let (_, least) = reference(&columns(&model, &voxels), &pixels, upper);
     let term = ImageTerm::new(pixels, model.pixels(), 1.0).unwrap();
     let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
     let problem = LinearProblem { upper, ..of_images(&model, &terms, voxels) };

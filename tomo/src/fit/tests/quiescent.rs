@@ -67,13 +67,8 @@ fn exact_gradient_beside_a_quiescent_image_by_differences() {
 fn exact_the_image_is_added_to_every_frame() {
     let (representation, parameters) = (beside(), lit());
     let axis = Axis::new([0.3, -0.5, 0.8]).unwrap();
-    let mut buffers = Buffers::default();
-    let mut movie = |model: &ForwardModel<f64>, representation, parameters: &[f64]| {
-        let field = Field { representation, parameters, axis, occupancy: None };
-        let mut movie = vec![0.0; 4 * SIDE * SIDE];
-        let Buffers { batch, workspace, .. } = &mut buffers;
-        model.movie(field, &[0, 1, 2, 3], batch, workspace, &mut movie);
-        movie
+    let movie = |model: &ForwardModel<f64>, representation, parameters: &[f64]| {
+        images(model, Field { representation, parameters, axis, occupancy: None })
     };
     let mut plain = forward_model::<f64>(true, true);
     plain.weigh(axis);

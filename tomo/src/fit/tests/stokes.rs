@@ -286,10 +286,9 @@ fn exact_fluxes_are_sums_of_images() {
     let grid = Voxels::cube(7, 12.0, Degree::Linear).field().unwrap();
     let parameters: Vec<f64> = (0..343).map(|k| (0.37 * f64::from(k)).sin().abs()).collect();
     let field = Field { representation: &grid, parameters: &parameters, axis, occupancy: None };
-    let mut movie = vec![0.0; 9];
-    flux.movie(field, &[0, 1, 2], &mut Batch::default(), &mut Workspace::new(), &mut movie);
+    let movie = super::images(&flux, field);
     // Data of exactly these fluxes are explained by exactly these voxels.
-    let term = ImageTerm::new(movie.clone(), 3, 1e-3).unwrap();
+    let term = ImageTerm::new(movie, 3, 1e-3).unwrap();
     let problem = LinearProblem {
         model: &flux,
         axis,

@@ -4,7 +4,6 @@ use super::super::change::Change;
 use super::*;
 use crate::fit::Region;
 use crate::fit::linear::StopRule;
-use crate::representation::Degree;
 use crate::representation::{Allowed, Carrier, Changing};
 use kerrlight_render::dynamics::{AngularVelocity, Velocity};
 
@@ -40,9 +39,7 @@ fn changing_of(velocity: AngularVelocity, voxels: &Voxels, knots: Knots) -> Chan
 
 fn images(model: &ForwardModel<f64>, field: &Changing<f64>, x: &[f64]) -> Vec<f64> {
     let field = Field { representation: field, parameters: x, axis: axis(), occupancy: None };
-    let mut movie = vec![0.0; FRAMES.len() * model.pixels()];
-    model.movie(field, &FRAMES, &mut Batch::default(), &mut Workspace::new(), &mut movie);
-    movie
+    super::images(model, field)
 }
 
 /// ‖A x‖² by the sparse matrix, where all nodes or some count, is that of the representation's images; so is its transpose.

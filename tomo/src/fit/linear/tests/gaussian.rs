@@ -16,6 +16,10 @@ fn prior(roughness: Roughness) -> GaussianField {
     GaussianField::new(law, &voxels()).unwrap()
 }
 
+fn noisy(data: &[f64], seed: u64) -> Vec<f64> {
+    moved(data, &normal(data.len(), seed), SIGMA)
+}
+
 /// The data of a field that the prior gives.
 struct Simulated {
     model: ForwardModel<f64>,
@@ -25,10 +29,8 @@ struct Simulated {
 impl Simulated {
     fn new(prior: &GaussianField) -> Self {
         let model = forward_model();
-        let mut data = movie(&model, &voxels(), &prior.drawn(3));
-        let noise = normal(data.len(), 4);
-        data.iter_mut().zip(noise).for_each(|(pixel, n)| *pixel += SIGMA * n);
-        Self { model, data }
+        let clean = movie(&model, &voxels(), &prior.drawn(3));
+        Self { model, data: noisy(&clean, 4) }
     }
 
     /// Hands the problem of some data to a function.
@@ -55,12 +57,8 @@ impl Simulated {
 
     /// The matrix from voxels to pixels.
     fn matrix(&self) -> DMatrix<f64> {
-        let column = |k: usize| {
-            let mut unit = vec![0.0; voxels().count()];
-            unit[k] = 1.0;
-            DVector::from_vec(movie(&self.model, &voxels(), &unit))
-        };
-        DMatrix::from_columns(&(0..voxels().count()).map(column).collect::<Vec<_>>())
+        let columns = columns(&self.model, &voxels()).into_iter().map(DVector::from_vec);
+        DMatrix::from_columns(&columns.collect::<Vec<_>>())
     }
 }
 
@@ -68,9 +66,8 @@ impl Simulated {
 fn precision(prior: &GaussianField) -> DMatrix<f64> {
     let n = prior.count();
     let column = |k: usize| {
-        let (mut unit, mut out) = (vec![0.0; n], vec![0.0; n]);
-        unit[k] = 1.0;
-        prior.add_curvature(&unit, 0.5, &mut out);
+        let mut out = vec![0.0; n];
+        prior.add_curvature(&beside(&out, k, 1.0), 0.5, &mut out);
         DVector::from_vec(out)
     };
     DMatrix::from_columns(&(0..n).map(column).collect::<Vec<_>>())
@@ -85,8 +82,7 @@ fn exact_solutions_are_those_of_the_normal_equations() {
         let simulated = Simulated::new(&prior);
         let (a, q) = (simulated.matrix(), precision(&prior));
         let bend = a.transpose() * &a / (SIGMA * SIGMA) + &q;
-        let noise = normal(simulated.data.len(), 9);
-        let data: Vec<f64> = simulated.data.iter().zip(noise).map(|(d, n)| d + SIGMA * n).collect();
+        let data = noisy(&simulated.data, 9);
         let center = prior.drawn(10);
         let right = a.transpose() * DVector::from_vec(data.clone()) / (SIGMA * SIGMA)
             + &q * DVector::from_vec(center.clone());
@@ -111,8 +107,7 @@ fn exact_draws_have_the_covariance_of_the_posterior() {
     let (draws, n) = (400, prior.count());
     let mut squares = vec![0.0; n];
     for seed in 0..draws {
-        let noise = normal(simulated.data.len(), 100 + seed);
-        let data: Vec<f64> = simulated.data.iter().zip(noise).map(|(d, n)| d + SIGMA * n).collect();
+        let data = noisy(&simulated.data, 100 + seed);
         let center = prior.drawn(1000 + seed);
         let draw = simulated.solution(&data, &prior.clone().about(center)).emission;
         for (square, (x, best)) in squares.iter_mut().zip(draw.iter().zip(&best)) {

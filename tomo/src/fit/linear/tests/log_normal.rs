@@ -19,9 +19,8 @@ fn prior(roughness: Roughness) -> LogNormalField {
 /// Hands the problem of data with a noise of `sigma` to a function.
 fn with<R>(sigma: f64, truth: &[f64], f: impl FnOnce(&LinearProblem<'_, f64>) -> R) -> R {
     let model = forward_model();
-    let mut data = movie(&model, &voxels(), truth);
-    let noise = normal(data.len(), 4);
-    data.iter_mut().zip(noise).for_each(|(pixel, n)| *pixel += sigma * n);
+    let clean = movie(&model, &voxels(), truth);
+    let data = moved(&clean, &normal(clean.len(), 4), sigma);
     let term = ImageTerm::new(data, model.pixels(), sigma).unwrap();
     f(&of_images(&model, &[Weighted { weight: 1.0, term: &term }], voxels()))
 }

@@ -49,12 +49,8 @@ fn problem<'a>(
 /// Images of values at all nodes, and of the image behind them, by way of the representation.
 fn images(model: &ForwardModel<f64>, x: &[f64]) -> Vec<f64> {
     let grid = Box::new(Voxels::cube(6, 5.0, Degree::Linear).field().unwrap());
-    let representation = WithStaticImage::new(grid, model.quiescent().unwrap());
-    let representation = &representation;
-    let field = Field { representation, parameters: x, axis: axis(), occupancy: None };
-    let mut movie = vec![0.0; FRAMES.len() * model.pixels()];
-    model.movie(field, &FRAMES, &mut Batch::default(), &mut Workspace::new(), &mut movie);
-    movie
+    let representation = &WithStaticImage::new(grid, model.quiescent().unwrap());
+    super::images(model, Field { representation, parameters: x, axis: axis(), occupancy: None })
 }
 
 /// ⟨A x, y⟩ = ⟨x, Aᵀ y⟩ with rows that are kept and with walks, where some voxels count or all; and A x are the images of

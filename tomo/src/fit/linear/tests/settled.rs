@@ -13,9 +13,8 @@ fn exact_few_nodes_that_shine_are_as_good_as_all() {
     for (k, x) in [(300, 2.0), (301, 1.0), (432, 3.0), (520, 0.7)] {
         truth[k] = x;
     }
-    let mut data = movie(&model, &voxels, &truth);
-    let noise = normal(data.len(), 5);
-    data.iter_mut().zip(noise).for_each(|(pixel, n)| *pixel += 0.05 * n);
+    let clean = movie(&model, &voxels, &truth);
+    let data = moved(&clean, &normal(clean.len(), 5), 0.05);
     let term = ImageTerm::new(data, model.pixels(), 0.05).unwrap();
     let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
     let problem = of_images(&model, &terms, voxels);
