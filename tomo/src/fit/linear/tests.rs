@@ -87,6 +87,10 @@ fn of_images<'a>(
     }
 }
 
+fn solved(problem: &LinearProblem<'_, f64>, settings: LinearSettings) -> LinearSolution<f64> {
+    problem.solve(&settings, &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
 fn random(count: usize, seed: u64) -> Vec<f64> {
     let mut random = Pcg64::seed_from_u64(seed);
     (0..count).map(|_| random.random::<f64>()).collect()
@@ -206,23 +210,17 @@ fn exact_solution_and_gap_of_a_dense_problem() {
     let term = ImageTerm::new(pixels, model.pixels(), 1.0).unwrap();
     let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
     let problem = LinearProblem { upper, ..of_images(&model, &terms, voxels) };
-    let solve = |iterations, coarse| {
-        let settings =
-            LinearSettings { coarse, iterations, tolerance: 1e-9, ..LinearSettings::default() };
-        problem.solve(&settings, &mut |_| ControlFlow::Continue(())).unwrap()
-    };
+    let of = |iterations| LinearSettings { iterations, tolerance: 1e-9, ..Default::default() };
     let coarse = Some(Coarse { nodes: 4, stride: 2, iterations: 5 });
     // Where noise is all that is left, a round ends early, with a value that noise would not tell from the least.
     let count = term.degrees_of_freedom(0) * FRAMES.len();
-    let settings = LinearSettings { settled: 0.1, tolerance: 0.0, ..LinearSettings::default() };
-    let go_on = &mut |_: &LinearProgress| ControlFlow::Continue(());
-    let settled = problem.solve(&LinearSettings { iterations: 1500, ..settings }, go_on).unwrap();
+    let settled = solved(&problem, LinearSettings { settled: 0.1, tolerance: 0.0, ..of(1500) });
     assert_eq!(settled.ending, Ending::Settled);
     let value = settled.certificate.unwrap().value;
     assert!(settled.evaluations < 200 && value > least, "{}", settled.evaluations);
     assert!(value < least * (1.0 + (2.0 / count as f64).sqrt()), "{value} {least}");
     for coarse in [None, coarse] {
-        let solution = solve(1500, coarse);
+        let solution = solved(&problem, LinearSettings { coarse, ..of(1500) });
         let certificate = solution.certificate.unwrap();
         let excess = certificate.value - least;
         assert!(excess.abs() < 1e-6 * certificate.dark, "{coarse:?}: {excess:e}");
@@ -232,7 +230,7 @@ fn exact_solution_and_gap_of_a_dense_problem() {
         let misfit = problem.misfit(&solution.emission).unwrap();
         assert!((misfit / certificate.value - 1.0).abs() < 1e-12, "{misfit}");
         // Far from the minimum the gap still bounds what is missing.
-        let rough = solve(3, coarse).certificate.unwrap();
+        let rough = solved(&problem, LinearSettings { coarse, ..of(3) }).certificate.unwrap();
         assert!(rough.value - least <= rough.gap && rough.value > certificate.value);
     }
 }
@@ -249,7 +247,7 @@ fn exact_threads_change_no_bit() {
         let problem = LinearProblem { upper: 2.0, priors, ..of_images(&model, &terms, voxels) };
         let settings = LinearSettings { coarse: None, memory, ..LinearSettings::default() };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| problem.solve(&settings, &mut |_| ControlFlow::Continue(()))).unwrap()
+        pool.install(|| solved(&problem, settings))
     };
     let (one, many) = (run(1, usize::MAX), run(5, usize::MAX));
     assert_eq!(one.emission, many.emission);

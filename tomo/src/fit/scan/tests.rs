@@ -16,20 +16,12 @@ fn exact_lattice_covers_the_sphere() {
     assert!(mean.iter().all(|m| m.abs() < 2e-3), "{mean:?}");
 }
 
-fn scan_of(
-    terms: &[Weighted<'_, f64>],
-    settings: &AxisSettings,
-) -> Result<Option<AxisScan>, Error> {
-    let problem = AxisProblem {
-        model: &forward_model(),
-        frames: &FRAMES,
-        terms,
-        half_width: 5.0,
-        upper: 2.0,
-        flux: None,
-        priors: &[],
-    };
-    search(&problem, settings, &|_, _| true)
+fn problem<'a>(
+    model: &'a ForwardModel<f64>,
+    terms: &'a [Weighted<'a, f64>],
+) -> AxisProblem<'a, f64> {
+    let (half_width, upper) = (5.0, 2.0);
+    AxisProblem { model, frames: &FRAMES, terms, half_width, upper, flux: None, priors: &[] }
 }
 
 const SMALL: AxisSettings = AxisSettings {
@@ -45,7 +37,8 @@ const SMALL: AxisSettings = AxisSettings {
 fn exact_losses_that_are_all_the_same_are_refused() {
     let term = ImageTerm::new(vec![0.0; 5 * 81], 81, 1.0).unwrap();
     let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
-    let error = scan_of(&terms, &SMALL).unwrap_err();
+    let model = forward_model();
+    let error = search(&problem(&model, &terms), &SMALL, &|_, _| true).unwrap_err();
     let Error::Linear(error) = error else { panic!("{error}") };
     assert_eq!(error, LinearError::Alike { axes: 40, loss: 0.0 });
 }
@@ -59,7 +52,7 @@ fn exact_axis_of_amplitudes_and_closure_phases() {
     let movie = movie_about(truth, &model, &voxels, &spot(&voxels));
     let data = [Observable::Amplitudes, Observable::Phases].map(|seen| array(&movie, seen));
     let terms = [0, 1].map(|k| Weighted { weight: 1.0, term: &data[k] as &dyn FrameTerm<f64> });
-    let scan = scan_of(&terms, &SMALL).unwrap().unwrap();
+    let scan = search(&problem(&model, &terms), &SMALL, &|_, _| true).unwrap().unwrap();
     assert!(scan.map.iter().all(|at| at.loss.is_finite() && at.loss > 0.0));
     assert!(scan.best.axis.dot(truth) > 0.9, "{:?}", scan.best);
 }
@@ -76,15 +69,8 @@ fn exact_axis_of_its_own_movie_on_any_number_of_threads() {
     let field: Vec<f64> = (0..voxels.count()).map(light).collect();
     let pixels = movie_about(truth, &model, &voxels, &field);
     let term = ImageTerm::new(pixels, model.pixels(), 1.0).unwrap();
-    let problem = AxisProblem {
-        model: &model,
-        frames: &FRAMES,
-        terms: &[Weighted { weight: 1.0, term: &term }],
-        half_width: 5.0,
-        upper: 2.0,
-        flux: None,
-        priors: &[],
-    };
+    let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
+    let problem = problem(&model, &terms);
     let settings = AxisSettings {
         directions: 60,
         coarse: Effort { nodes: 8, iterations: 10 },

@@ -96,7 +96,7 @@ fn solve(model: &ForwardModel<f64>, pixels: Vec<f64>, change: Change) -> LinearS
         tolerance: 1e-7,
         ..LinearSettings::default()
     };
-    problem.solve(&settings, &mut |_| ControlFlow::Continue(())).unwrap()
+    solved(&problem, settings)
 }
 
 /// A field that is born, or appears and fades, explains images of it; a field that matter carries unchanged does not. A
@@ -161,7 +161,7 @@ fn exact_sharpened_births_keep_their_light() {
         let problem = LinearProblem { change, upper: 2.0, ..of_images(&model, &terms, voxels) };
         let settings =
             LinearSettings { iterations: 400, coarse: None, ..LinearSettings::default() };
-        let found = problem.solve(&settings, &mut |_| ControlFlow::Continue(())).unwrap();
+        let found = solved(&problem, settings);
         let light: f64 = found.emission[voxels.count()..].iter().sum();
         light / truth.iter().sum::<f64>()
     };

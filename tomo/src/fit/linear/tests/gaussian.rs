@@ -50,9 +50,7 @@ impl Simulated {
     fn solution(&self, data: &[f64], prior: &GaussianField) -> LinearSolution<f64> {
         let settings =
             LinearSettings { iterations: 3000, tolerance: 1e-10, ..LinearSettings::default() };
-        self.with(data, prior, |problem| {
-            problem.solve(&settings, &mut |_| ControlFlow::Continue(())).unwrap()
-        })
+        self.with(data, prior, |problem| solved(problem, settings))
     }
 
     /// The matrix from voxels to pixels.

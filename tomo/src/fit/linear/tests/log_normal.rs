@@ -25,7 +25,7 @@ fn with<R>(sigma: f64, truth: &[f64], f: impl FnOnce(&LinearProblem<'_, f64>) ->
     f(&of_images(&model, &[Weighted { weight: 1.0, term: &term }], voxels()))
 }
 
-fn solved(problem: &LinearProblem<'_, f64>, prior: &LogNormalField) -> LinearSolution<f64> {
+fn most_probable(problem: &LinearProblem<'_, f64>, prior: &LogNormalField) -> LinearSolution<f64> {
     let settings =
         LinearSettings { iterations: 3000, tolerance: 1e-9, ..LinearSettings::default() };
     problem.solve_log_normal(prior, &settings, &mut |_| ControlFlow::Continue(())).unwrap()
@@ -82,7 +82,7 @@ fn exact_the_most_probable_field_is_stationary() {
     let prior = prior(Roughness::FiveHalves);
     let truth = prior.drawn(3);
     with(0.02, &truth, |problem| {
-        let found = solved(problem, &prior);
+        let found = most_probable(problem, &prior);
         assert_eq!((found.certificate, found.quiescent.len()), (None, 0));
         let flatness = found.stationarity.unwrap();
         assert!(flatness.relative_violation() < 1e-7, "{flatness:?}");
@@ -98,7 +98,7 @@ fn exact_data_that_say_nothing_leave_the_draw() {
     let prior = prior(Roughness::Half);
     let draw = prior.drawn(11);
     with(1e9, &draw, |problem| {
-        let found = solved(problem, &prior.clone().about(11));
+        let found = most_probable(problem, &prior.clone().about(11));
         for (found, expected) in found.emission.iter().zip(&draw) {
             assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
         }
@@ -116,10 +116,10 @@ fn exact_small_amplitudes_are_gaussian() {
     let of_emission = Matern { mean: scale, amplitude: scale * law.amplitude, ..law };
     let gaussian = GaussianField::at_nodes(of_emission, &voxels()).unwrap();
     with(1e-4, &prior.drawn(3), |problem| {
-        let found = solved(problem, &prior);
+        let found = most_probable(problem, &prior);
         let settings = LinearSettings { iterations: 3000, tolerance: 1e-10, ..Default::default() };
         let problem = LinearProblem { gaussian: Some(&gaussian), ..*problem };
-        let linear = problem.solve(&settings, &mut |_| ControlFlow::Continue(())).unwrap();
+        let linear = solved(&problem, settings);
         for (found, linear) in found.emission.iter().zip(&linear.emission) {
             let [found, linear] = [found, linear].map(|e| (e / scale - 1.0) / law.amplitude);
             assert!((found - linear).abs() < 1e-2, "{found} {linear}");

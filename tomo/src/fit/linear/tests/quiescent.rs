@@ -130,7 +130,7 @@ fn exact_certificates_beside_a_quiescent_image() {
         let solve = |iterations, coarse| {
             let settings =
                 LinearSettings { coarse, iterations, tolerance: 1e-8, ..LinearSettings::default() };
-            problem.solve(&settings, &mut |_| ControlFlow::Continue(())).unwrap()
+            solved(&problem, settings)
         };
         let least = solve(3000, None).certificate.unwrap();
         assert!(least.relative_gap() < 1e-5, "{least:?}");
@@ -170,7 +170,7 @@ fn exact_what_does_not_move_is_told_apart() {
         tolerance: 1e-7,
         ..LinearSettings::default()
     };
-    let found = problem.solve(&settings, &mut |_| ControlFlow::Continue(())).unwrap();
+    let found = solved(&problem, settings);
     let correlation = |a: &[f64], b: &[f64]| dot(a, b) / (dot(a, a) * dot(b, b)).sqrt();
     let (fields, light) = truth.split_at(truth.len() - 81);
     let [moving, still] =
