@@ -2,7 +2,12 @@ use super::super::fits::{Cards, padded};
 use super::*;
 
 /// Two rows of three pixels, the southern row first, of each plane, with more cards.
-fn image(east_step: f64, planes: usize, first: bool, more: impl Fn(&mut Cards)) -> Vec<u8> {
+fn image(
+    east_step: f64,
+    planes: usize,
+    first: bool,
+    more: impl Fn(&mut Cards) -> &mut Cards,
+) -> Vec<u8> {
     let mut cards = Cards::default();
     if first {
         cards.value("SIMPLE", "T");
@@ -21,11 +26,11 @@ fn image(east_step: f64, planes: usize, first: bool, more: impl Fn(&mut Cards)) 
 }
 
 fn file(east_step: f64) -> Vec<u8> {
-    image(east_step, 1, true, |_| {})
+    image(east_step, 1, true, |cards| cards)
 }
 
 /// Returns the message with which a file with these cards is refused.
-fn refused(more: impl Fn(&mut Cards)) -> String {
+fn refused(more: impl Fn(&mut Cards) -> &mut Cards) -> String {
     read(&image(-1e-9, 1, true, more)).expect_err("a card that is not read").to_string()
 }
 
@@ -91,18 +96,12 @@ fn exact_cards_that_are_not_read_are_refused() {
         ("PV2_1", 0.1, 0.0),
         ("EQUINOX", 1950.0, 2000.0),
     ] {
-        let message = refused(|cards| {
-            cards.number(keyword, wrong);
-        });
+        let message = refused(|cards| cards.number(keyword, wrong));
         assert!(message.contains(keyword), "{message}");
-        let good = image(-1e-9, 1, true, |cards| {
-            cards.number(keyword, harmless);
-        });
+        let good = image(-1e-9, 1, true, |cards| cards.number(keyword, harmless));
         assert_eq!(read(&good).unwrap().i.pixels, PIXELS, "{keyword}");
     }
-    let message = refused(|cards| {
-        cards.number("CD1_1", -1e-9);
-    });
+    let message = refused(|cards| cards.number("CD1_1", -1e-9));
     assert!(message.contains("CD1_1"), "{message}");
     for (keyword, wrong, right) in [
         ("CTYPE1", "GLON-SIN", "RA---SIN"),
@@ -111,20 +110,12 @@ fn exact_cards_that_are_not_read_are_refused() {
         ("CUNIT1", "arcsec", "deg"),
         ("STOKES", "XX", "I"),
     ] {
-        let message = refused(|cards| {
-            cards.text(keyword, wrong);
-        });
+        let message = refused(|cards| cards.text(keyword, wrong));
         assert!(message.contains(keyword), "{message}");
-        let good = image(-1e-9, 1, true, |cards| {
-            cards.text(keyword, right);
-        });
+        let good = image(-1e-9, 1, true, |cards| cards.text(keyword, right));
         assert!(read(&good).is_ok(), "{keyword}");
     }
-    let planes = |kind: &'static str| {
-        image(-1e-9, 2, true, |cards| {
-            cards.text("CTYPE3", kind);
-        })
-    };
+    let planes = |kind: &'static str| image(-1e-9, 2, true, |cards| cards.text("CTYPE3", kind));
     for kind in ["FREQ", "TIME", ""] {
         assert!(read(&planes(kind)).unwrap_err().to_string().contains("NAXIS3"), "{kind}");
     }
@@ -136,7 +127,7 @@ fn exact_planes_of_stokes_parameters() {
     let of = |planes: usize, first: f64, step: f64| {
         read(&image(-1e-9, planes, true, |cards| {
             cards.text("CTYPE3", "STOKES").number("CRVAL3", first).number("CDELT3", step);
-            cards.number("CRPIX3", 1.0);
+            cards.number("CRPIX3", 1.0)
         }))
     };
     let plane = |k: usize| PIXELS.map(|x| x + 10.0 * k as f64).to_vec();
@@ -159,13 +150,9 @@ fn exact_planes_of_stokes_parameters() {
 #[test]
 fn exact_units_of_stokes_parameters() {
     let with = |names: &[&str]| {
-        let mut bytes = image(-1e-9, 1, true, |cards| {
-            cards.text("STOKES", "I");
-        });
+        let mut bytes = image(-1e-9, 1, true, |cards| cards.text("STOKES", "I"));
         for name in names {
-            bytes.extend(image(-1e-9, 1, false, |cards| {
-                cards.text("EXTNAME", name);
-            }));
+            bytes.extend(image(-1e-9, 1, false, |cards| cards.text("EXTNAME", name)));
         }
         read(&bytes)
     };
