@@ -124,7 +124,7 @@ impl<T: Float> Task<T> for Update<'_, T> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use core::ops::Range;
 
@@ -161,17 +161,12 @@ mod tests {
         }
     }
 
-    #[test]
-    fn regress_same_bits_on_any_threads_and_after_a_break() {
-        let count = 3 * SHARE + 5;
-        let gradient = |step: usize| -> Vec<f32> {
-            (0..count).map(|k| ((k * 7 + step * 13) % 101) as f32 - 50.0).collect()
+    /// Takes steps of `count` parameters without and with a break, on one and on several threads, to the same bits.
+    pub fn repeats(count: usize, step: impl Fn(u64, &mut AdamState<f32>, &mut [f32]) + Sync) {
+        let run = |threads: usize, steps: Range<u64>, x: &mut [f32], state: &mut AdamState<f32>| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| steps.for_each(|k| step(k, state, x)));
         };
-        let run =
-            |threads: usize, steps: Range<usize>, x: &mut [f32], state: &mut AdamState<f32>| {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                pool.install(|| steps.for_each(|step| state.step(1e-3, &gradient(step), x)));
-            };
         let (mut x, mut state) = (vec![1.0; count], AdamState::new(count));
         run(1, 0..6, &mut x, &mut state);
         let (mut y, mut first) = (vec![1.0; count], AdamState::new(count));
@@ -180,5 +175,14 @@ mod tests {
         let mut again = AdamState { steps, first, second };
         run(2, 2..6, &mut y, &mut again);
         assert!(x == y && state == again);
+    }
+
+    #[test]
+    fn regress_same_bits_on_any_threads_and_after_a_break() {
+        let count = 3 * SHARE + 5;
+        repeats(count, |step, state, x| {
+            let gradient = (0..count as u64).map(|k| ((k * 7 + step * 13) % 101) as f32 - 50.0);
+            state.step(1e-3, &gradient.collect::<Vec<f32>>(), x);
+        });
     }
 }

@@ -1,3 +1,4 @@
+use super::super::adam::tests::repeats;
 use super::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -143,20 +144,8 @@ fn regress_same_bits_on_any_threads_and_after_a_break() {
     let matrices: Vec<WeightMatrix> =
         (0..4).map(|k| WeightMatrix { offset: 5 + 1200 * k, rows: 30, columns: 40 }).collect();
     let count = 5 + 4800 + 7;
-    let gradient =
-        |step: u64| -> Vec<f32> { numbers(count, step).into_iter().map(|x| x as f32).collect() };
-    let run = |threads: usize, steps: Range<u64>, x: &mut Vec<f32>, state: &mut _| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| {
-            steps.for_each(|step| MUON.step(1e-3, &gradient(step), &matrices, state, x));
-        });
-    };
-    let (mut x, mut state) = (vec![1.0; count], AdamState::new(count));
-    run(1, 0..6, &mut x, &mut state);
-    let (mut y, mut first) = (vec![1.0; count], AdamState::new(count));
-    run(3, 0..2, &mut y, &mut first);
-    let AdamState { steps, first, second } = first;
-    let mut again = AdamState { steps, first, second };
-    run(2, 2..6, &mut y, &mut again);
-    assert!(x == y && state == again);
+    repeats(count, |step, state, x| {
+        let gradient: Vec<f32> = numbers(count, step).into_iter().map(|x| x as f32).collect();
+        MUON.step(1e-3, &gradient, &matrices, state, x);
+    });
 }
