@@ -59,11 +59,17 @@ fn screen(side: u32, width: f64) -> (Vec<f64>, Vec<f64>) {
     (0..side * side).map(|k| (along(k % side), along(k / side))).unzip()
 }
 
-fn observe(prepared: &PreparedScene, times: &[f64]) -> Vec<RayResult> {
+/// Light of 24² rays, and how they were traced.
+fn traced(prepared: &PreparedScene, times: &[f64]) -> (Vec<RayResult>, Scratch) {
     let (alpha, beta) = screen(24, 24.0);
     let mut seen = vec![RayResult::default(); alpha.len() * times.len()];
-    prepared.observe_block(&alpha, &beta, times, &mut Scratch::default(), &mut seen).unwrap();
-    seen
+    let mut scratch = Scratch::default();
+    prepared.observe_block(&alpha, &beta, times, &mut scratch, &mut seen).unwrap();
+    (seen, scratch)
+}
+
+fn observe(prepared: &PreparedScene, times: &[f64]) -> Vec<RayResult> {
+    traced(prepared, times).0
 }
 
 /// The tree leaves out only what is dark: to the last bit the same light, from the same places,
@@ -79,8 +85,8 @@ fn exact_tree_against_every_spot() {
                 scene.spot = spots(count, since);
                 let prepared = PreparedScene::new(&scene, None).unwrap();
                 let times = [30.0, 47.0];
-                let (found, expected) =
-                    (observe(&prepared, &times), observe(&prepared.clone().one_by_one(), &times));
+                let found = observe(&prepared, &times);
+                let expected = observe(&prepared.one_by_one(), &times);
                 lit += found.iter().filter(|seen| seen.intensity > 0.0).count();
                 let differ = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
                 assert_eq!(differ, 0, "{count} spots, {since:?}, a = {spin}, slow light {slow}");
@@ -98,22 +104,17 @@ fn exact_rays_that_cannot_meet_a_spot() {
     let prepared = PreparedScene::new(&scene, None).unwrap();
     let tree = prepared.spots.tree(&prepared.optics, 30.0).unwrap();
     let (alpha, beta) = screen(24, 40.0);
+    let all = prepared.clone().one_by_one();
     let (mut out, mut lit) = (0, 0);
     for (alpha, beta) in alpha.iter().zip(&beta) {
         let ray = prepared.view().ray(prepared.hole(), *alpha, *beta).unwrap();
-        let seen = prepared.observe(*alpha, *beta, &mut Scratch::default()).unwrap();
-        lit += u32::from(seen.intensity > 0.0);
+        let light = |scene: &PreparedScene| {
+            scene.observe(*alpha, *beta, &mut Scratch::default()).unwrap().intensity
+        };
+        lit += u32::from(light(&prepared) > 0.0);
         if !tree.can_be_met(&ray) {
             out += 1;
-            assert_eq!(
-                prepared
-                    .clone()
-                    .one_by_one()
-                    .observe(*alpha, *beta, &mut Scratch::default())
-                    .unwrap()
-                    .intensity,
-                0.0
-            );
+            assert_eq!(light(&all), 0.0);
         }
     }
     assert!(out > 150 && lit > 20, "{out} {lit}");
@@ -138,20 +139,16 @@ fn exact_sighting_of_single_spots() {
             scene.spot[0].radius -= if k % 5 == 0 { 2.0 } else { 0.0 };
             let prepared = PreparedScene::new(&scene, None).unwrap();
             let times = [30.0, 47.0];
-            let (found, expected) =
-                (observe(&prepared, &times), observe(&prepared.clone().one_by_one(), &times));
+            let (found, scratch) = traced(&prepared, &times);
+            let expected = observe(&prepared.one_by_one(), &times);
             for (found, expected) in found.iter().zip(&expected) {
                 let light = |seen: &RayResult| (seen.intensity, seen.redshift, seen.radius);
                 assert_eq!(light(found), light(expected), "spot {k}, a = {spin}, {inclination}");
                 lit += u32::from(found.intensity > 0.0);
             }
-            let mut scratch = Scratch::default();
-            let (alpha, beta) = screen(24, 24.0);
-            let mut seen = vec![RayResult::default(); alpha.len() * times.len()];
-            prepared.observe_block(&alpha, &beta, &times, &mut scratch, &mut seen).unwrap();
-            stepped +=
-                scratch.rays.rays().iter().filter(|ray| ray.with_path || ray.stepped).count();
-            all += alpha.len();
+            let rays = scratch.rays.rays();
+            stepped += rays.iter().filter(|ray| ray.with_path || ray.stepped).count();
+            all += rays.len();
         }
     }
     assert!(lit > 2_000 && 3 * stepped < all, "{lit} lit, {stepped} of {all} stepped");
@@ -168,19 +165,15 @@ fn exact_sighting_of_a_spot_in_gas_that_absorbs() {
     scene.spot = spots(1, None);
     (scene.spot[0].sigma, scene.spot[0].peak_emissivity) = (0.2, 1e-6);
     let prepared = PreparedScene::new(&scene, None).unwrap();
-    let times = [30.0];
-    let (found, expected) =
-        (observe(&prepared, &times), observe(&prepared.clone().one_by_one(), &times));
+    let (found, scratch) = traced(&prepared, &[30.0]);
+    let expected = observe(&prepared.one_by_one(), &[30.0]);
     let largest = expected.iter().fold(0.0f64, |most, seen| most.max(seen.intensity));
     let apart = found.iter().zip(&expected).map(|(a, b)| (a.intensity - b.intensity).abs());
     let apart = apart.fold(0.0f64, f64::max);
     // Panels along a path begin elsewhere than those of the closed form.
     assert!(largest > 0.0 && apart < 1e-7 * largest, "{apart:e} of {largest:e}");
     assert!(expected.iter().all(|seen| seen.optical_depth > 0.0));
-    let mut scratch = Scratch::default();
-    let (alpha, beta) = screen(24, 24.0);
-    let mut seen = vec![RayResult::default(); alpha.len()];
-    prepared.observe_block(&alpha, &beta, &times, &mut scratch, &mut seen).unwrap();
-    let stepped = scratch.rays.rays().iter().filter(|ray| ray.stepped).count();
-    assert!(stepped > 10 && 2 * stepped < alpha.len(), "{stepped} of {}", alpha.len());
+    let rays = scratch.rays.rays();
+    let stepped = rays.iter().filter(|ray| ray.stepped).count();
+    assert!(stepped > 10 && 2 * stepped < rays.len(), "{stepped} of {}", rays.len());
 }
