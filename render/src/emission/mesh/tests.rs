@@ -69,14 +69,17 @@ fn gltf(length: usize) -> String {
     )
 }
 
+/// The file with `to` in place of `from`.
+fn changed(from: &str, to: &str) -> Result<MeshFile, crate::Error> {
+    let text = gltf(36).replace(from, to);
+    assert!(text != gltf(36), "{from}");
+    MeshFile::decode(text.as_bytes(), &none)
+}
+
 /// Files that would break the crate's readers are refused first.
 #[test]
 fn exact_gltf_against_its_specification_says_why() {
-    let with = |from: &str, to: &str| {
-        let text = gltf(36).replace(from, to);
-        assert!(text != gltf(36), "{from}");
-        MeshFile::decode(text.as_bytes(), &none).unwrap_err().to_string()
-    };
+    let with = |from: &str, to: &str| changed(from, to).unwrap_err().to_string();
     assert!(with("2.0", "3.0").contains("version \"3.0\" of glTF is not read"));
     let turned = |x: &str| with("\"translation\"", &format!("\"rotation\":[{x}],\"translation\""));
     assert!(turned("0,0,0,0").contains("node 0 (counted from 0): rotation of length 0: 1"));
@@ -124,12 +127,10 @@ fn exact_gltf_with_embedded_buffer() {
     let model = MeshModel::new(&scene_mesh(None), &file).unwrap();
     assert_eq!(model.light(&model.triangles[0], [0.0; 3]), (0.25, [1.0, 1.0, 0.5]));
     assert!(MeshFile::decode(gltf(400).as_bytes(), &none).is_err());
-    let beyond = gltf(36).replace("\"count\":3", "\"count\":4");
-    let error = MeshFile::decode(beyond.as_bytes(), &none).unwrap_err().to_string();
+    let error = changed("\"count\":3", "\"count\":4").unwrap_err().to_string();
     assert!(error.contains("beyond its buffer"), "{error}");
-    let outside =
-        gltf(36).replace(&format!("data:application/octet-stream;base64,{BASE64}"), "a.bin");
-    let error = MeshFile::decode(outside.as_bytes(), &none).unwrap_err().to_string();
+    let inside = format!("data:application/octet-stream;base64,{BASE64}");
+    let error = changed(&inside, "a.bin").unwrap_err().to_string();
     assert!(error.contains("`a.bin`") && error.contains("no a.bin here"), "{error}");
 }
 
@@ -151,15 +152,19 @@ fn files_that_are_no_meshes_say_why() {
     assert!(error(b"").contains("no triangles"));
 }
 
-/// A picture of two columns: the left half of a surface is dark, the right one light.
-#[test]
-fn exact_textures_by_coordinates() {
+/// A picture of two columns, dark and light.
+fn columns() -> Vec<u8> {
     let mut picture = image::RgbImage::new(2, 1);
     picture.put_pixel(1, 0, image::Rgb([255, 255, 255]));
-    let mut png = Vec::new();
-    let mut cursor = std::io::Cursor::new(&mut png);
-    picture.write_to(&mut cursor, image::ImageFormat::Png).unwrap();
-    let library = b"newmtl lamp\nmap_Ke columns.png\n";
+    let mut png = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut png, image::ImageFormat::Png).unwrap();
+    png.into_inner()
+}
+
+/// The left half of a surface is dark, the right one light.
+#[test]
+fn exact_textures_by_coordinates() {
+    let (library, png) = (b"newmtl lamp\nmap_Ke columns.png\n", columns());
     let beside = [("paint.mtl", &library[..]), ("columns.png", &png[..])];
     let file = MeshFile::decode(OBJ.as_bytes(), &files(&beside)).unwrap();
     let flat = Mesh { scale: 1.0, position: [0.0; 3], rotation_deg: 0.0, ..scene_mesh(None) };
@@ -235,15 +240,6 @@ fn exact_statements_of_obj_that_are_not_read_say_where() {
     assert!(error(b"ply\nformat ascii 1.0\n", &[]).contains("PLY files are not read"));
 }
 
-/// A picture of two columns, dark and light.
-fn columns() -> Vec<u8> {
-    let mut picture = image::RgbImage::new(2, 1);
-    picture.put_pixel(1, 0, image::Rgb([255, 255, 255]));
-    let mut png = std::io::Cursor::new(Vec::new());
-    picture.write_to(&mut png, image::ImageFormat::Png).unwrap();
-    png.into_inner()
-}
-
 /// Options -s and -o of a texture scale and move coordinates whose v grows upwards.
 #[test]
 fn exact_scale_and_offset_of_textures() {
@@ -294,27 +290,22 @@ fn exact_textures_of_gltf() {
 
 #[test]
 fn exact_what_gltf_moves_is_refused_and_the_rest_told() {
-    let with = |from: &str, to: &str| {
-        let text = gltf(36).replace(from, to);
-        assert!(text != gltf(36), "{from}");
-        MeshFile::decode(text.as_bytes(), &none)
-    };
     let primitive = r#"[{"primitives":[{"attributes":{"POSITION":0},"material":0}]"#;
     let morph = r#"[{"primitives":[{"attributes":{"POSITION":0},"targets":[{"POSITION":0}],"material":0}],"weights":[0.5]"#;
-    let said = with(primitive, morph).unwrap_err().to_string();
+    let said = changed(primitive, morph).unwrap_err().to_string();
     assert!(said.contains("node 0 (counted from 0) has morph targets"), "{said}");
-    assert!(with(primitive, &morph.replace("0.5", "0")).is_ok());
-    let skin = with(r#"{"mesh":0"#, r#"{"skin":0,"mesh":0"#);
+    assert!(changed(primitive, &morph.replace("0.5", "0")).is_ok());
+    let skin = changed(r#"{"mesh":0"#, r#"{"skin":0,"mesh":0"#);
     assert!(skin.is_err(), "a skin that is not there");
     let skinned = gltf(36)
         .replace(r#"{"mesh":0"#, r#"{"skin":0,"mesh":0"#)
         .replace(r#""materials""#, r#""skins":[{"joints":[0]}],"materials""#);
     let said = MeshFile::decode(skinned.as_bytes(), &none).unwrap_err().to_string();
     assert!(said.contains("has a skin, which is not read"), "{said}");
-    let clear = with(r#""emissiveFactor""#, r#""alphaMode":"BLEND","emissiveFactor""#).unwrap();
+    let clear = changed(r#""emissiveFactor""#, r#""alphaMode":"BLEND","emissiveFactor""#).unwrap();
     assert!(clear.warnings[0].contains("transparent materials"), "{:?}", clear.warnings);
     let used =
-        with(r#""accessors""#, r#""extensionsUsed":["EXT_mesh_gpu_instancing"],"accessors""#);
+        changed(r#""accessors""#, r#""extensionsUsed":["EXT_mesh_gpu_instancing"],"accessors""#);
     assert_eq!(used.unwrap().warnings, ["extension EXT_mesh_gpu_instancing is not read"]);
 }
 
