@@ -1,11 +1,11 @@
 //! The functions for C, called from Rust where misuse is concerned, and from a compiled C program.
 #![cfg(feature = "capi")]
 
+use crate::{at_infinity, inclination};
 use kerrlight_geodesic::analytic::CriticalCurve;
 use kerrlight_geodesic::capi::{self, PointColumns, RayColumns, SamplePlacement, Scene};
 use kerrlight_geodesic::{
-    Camera, Inclination, Integrator, Kerr, Motion, Observer, Outcome, Placement, Quantities,
-    RayTable, Request, Tracer,
+    Camera, Integrator, Kerr, Motion, Outcome, Placement, Quantities, RayTable, Request, Tracer,
 };
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -59,7 +59,6 @@ fn message() -> String {
 /// The rays of the test below, traced by a call from Rust.
 fn from_rust() -> RayTable {
     let hole = Kerr::new(0.94).unwrap();
-    let observer = Observer::at_infinity(Inclination::from_degrees(60.0).unwrap());
     let request = Request {
         crossings: 2,
         samples: Placement::GaussLegendre { points: 4, from: 4.0, to: 20.0 },
@@ -69,7 +68,7 @@ fn from_rust() -> RayTable {
         uncertainty: true,
         ..Request::default()
     };
-    Integrator::TaylorMino.trace(&hole, &observer, &ALPHA, &BETA, 1e-10, &request).unwrap()
+    Integrator::TaylorMino.trace(&hole, &at_infinity(60.0), &ALPHA, &BETA, 1e-10, &request).unwrap()
 }
 
 #[test]
@@ -263,12 +262,11 @@ fn library() -> PathBuf {
 /// Returns the output of examples/c/shadow.c, from Rust.
 fn expected_picture() -> (String, Vec<[f64; 3]>) {
     let hole = Kerr::new(0.998).unwrap();
-    let observer = |degrees| Observer::at_infinity(Inclination::from_degrees(degrees).unwrap());
     let place = |k: i32| (0.25 * f64::from(k % 60) - 5.5, 6.0 - 0.5 * f64::from(k / 60));
     let (alpha, beta): (Vec<f64>, Vec<f64>) = (0..25 * 60).map(place).unzip();
     let tracer = Integrator::TaylorMino;
     let rays =
-        tracer.trace(&hole, &observer(90.0), &alpha, &beta, 1e-6, &Request::default()).unwrap();
+        tracer.trace(&hole, &at_infinity(90.0), &alpha, &beta, 1e-6, &Request::default()).unwrap();
     let mut picture = String::new();
     for (k, outcome) in rays.outcome.iter().enumerate() {
         let lensed = rays.crossing_count[k] > 1;
@@ -282,7 +280,7 @@ fn expected_picture() -> (String, Vec<[f64; 3]>) {
         }
     }
     let one = tracer
-        .trace(&hole, &observer(60.0), &[-5.5], &[1.0], 1e-12, &Request::crossings(3))
+        .trace(&hole, &at_infinity(60.0), &[-5.5], &[1.0], 1e-12, &Request::crossings(3))
         .unwrap()
         .crossings;
     let row = |k: usize| [one.radius[k], one.azimuth[k], one.delay[k]];
@@ -315,7 +313,7 @@ fn exact_c_example_prints_what_rust_finds() {
 /// an orbit.
 fn expected_sky() -> (String, [f64; 3]) {
     let hole = Kerr::new(0.9).unwrap();
-    let place = Inclination::from_degrees(85.0).unwrap();
+    let place = inclination(85.0);
     let camera = Camera::new(&hole, place, 12.0, Motion::FreeFall).unwrap();
     let point = |k: i32| (0.04 * f64::from(k % 61 - 30), 0.08 * f64::from(10 - k / 61));
     let (x, y): (Vec<f64>, Vec<f64>) = (0..21 * 61).map(point).unzip();

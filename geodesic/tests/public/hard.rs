@@ -1,6 +1,7 @@
 //! Places where derivatives and footprints could break: axes, the equator, spins next to ±1, screen
 //! coordinates of 0 and of a million, rays next to the critical curve.
 
+use crate::{at_infinity, at_radius, inclination};
 use kerrlight_geodesic::derivatives::{self, Gradient};
 use kerrlight_geodesic::{
     Double, Inclination, Integrator, Kerr, Observer, Outcome, Path, Placement, Quantities,
@@ -31,8 +32,7 @@ fn screen() -> (Vec<f64>, Vec<f64>) {
 }
 
 fn observers(degrees: f64) -> [Observer; 2] {
-    let inclination = Inclination::from_degrees(degrees).unwrap();
-    [Observer::at_infinity(inclination), Observer::at_radius(inclination, 1e9).unwrap()]
+    [at_infinity(degrees), at_radius(degrees, 1e9)]
 }
 
 fn defined(gradients: &[Gradient]) -> usize {
@@ -64,15 +64,16 @@ fn exact_derivatives_are_numbers_everywhere() {
             }
             for (ray, outcome) in rays.values.outcome.iter().enumerate() {
                 let place = format!("a {spin} i {degrees} ({}, {})", alpha[ray], beta[ray]);
-                for k in rays.values.samples.of(ray) {
-                    let g = &rays.samples;
-                    let all = [g.mino_time[k], g.radius[k], g.theta[k], g.azimuth[k], g.delay[k]];
-                    assert_eq!(defined(&all), 5, "{place} {outcome:?}: sample {k} {all:?}");
-                }
-                for k in rays.values.crossings.of(ray) {
-                    let g = &rays.crossings;
-                    let all = [g.mino_time[k], g.radius[k], g.theta[k], g.azimuth[k], g.delay[k]];
-                    assert_eq!(defined(&all), 5, "{place} {outcome:?}: crossing {k} {all:?}");
+                let values = &rays.values;
+                for (kind, points, g) in [
+                    ("sample", &values.samples, &rays.samples),
+                    ("crossing", &values.crossings, &rays.crossings),
+                ] {
+                    for k in points.of(ray) {
+                        let all =
+                            [g.mino_time[k], g.radius[k], g.theta[k], g.azimuth[k], g.delay[k]];
+                        assert_eq!(defined(&all), 5, "{place} {outcome:?}: {kind} {k} {all:?}");
+                    }
                 }
             }
         }
@@ -140,8 +141,7 @@ const METHODS: [Integrator; 3] =
 /// At the horizon of an extremal hole Δ = (r − 1)² is that of the last float outside, as everywhere else.
 #[test]
 fn exact_momenta_at_an_extremal_horizon_are_numbers() {
-    let inclination = Inclination::from_degrees(90.0).unwrap();
-    let observer = Observer::at_radius(inclination, 1e9).unwrap();
+    let observer = at_radius(90.0, 1e9);
     let request = Request { momentum: true, ..Request::samples(Placement::MinoTime(5)) };
     for spin in [1.0, -1.0] {
         let hole = Kerr::new(spin).unwrap();
@@ -172,7 +172,6 @@ fn exact_crossings_are_those_before_the_end() {
 /// λ ≈ 2a around extremal holes: every number is one, and fate and radii are those of 28 digits.
 #[test]
 fn exact_rays_on_the_straight_part_of_an_extremal_critical_curve_are_numbers() {
-    let inclination = Inclination::from_degrees(90.0).unwrap();
     let betas = [-0.5528916854514749, 0.8994698741176206, 1.3246097831865098, 1.7547873481341332];
     let distances = [0.0, -4e-16, 5e-16, -3e-14, 1.6e-14, 3.3775e-13, 9e-13];
     for (beta, distance) in betas.iter().flat_map(|b| distances.iter().map(move |d| (*b, *d))) {
@@ -180,14 +179,13 @@ fn exact_rays_on_the_straight_part_of_an_extremal_critical_curve_are_numbers() {
         let hole = Kerr::new(spin).unwrap();
         let alpha = -2.0 * spin * (1.0 + distance);
         let [spin, wide_alpha, wide_beta] = [spin, alpha, beta].map(Double::from);
-        let wide = Observer::at_infinity(inclination.widen());
+        let wide = Observer::at_infinity(inclination(90.0).widen());
         let ray = wide.ray(&Kerr::from_spin(spin).unwrap(), wide_alpha, wide_beta).unwrap();
         let mut truth = Path::empty();
         trace_series(1e-24, &Kerr::from_spin(spin).unwrap(), &ray, Quantities::POLAR, &mut truth)
             .unwrap();
         for integrator in METHODS {
-            let far = Observer::at_infinity(inclination);
-            let rays = sampled(integrator, (&hole, &far), [alpha, beta]);
+            let rays = sampled(integrator, (&hole, &at_infinity(90.0)), [alpha, beta]);
             let context = format!("{integrator:?} ({alpha}, {beta})");
             if !rays.outcome[0].is_unresolved() {
                 assert_eq!(rays.outcome[0], truth.outcome(), "{context}");
@@ -197,8 +195,7 @@ fn exact_rays_on_the_straight_part_of_an_extremal_critical_curve_are_numbers() {
                     assert!(miss <= 10.0 * rays.uncertainty[0].radius, "{context}: {k} {miss:e}");
                 }
             }
-            let near = Observer::at_radius(inclination, 200.0).unwrap();
-            let rays = sampled(integrator, (&hole, &near), [alpha, beta]);
+            let rays = sampled(integrator, (&hole, &at_radius(90.0, 200.0)), [alpha, beta]);
             if rays.outcome[0] == Outcome::Escaped {
                 returns(&rays, 200.0, &context);
             }
@@ -211,8 +208,7 @@ fn exact_rays_on_the_straight_part_of_an_extremal_critical_curve_are_numbers() {
 fn exact_near_critical_rays_return_to_far_observers() {
     for (spin, degrees) in [(0.0, 17.0), (0.5, 1.0), (-0.7, 60.0), (0.998, 90.0)] {
         let hole = Kerr::new(spin).unwrap();
-        let inclination = Inclination::from_degrees(degrees).unwrap();
-        let screen = Observer::at_infinity(inclination);
+        let screen = at_infinity(degrees);
         for k in 0..4 {
             let (y, x) = (0.4 + 1.6 * f64::from(k)).sin_cos();
             let falls = |b: f64| screen.ray(&hole, b * x, b * y).unwrap().potential.captures();
@@ -222,7 +218,7 @@ fn exact_near_critical_rays_return_to_far_observers() {
                 *(if falls(middle) { &mut inside } else { &mut outside }) = middle;
             }
             for radius in [1e6, 1e9, 1e12, 1e20, 1e30] {
-                let far = Observer::at_radius(inclination, radius).unwrap();
+                let far = at_radius(degrees, radius);
                 for integrator in METHODS {
                     let rays = sampled(integrator, (&hole, &far), [outside * x, outside * y]);
                     let context = format!("{integrator:?} a = {spin}, {radius}, {k}");
@@ -233,7 +229,6 @@ fn exact_near_critical_rays_return_to_far_observers() {
             }
         }
     }
-    let inclination = Inclination::from_degrees(60.0).unwrap();
-    let error = Observer::at_radius(inclination, 1e300).unwrap_err().to_string();
+    let error = Observer::at_radius(inclination(60.0), 1e300).unwrap_err().to_string();
     assert_eq!(error, "observer radius = 1e300 is not allowed: above 2 and at most 1e30 (M)");
 }

@@ -1,15 +1,12 @@
 //! Rays that were not traced, or not for this hole, are not numbers, and errors name what is wrong.
 
+use crate::{at_infinity, at_radius, inclination};
 use kerrlight_geodesic::analytic::ClosedForm;
 use kerrlight_geodesic::{
-    BlockRequest, BlockTracer, Camera, Error, Inclination, Integrator, Kerr, Motion, Observer,
-    Outcome, Path, PathOfRay, Placement, PlaneCrossing, Quantities, Ray, RayBlock, RayVisitor,
-    Request, TracedRay, Tracer, Unresolved, View, ZamoFrame, flow, footprint,
+    BlockRequest, BlockTracer, Camera, Error, Integrator, Kerr, Motion, Outcome, Path, PathOfRay,
+    Placement, PlaneCrossing, Quantities, Ray, RayBlock, RayVisitor, Request, TracedRay, Tracer,
+    Unresolved, View, ZamoFrame, flow, footprint,
 };
-
-fn degrees(angle: f64) -> Inclination {
-    Inclination::from_degrees(angle).unwrap()
-}
 
 fn traced(hole: &Kerr, ray: &Ray, quantities: Quantities) -> Path {
     let mut path = Path::new();
@@ -21,7 +18,7 @@ fn traced(hole: &Kerr, ray: &Ray, quantities: Quantities) -> Path {
 #[test]
 fn exact_a_path_without_azimuth_has_no_place_and_no_redshift() {
     let hole = Kerr::new(0.9).unwrap();
-    let ray = Observer::at_infinity(degrees(60.0)).ray(&hole, -6.0, 2.0).unwrap();
+    let ray = at_infinity(60.0).ray(&hole, -6.0, 2.0).unwrap();
     let [whole, polar] = [Quantities::ALL, Quantities::POLAR].map(|q| traced(&hole, &ray, q));
     let time = whole.equatorial_crossings().next().unwrap();
     let [known, bare] = [&whole, &polar].map(|path| path.at(time));
@@ -41,7 +38,7 @@ fn exact_a_path_without_azimuth_has_no_place_and_no_redshift() {
 fn exact_places_at_infinity_are_infinite() {
     let hole = Kerr::new(0.9).unwrap();
     for (angle, beta) in [(60.0, 2.0), (90.0, 0.0), (0.0, 1.0)] {
-        let ray = Observer::at_infinity(degrees(angle)).ray(&hole, -6.0, beta).unwrap();
+        let ray = at_infinity(angle).ray(&hole, -6.0, beta).unwrap();
         let path = traced(&hole, &ray, Quantities::ALL);
         for time in [0.0, path.mino_total()] {
             let place = path.at(time).cartesian();
@@ -54,7 +51,7 @@ fn exact_places_at_infinity_are_infinite() {
 #[test]
 fn exact_a_ray_of_another_hole_is_refused() {
     let [own, other] = [0.9, -0.9].map(|spin| Kerr::new(spin).unwrap());
-    let camera = Camera::new(&own, degrees(80.0), 12.0, Motion::Static).unwrap();
+    let camera = Camera::new(&own, inclination(80.0), 12.0, Motion::Static).unwrap();
     let view = View::Camera(camera);
     let message = |error: Error| error.to_string();
     let refused =
@@ -74,14 +71,14 @@ fn exact_a_ray_of_another_hole_is_refused() {
     assert!(path.at(0.1).radius().is_nan() && path.uncertainty_at(0.1).radius.is_infinite());
     let form = ClosedForm::new(&other, &ray);
     assert!(form.mino_total().is_nan() && form.crossings().next().is_none());
-    let screen = Observer::at_infinity(degrees(80.0)).ray(&own, 5.0, 1.0).unwrap();
+    let screen = at_infinity(80.0).ray(&own, 5.0, 1.0).unwrap();
     assert_eq!(traced(&other, &screen, Quantities::POLAR).steps(), 0);
 }
 
 #[test]
 fn regress_errors_of_cameras_name_what_is_wrong() {
     let hole = Kerr::new(0.9).unwrap();
-    let new = |radius, motion| Camera::new(&hole, degrees(80.0), radius, motion);
+    let new = |radius, motion| Camera::new(&hole, inclination(80.0), radius, motion);
     for motion in [Motion::Static, Motion::Zamo, Motion::Keplerian, Motion::FreeFall] {
         assert!(new(1e30, motion).unwrap().ray(0.1, 0.2).is_ok());
         let error = new(1e300, motion).unwrap_err();
@@ -95,7 +92,7 @@ fn regress_errors_of_cameras_name_what_is_wrong() {
         ([0.0, 0.0, f64::NAN], "dphi/dt"),
         ([2.0, 0.0, 0.0], "camera speed"),
     ] {
-        let error = Camera::moving(&hole, degrees(80.0), 9.0, rates).unwrap_err();
+        let error = Camera::moving(&hole, inclination(80.0), 9.0, rates).unwrap_err();
         assert_eq!(error.field(), field);
     }
     let camera = new(9.0, Motion::Static).unwrap();
@@ -103,7 +100,7 @@ fn regress_errors_of_cameras_name_what_is_wrong() {
     assert_eq!(astray.field(), "yaw, pitch or roll");
     let astray = camera.with_azimuth(f64::INFINITY).ray(0.0, 0.0).unwrap_err();
     assert_eq!(astray.field(), "camera azimuth");
-    let observer = Observer::at_infinity(degrees(60.0)).with_azimuth(f64::NAN);
+    let observer = at_infinity(60.0).with_azimuth(f64::NAN);
     assert_eq!(observer.ray(&hole, 1.0, 2.0).unwrap_err().field(), "observer azimuth");
 }
 
@@ -128,7 +125,7 @@ fn exact_ends_and_directions_of_blocks_do_not_depend_on_the_integrator() {
     let request = BlockRequest { exit: true, crossings: 3, ..BlockRequest::default() };
     let bare = BlockRequest { exit: false, ..request.clone() };
     for radius in [20.0, 1000.0] {
-        let observer = Observer::at_radius(degrees(60.0), radius).unwrap();
+        let observer = at_radius(60.0, radius);
         let trace = |integrator, request: &BlockRequest| {
             let tracer = BlockTracer::new(hole, View::Screen(observer), integrator, 1e-11).unwrap();
             let mut block = RayBlock::default();
@@ -158,8 +155,8 @@ fn exact_ends_and_directions_of_blocks_do_not_depend_on_the_integrator() {
 #[test]
 fn exact_tables_of_cameras_agree_with_paths() {
     let hole = Kerr::new(0.9).unwrap();
-    let outside = Camera::new(&hole, degrees(80.0), 12.0, Motion::Keplerian).unwrap();
-    let inside = Camera::new(&hole, degrees(90.0), 1.7, Motion::Zamo).unwrap();
+    let outside = Camera::new(&hole, inclination(80.0), 12.0, Motion::Keplerian).unwrap();
+    let inside = Camera::new(&hole, inclination(90.0), 1.7, Motion::Zamo).unwrap();
     let inside = inside.with_pointing(3.0, 0.1, 0.0);
     let request = Request { crossings: 2, ..Request::samples(Placement::MinoTime(6)) };
     let (x, y): (Vec<f64>, Vec<f64>) =

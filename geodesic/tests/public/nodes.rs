@@ -1,7 +1,8 @@
 //! Nodes of quadratures along many rays against the Taylor tracer and closed forms.
 
+use crate::{at_infinity, at_radius};
 use kerrlight_geodesic::simd::{Crossings, NodeRequest, Nodes, PanelRule};
-use kerrlight_geodesic::{Inclination, Kerr, Observer, Outcome, Path, Quantities, Tracer};
+use kerrlight_geodesic::{Kerr, Outcome, Path, Quantities, Tracer};
 
 fn request(radius: f64) -> NodeRequest {
     let rule = PanelRule::new(8);
@@ -19,13 +20,9 @@ fn turn(angle: f64) -> f64 {
 }
 
 /// Largest misses of (r relative, cos θ, azimuth, delay, velocities) at all nodes of the screen.
-fn misses(spin: f64, inclination: f64, observer: Option<f64>) -> [f64; 5] {
+fn misses(spin: f64, degrees: f64, radius: f64) -> [f64; 5] {
     let hole = Kerr::new(spin).unwrap();
-    let inclination = Inclination::from_degrees(inclination).unwrap();
-    let observer = match observer {
-        Some(radius) => Observer::at_radius(inclination, radius).unwrap(),
-        None => Observer::at_infinity(inclination),
-    };
+    let observer = at_radius(degrees, radius);
     let (alpha, beta) = screen();
     let mut nodes = Nodes::default();
     nodes.trace(&hole, &observer, &alpha, &beta, None, &request(20.0)).unwrap();
@@ -59,7 +56,7 @@ fn misses(spin: f64, inclination: f64, observer: Option<f64>) -> [f64; 5] {
 fn code_nodes_lie_on_the_traced_paths() {
     for spin in [0.0, 0.5, -0.94, 0.998] {
         for inclination in [0.0, 17.0, 60.0, 90.0, 163.0] {
-            for radius in [None, Some(1000.0), Some(19.0)] {
+            for radius in [f64::INFINITY, 1000.0, 19.0] {
                 let [r, u, azimuth, delay, velocity] = misses(spin, inclination, radius);
                 let case = format!("a = {spin}, i = {inclination}, {radius:?}");
                 let all = format!("{case}: {r:e} {u:e} {azimuth:e} {delay:e} {velocity:e}");
@@ -75,7 +72,7 @@ fn code_nodes_lie_on_the_traced_paths() {
 #[test]
 fn exact_integrals_along_a_falling_ray() {
     let hole = Kerr::new(0.0).unwrap();
-    let observer = Observer::at_infinity(Inclination::from_degrees(60.0).unwrap());
+    let observer = at_infinity(60.0);
     let mut nodes = Nodes::default();
     for (split, tolerance) in [(1, 2e-7), (2, 1e-9), (4, 1e-12)] {
         let request = NodeRequest { split, ..request(10.0) };
@@ -94,7 +91,7 @@ fn exact_integrals_along_a_falling_ray() {
 #[test]
 fn exact_nodes_end_where_they_are_told_to() {
     let hole = Kerr::new(0.7).unwrap();
-    let observer = Observer::at_infinity(Inclination::from_degrees(60.0).unwrap());
+    let observer = at_infinity(60.0);
     let (alpha, beta) = screen();
     let (mut all, mut cut) = (Nodes::default(), Nodes::default());
     all.trace(&hole, &observer, &alpha, &beta, None, &request(20.0)).unwrap();
@@ -128,15 +125,11 @@ fn code_ends_of_rays_are_those_of_the_tracer() {
     let tracer = Tracer::new(1e-13).unwrap();
     let (alpha, beta) = screen();
     let (mut path, mut found, mut captured) = (Path::new(), Crossings::default(), 0);
-    for (spin, inclination, radius) in
+    for (spin, degrees, radius) in
         [(0.0, 0.0, f64::INFINITY), (0.9, 60.0, 1000.0), (-0.5, 90.0, 30.0), (1.0, 17.0, 1e6)]
     {
         let hole = Kerr::new(spin).unwrap();
-        let inclination = Inclination::from_degrees(inclination).unwrap();
-        let observer = match radius {
-            f64::INFINITY => Observer::at_infinity(inclination),
-            radius => Observer::at_radius(inclination, radius).unwrap(),
-        };
+        let observer = at_radius(degrees, radius);
         found.trace(&hole, &observer, &alpha, &beta, 2).unwrap();
         for k in 0..alpha.len() {
             let ray = observer.ray(&hole, alpha[k], beta[k]).unwrap();

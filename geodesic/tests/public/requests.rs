@@ -1,18 +1,11 @@
 //! Requests bring weights that integrate, equidistant samples, momenta that are null, and nothing
 //! that was not requested.
 
+use crate::{at_infinity, at_radius};
 use kerrlight_geodesic::{
-    Error, Inclination, Integrator, Kerr, Observer, Outcome, Path, Placement, Points, Quantities,
-    RayTable, Request, Tracer,
+    Error, Integrator, Kerr, Observer, Outcome, Path, Placement, Points, Quantities, RayTable,
+    Request, Tracer,
 };
-
-fn at_infinity(degrees: f64) -> Observer {
-    Observer::at_infinity(Inclination::from_degrees(degrees).unwrap())
-}
-
-fn at_radius(degrees: f64, radius: f64) -> Observer {
-    Observer::at_radius(Inclination::from_degrees(degrees).unwrap(), radius).unwrap()
-}
 
 fn everything(samples: Placement) -> Request {
     Request {
@@ -149,8 +142,7 @@ fn exact_path_length_samples_are_equidistant() {
     for weight in &table.samples.weight {
         assert!((weight * n as f64 / whole - 1.0).abs() < 1e-10, "{weight} {whole}");
     }
-    let inclination = Inclination::from_degrees(70.0).unwrap();
-    let ray = Observer::at_infinity(inclination).ray(&hole, -6.0, 3.0).unwrap();
+    let ray = at_infinity(70.0).ray(&hole, -6.0, 3.0).unwrap();
     let mut path = Path::new();
     let tracer = Tracer::new(1e-13).unwrap();
     tracer.trace(&hole, &ray, Quantities::POLAR, &mut path);
@@ -333,8 +325,7 @@ fn code_all_integrators_agree() {
     let hole = Kerr::new(0.94).unwrap();
     let (alpha, beta) = ([-6.0, 1.0, 7.0, 4.5, 8.0], [2.0, 0.5, 0.0, -4.0, 7.0]);
     for degrees in [0.0, 60.0, 90.0] {
-        let inclination = Inclination::from_degrees(degrees).unwrap();
-        let observer = Observer::at_radius(inclination, 100.0).unwrap();
+        let observer = at_radius(degrees, 100.0);
         let request = Request {
             crossings: 2,
             weight: true,
@@ -373,9 +364,7 @@ fn code_all_integrators_agree() {
 #[test]
 fn code_elliptic_serves_every_request() {
     let hole = Kerr::new(0.94).unwrap();
-    let inclination = Inclination::from_degrees(60.0).unwrap();
-    let far = Observer::at_radius(inclination, 100.0).unwrap();
-    let near = Observer::at_radius(inclination, 3.0).unwrap();
+    let (far, near) = (at_radius(60.0, 100.0), at_radius(60.0, 3.0));
     let trace = |integrator: Integrator, observer: &Observer, request: &Request| {
         let (alpha, beta) = ([-3.0, 0.5, 1.0], [2.0, 0.5, 1.0]);
         integrator.trace(&hole, observer, &alpha, &beta, 1e-11, request).unwrap()
@@ -394,8 +383,7 @@ fn code_elliptic_serves_every_request() {
     let alpha = [27f64.sqrt() * (1.0 + 1e-9)];
     let request = Request { uncertainty: true, ..Request::crossings(3) };
     let [closed, series] = [Integrator::Elliptic, Integrator::TaylorMino].map(|integrator| {
-        let infinity = Observer::at_infinity(inclination);
-        integrator.trace(&hole, &infinity, &alpha, &[0.0], 1e-12, &request).unwrap()
+        integrator.trace(&hole, &at_infinity(60.0), &alpha, &[0.0], 1e-12, &request).unwrap()
     });
     assert_eq!(closed.crossings, series.crossings);
     assert_eq!(closed.uncertainty, series.uncertainty);
