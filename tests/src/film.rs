@@ -1,6 +1,6 @@
 //! Films: frames that are those of `render`, that are kept, and that do not flicker.
 
-use crate::support::{fail, folder_with, object, sets, succeed, told};
+use crate::support::{fail, fail_with, folder_with, object, sets, succeed, told};
 use kerrlight_render::Error;
 use kerrlight_render::image::exr;
 use kerrlight_render::scene::Scene;
@@ -144,8 +144,7 @@ fn exact_second_run_goes_on() {
     let gif = std::fs::read(folder.path().join("a.gif")).unwrap();
     assert!(gif.starts_with(b"GIF89a"));
     let other = [&MOVIE[..], &["--set", "hole.spin=0.5"][..]].concat();
-    let message = fail(folder.path(), &other);
-    assert!(message.contains("scene_resolved") && message.contains("another folder"), "{message}");
+    fail_with(folder.path(), &other, &["scene_resolved", "another folder"]);
     let fewer = ["movie", "spot.toml", "--frames", "2", "--duration", "60min", "-o", "film"];
     assert!(fail(folder.path(), &fewer).contains("frame_0002.exr"));
     assert!(fail(folder.path(), &MOVIE[..4]).contains("--output"));
@@ -181,8 +180,7 @@ fn exact_parts_are_frames_of_the_whole() {
     let words = ["movie", "spot.toml", "--duration", "60", "-o", "parts", "--frames"];
     let error = fail(at, &[&words[..], &["0..1/5", "--gif", "x.gif"]].concat());
     assert!(error.contains("show the whole film: give them with --frames 5"), "{error}");
-    let error = fail(at, &[&words[..], &["3..5/5"]].concat());
-    assert!(error.contains("A..B/N for the frames A to B of N"), "{error}");
+    fail_with(at, &[&words[..], &["3..5/5"]].concat(), &["A..B/N for the frames A to B of N"]);
 }
 
 /// Bad cameras name the key and the line.

@@ -1,6 +1,8 @@
 //! `kerrlight fit`, from settings to a report.
 
-use crate::support::{are_the_same, fail, json, kill, render, root, scene, sets, start, succeed};
+use crate::support::{
+    are_the_same, fail_with, json, kill, render, root, scene, sets, start, succeed,
+};
 use std::path::Path;
 use std::time::Instant;
 
@@ -72,8 +74,7 @@ fn exact_every_representation_leaves_a_whole_run() {
 fn exact_a_field_of_events_is_fitted_without_a_mask() {
     let (small, folder) = (small(), tempfile::tempdir().unwrap());
     let events = ["-o", "run", "--set", "representation=mlp4d"];
-    let error = fail(folder.path(), &with(&small, &events));
-    assert!(error.contains("training.occupancy"), "{error}");
+    fail_with(folder.path(), &with(&small, &events), &["training.occupancy"]);
     let events = [&events[..], &["--set", "training.start=drawn"]].concat();
     let words = changed(folder.path(), |text| {
         let (before, rest) = text.split_once("[training.occupancy]").unwrap();
@@ -161,23 +162,18 @@ fn bad_input_is_named_and_nothing_is_begun() {
         ("nonsense=1", "unknown field `nonsense`"),
         ("representation=cubes", "representation.kind = \"cubes\" is not allowed: bhnerf"),
     ] {
-        let error = fail(folder.path(), &with(&small, &["-o", "run", "--set", change]));
-        assert!(error.contains(said), "{change}: {error}");
+        fail_with(folder.path(), &with(&small, &["-o", "run", "--set", change]), &[said]);
     }
     std::fs::create_dir(folder.path().join("full")).unwrap();
     std::fs::write(folder.path().join("full/mine.txt"), "mine").unwrap();
-    let error = fail(folder.path(), &with(&small, &["-o", "full"]));
-    assert!(error.contains("not an empty folder"), "{error}");
-    let error = fail(folder.path(), &["fit", "--resume", "full"]);
-    assert!(error.contains("holds no run"), "{error}");
+    fail_with(folder.path(), &with(&small, &["-o", "full"]), &["not an empty folder"]);
+    fail_with(folder.path(), &["fit", "--resume", "full"], &["holds no run"]);
     let text = std::fs::read_to_string(root().join("scenes/fits/scene_1.toml")).unwrap();
     std::fs::write(folder.path().join("a.toml"), text.replace("seed = 1", "seed = 2")).unwrap();
     succeed(folder.path(), &with(&small, &["-o", "run"]));
-    let error = fail(folder.path(), &["fit", "a.toml", "--resume", "run"]);
-    assert!(error.contains("differs from the settings"), "{error}");
+    fail_with(folder.path(), &["fit", "a.toml", "--resume", "run"], &["differs from the settings"]);
     std::fs::write(folder.path().join("run/checkpoint.safetensors"), b"broken").unwrap();
-    let error = fail(folder.path(), &["fit", "--resume", "run"]);
-    assert!(error.contains("checkpoint"), "{error}");
+    fail_with(folder.path(), &["fit", "--resume", "run"], &["checkpoint"]);
 }
 
 /// All data that an array gives, together, of the built-in experiment made small.

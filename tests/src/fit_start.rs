@@ -2,7 +2,7 @@
 
 use crate::fit::results;
 use crate::fit_data::{FEW, observed};
-use crate::support::{fail, scene_path, sets, succeed};
+use crate::support::{fail, fail_with, scene_path, sets, succeed};
 use kerrlight_render::image::exr;
 use std::path::Path;
 
@@ -105,8 +105,7 @@ fn exact_movie_of_a_run_is_observed() {
     );
     let read = |name: &str| std::fs::read_to_string(path.join(name)).unwrap();
     assert_eq!(read("a.csv"), read("b.csv"));
-    let message = fail(path, &see(&["--utc", "12.9-13.2", "-o", "c.csv"]));
-    assert!(message.contains("--frame-times"), "{message}");
+    fail_with(path, &see(&["--utc", "12.9-13.2", "-o", "c.csv"]), &["--frame-times"]);
 }
 
 /// The starter file of the built-in experiment is the built-in experiment.
@@ -143,8 +142,7 @@ fn exact_starters_of_visibilities_run() {
             ("# mass_msun = 4.154e6", "hole.mass_msun is missing"),
             ("# distance_kpc = 8.178", "hole.distance_kpc is missing"),
         ] {
-            let message = fail(path, &fit);
-            assert!(message.contains(missing), "{message}");
+            fail_with(path, &fit, &[missing]);
             let text = std::fs::read_to_string(path.join(&toml)).unwrap();
             assert!(text.contains(line), "{text}");
             std::fs::write(path.join(&toml), text.replacen(line, &line[2..], 1)).unwrap();

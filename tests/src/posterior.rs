@@ -1,7 +1,7 @@
 //! Draws around a finished fit.
 
 use crate::support::{
-    are_the_same, fail, folder_with, json, kill, root, sets, start, succeed, told, until,
+    are_the_same, fail_with, folder_with, json, kill, root, sets, start, succeed, told, until,
 };
 use crate::unknown_geometry::{NEAR, of_unknown_view};
 
@@ -201,8 +201,7 @@ fn exact_priors_that_mean_nothing_are_refused() {
     ] {
         let kind = ["fit", "fit.toml", "-o", "run", "--set", "representation=linear-grid"];
         let all = [&kind[..], &["--set", PRIOR, "--set", change]].concat();
-        let told = fail(folder.path(), &all);
-        assert!(told.contains(expected), "{change}: {told}");
+        fail_with(folder.path(), &all, &[expected]);
     }
 }
 
@@ -237,10 +236,7 @@ fn exact_draws_of_an_unknown_geometry_have_geometries() {
 #[test]
 fn exact_draws_without_a_finished_fit_are_refused() {
     let folder = folder_with("fit.toml", settings());
-    let refused = |arguments: &[&str], expected: &str| {
-        let said = fail(folder.path(), arguments);
-        assert!(said.contains(expected), "{arguments:?}: {said}");
-    };
+    let refused = |words: &[&str], expected: &str| fail_with(folder.path(), words, &[expected]);
     refused(&["posterior", "nowhere", "--samples", "4"], "nowhere");
     refused(&["posterior", "nowhere", "--samples", "1"], "2..=100000");
     for (change, expected) in [

@@ -1,7 +1,7 @@
 //! `kerrlight fit` of a flare beside what does not move, and of a rotation of position angles that is not known.
 
 use crate::fit::results;
-use crate::support::{fail, root, sets, succeed};
+use crate::support::{fail_with, root, sets, succeed};
 use std::path::Path;
 
 /// The scene of docs/method/quiescent-emission.md with a few exact images in place of visibilities.
@@ -75,7 +75,6 @@ fn exact_what_excludes_a_quiescent_image_is_refused() {
         ),
     ] {
         let words = [&["fit", &scene], &sets(set)[..], &["-o", "refused"]].concat();
-        let said = fail(folder.path(), &words);
-        assert!(said.contains(says), "{set:?}: {said}");
+        fail_with(folder.path(), &words, &[says]);
     }
 }

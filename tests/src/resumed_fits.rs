@@ -2,7 +2,8 @@
 
 use crate::fit::{results, small, with};
 use crate::support::{
-    are_the_same, fail, holds, kerrlight, kill, killed, root, sets, start, succeed, told, until,
+    are_the_same, fail, fail_with, holds, kerrlight, kill, killed, root, sets, start, succeed,
+    told, until,
 };
 use std::path::Path;
 
@@ -196,8 +197,7 @@ fn exact_comparisons_are_resumed_alone_with_the_same_data() {
     let sites = std::fs::read_to_string(&array).unwrap();
     std::fs::write(&array, sites.replace("11000", "12000")).unwrap();
     let before = std::fs::read(at.join("out/results.json")).unwrap();
-    let message = fail(at, &resume);
-    assert!(message.contains("array.txt has changed since"), "{message}");
+    fail_with(at, &resume, &["array.txt has changed since"]);
     assert!(std::fs::read(at.join("out/results.json")).unwrap() == before);
     std::fs::write(&array, sites).unwrap();
     // Damaged results of a case are made again, from its checkpoint.

@@ -236,6 +236,13 @@ pub fn fail(folder: &Path, arguments: &[&str]) -> String {
     message
 }
 
+/// Asserts that a run fails, leaving `folder` as it was, and that its message has these words.
+pub fn fail_with(folder: &Path, arguments: &[&str], words: &[&str]) {
+    let message = fail(folder, arguments);
+    let says = words.iter().all(|word| message.contains(word));
+    assert!(says, "{arguments:?} without {words:?}: {message}");
+}
+
 /// A number of [0, 1) for each index, and another one for each of six axes: multiples of powers of the inverse of x⁷ = x + 1 fall evenly
 /// in the cube of six sides.
 pub fn even(k: usize, axis: i32) -> f64 {

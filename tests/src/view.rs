@@ -1,7 +1,9 @@
 //! The page of `kerrlight view`: its files, and what a browser makes of it beside what `render` makes of its scene.
 
 use crate::browser::{Browser, address};
-use crate::support::{after, fail, folder_with, kill, message, scene_path, sets, start, succeed};
+use crate::support::{
+    after, fail, fail_with, folder_with, kill, message, scene_path, sets, start, succeed,
+};
 use kerrlight_geodesic::wgsl;
 use kerrlight_geodesic::{
     Camera, Inclination, Kerr, Motion, Observer, Outcome, Quantities, Tracer,
@@ -28,16 +30,14 @@ fn exact_the_page_has_the_tracer_and_loads_nothing() {
 #[test]
 fn a_folder_that_is_a_file() {
     let folder = folder_with("page", "no folder");
-    let told = fail(folder.path(), &["view", "--web", "page"]);
-    assert!(told.contains("cannot make the folder page"), "{told}");
+    fail_with(folder.path(), &["view", "--web", "page"], &["cannot make the folder page"]);
 }
 
 #[test]
 fn a_folder_without_a_fit() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("run")).unwrap();
-    let told = fail(folder.path(), &["view", "run", "--web", "page"]);
-    assert!(told.contains("run: no scene.toml"), "{told}");
+    fail_with(folder.path(), &["view", "run", "--web", "page"], &["run: no scene.toml"]);
     let told = fail(folder.path(), &["view", "--set", "hole.spin=2", "--web", "page"]);
     assert!(told.contains("hole.spin") && told.contains("-1 to 1"), "{told}");
 }
