@@ -291,7 +291,7 @@ fn bytes_of_rows(rows: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::array::built_in;
 

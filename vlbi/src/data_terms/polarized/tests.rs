@@ -4,24 +4,17 @@ use super::super::tests::{of_precision, off};
 use super::*;
 use crate::array::built_in;
 use crate::conformance;
-use crate::earth::{Frame, SourcePosition, Ut1};
+use crate::earth::SourcePosition;
 use crate::noise::{GainErrors, add_thermal_noise, apply_gains, apply_leakage};
-use crate::schedule::{Clock, Schedule, Setup, observe};
+use crate::schedule::tests::{SCHEDULE, SETUP};
+use crate::schedule::{Schedule, Setup, observe};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 /// A scan of the EHT with random visibilities of 1 Jy, their I, Q and U, and the leakage that was put on them.
 pub fn scan(leakage: f64, gains: bool) -> (Observation, Vec<Complex64>, SharedLeakage) {
-    let schedule =
-        Schedule { mjd: 57850, clock: Clock::Utc, start_h: 12.0, stop_h: 13.0, scans: 1 };
-    let setup = Setup {
-        frequency_hz: 230e9,
-        bandwidth_hz: 2e9,
-        integration_s: 60.0,
-        elevation_deg: [10.0, 85.0],
-        ut1: Ut1::Table,
-        frame: Frame::Catalogue,
-    };
+    let schedule = Schedule { start_h: 12.0, stop_h: 13.0, scans: 1, ..SCHEDULE };
+    let setup = Setup { frequency_hz: 230e9, bandwidth_hz: 2e9, ..SETUP };
     let array = built_in("EHT2017").unwrap();
     let mut data = observe(&array, SourcePosition::SGR_A, &schedule, &setup).unwrap();
     let mut random = Pcg64Mcg::seed_from_u64(8);

@@ -4,9 +4,10 @@ use super::super::fits::{Cards, ColumnData, binary_table, padded};
 use super::*;
 use crate::Complex64;
 use crate::array::{Station, built_in};
-use crate::earth::{Frame, SourcePosition, Ut1};
+use crate::earth::{Frame, SourcePosition};
 use crate::observation::{Averaging, Basis, Channel, Measured, Observation, Row};
-use crate::schedule::{Clock, Schedule, Setup, observe};
+use crate::schedule::tests::{SCHEDULE, SETUP};
+use crate::schedule::{Schedule, Setup, observe};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -53,15 +54,8 @@ pub(in crate::files) fn small() -> Observation {
 
 /// Scans of Sgr A* by the array of 2017, between two hours of UTC of MJD 57850.
 pub(super) fn observed(frame: Frame, [start_h, stop_h]: [f64; 2], scans: u32) -> Observation {
-    let schedule = Schedule { mjd: 57850, clock: Clock::Utc, start_h, stop_h, scans };
-    let setup = Setup {
-        frequency_hz: 226_191_789_062.5,
-        bandwidth_hz: 1.856e9,
-        integration_s: 60.0,
-        elevation_deg: [0.0, 90.0],
-        ut1: Ut1::Table,
-        frame,
-    };
+    let schedule = Schedule { start_h, stop_h, scans, ..SCHEDULE };
+    let setup = Setup { elevation_deg: [0.0, 90.0], frame, ..SETUP };
     observe(&built_in("EHT2017").unwrap(), SourcePosition::SGR_A, &schedule, &setup).unwrap()
 }
 
