@@ -8,7 +8,7 @@ use kerrlight_geodesic::{Kerr, ZamoFrame, orbits, plunge::Plunge, vector::dot};
 
 const LAW: Plunging = Plunging { intensity: 0.7, exponent: 1.5 };
 
-fn disc(plunging: Option<Plunging>) -> Disc {
+pub fn disc(plunging: Option<Plunging>) -> Disc {
     Disc {
         inner_edge: None,
         outer_edge: 12.0,
