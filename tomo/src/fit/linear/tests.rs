@@ -68,7 +68,7 @@ pub(super) fn normal(count: usize, seed: u64) -> Vec<f64> {
 }
 
 /// A problem without penalties, priors or a bound that acts.
-fn of_images<'a>(
+pub(in crate::fit) fn of_images<'a>(
     model: &'a ForwardModel<f64>,
     terms: &'a [Weighted<'a, f64>],
     voxels: Voxels,
@@ -87,7 +87,10 @@ fn of_images<'a>(
     }
 }
 
-fn solved(problem: &LinearProblem<'_, f64>, settings: LinearSettings) -> LinearSolution<f64> {
+pub(in crate::fit) fn solved(
+    problem: &LinearProblem<'_, f64>,
+    settings: LinearSettings,
+) -> LinearSolution<f64> {
     problem.solve(&settings, &mut |_| ControlFlow::Continue(())).unwrap()
 }
 

@@ -1,7 +1,8 @@
 //! Stokes factors of a fit against published formulas, pictures of the renderer and each other.
 
 use super::*;
-use crate::fit::linear::{Change, LinearProblem, LinearProgress, LinearSettings, Voxels, Weighted};
+use crate::fit::linear::tests::{movie_about, of_images, solved};
+use crate::fit::linear::{LinearProblem, LinearSettings, Voxels, Weighted};
 use crate::representation::Degree;
 use core::f64::consts::{PI, TAU};
 use kerrlight_render::polarization::{
@@ -283,33 +284,21 @@ fn exact_fluxes_are_sums_of_images() {
             assert!((found - expected).abs() < 1e-12 * sum(frame, 0));
         }
     }
-    let grid = Voxels::cube(7, 12.0, Degree::Linear).field().unwrap();
+    let voxels = Voxels::cube(7, 12.0, Degree::Linear);
     let parameters: Vec<f64> = (0..343).map(|k| (0.37 * f64::from(k)).sin().abs()).collect();
-    let field = Field { representation: &grid, parameters: &parameters, axis, occupancy: None };
-    let movie = super::images(&flux, field);
+    let movie = movie_about(axis, &flux, &voxels, &parameters);
     // Data of exactly these fluxes are explained by exactly these voxels.
     let term = ImageTerm::new(movie, 3, 1e-3).unwrap();
-    let problem = LinearProblem {
-        model: &flux,
-        axis,
-        frames: &[0, 1, 2],
-        terms: &[Weighted { weight: 1.0, term: &term }],
-        voxels: Voxels::cube(7, 12.0, Degree::Linear),
-        upper: 1.0,
-        flux: None,
-        priors: &[],
-        gaussian: None,
-        change: Change::NONE,
-    };
+    let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
+    let of_images = of_images(&flux, &terms, voxels);
+    let problem = LinearProblem { axis, frames: &[0, 1, 2], upper: 1.0, ..of_images };
     let settings = LinearSettings {
         coarse: None,
         iterations: 400,
         tolerance: 0.0,
         ..LinearSettings::default()
     };
-    let mut watch = |_: &LinearProgress| core::ops::ControlFlow::Continue(());
-    let found = problem.solve(&settings, &mut watch).unwrap();
-    let certificate = found.certificate.unwrap();
+    let certificate = solved(&problem, settings).certificate.unwrap();
     assert!(certificate.value < 1e-6 * certificate.dark, "{certificate:?}");
 }
 
