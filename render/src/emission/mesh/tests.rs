@@ -70,7 +70,7 @@ fn gltf(length: usize) -> String {
 }
 
 /// The file with `to` in place of `from`.
-fn changed(from: &str, to: &str) -> Result<MeshFile, crate::Error> {
+fn changed(from: &str, to: &str) -> Result<MeshFile, Error> {
     let text = gltf(36).replace(from, to);
     assert!(text != gltf(36), "{from}");
     MeshFile::decode(text.as_bytes(), &none)

@@ -64,7 +64,7 @@ fn exact_annulus_against_the_disc() {
         let ring = mesh(true, MeshVelocity::Keplerian);
         let with_mesh = prepared(base.clone(), vec![(ring, annulus(9.0, 15.0, sides))]);
         base.disc =
-            Some(Disc { inner_edge: Some(9.0), outer_edge: 15.0, ..super::discs::disc(None) });
+            Some(Disc { inner_edge: Some(9.0), outer_edge: 15.0, ..discs::disc(None) });
         let with_disc = PreparedScene::new(&base, None).unwrap();
         // Chords of the rings cut off this much.
         let flat = (PI / f64::from(sides)).cos();
