@@ -2,7 +2,7 @@
 //! what would be needed and what there is, never in a signal.
 
 use crate::file_fields::npy;
-use crate::support::{are_the_same, fail, fail_with, scene_path, sets, succeed};
+use crate::support::{are_the_same, fail, fail_with, replaced, scene_path, sets, succeed};
 use std::io::Write;
 use std::path::Path;
 
@@ -142,9 +142,8 @@ fn small(start: &'static str) -> Vec<&'static str> {
 /// Writes settings of a scene without its truth, for data.
 fn without_truth(at: &Path, scene: &str) {
     let text = std::fs::read_to_string(scene).unwrap();
-    let (head, rest) = text.split_once("[[simulation.truth.spot]]").unwrap();
-    let (_, tail) = rest.split_once("[[loss]]").unwrap();
-    std::fs::write(at.join("data.toml"), format!("{head}[[loss]]{tail}")).unwrap();
+    let text = replaced(&text, "[[simulation.truth.spot]]", "[[loss]]", "");
+    std::fs::write(at.join("data.toml"), text).unwrap();
 }
 
 /// A movie that is larger than its part of the memory is kept in a file, and nothing that comes out is another byte.

@@ -2,7 +2,8 @@
 
 use crate::fit::{changed, results, small, with};
 use crate::support::{
-    are_the_same, cramped, fail, fail_with, files, message, scene_path, sets, start, succeed, told,
+    are_the_same, cramped, fail, fail_with, files, message, replaced, scene_path, sets, start,
+    succeed, told,
 };
 use std::path::Path;
 
@@ -84,9 +85,7 @@ fn bad_settings_are_named_with_their_line() {
         fail_with(folder.path(), &with(&words, &["-o", "run"]), &[said]);
     }
     let words = changed(folder.path(), |text| {
-        let (before, rest) = text.split_once("[[loss]]").unwrap();
-        let (_, after) = rest.split_once("[representation]").unwrap();
-        format!("loss = []\n{before}[representation]{after}")
+        "loss = []\n".to_owned() + &replaced(text, "[[loss]]", "[representation]", "")
     });
     fail_with(folder.path(), &with(&words, &["-o", "run"]), &["loss is empty"]);
 }
@@ -98,13 +97,8 @@ fn movie(folder: &Path, pixel: &str) -> Vec<String> {
         (0..20).map(flux).collect::<Vec<_>>().join(",") + "\n"
     };
     std::fs::write(folder.join("frame.csv"), (0..20).map(row).collect::<String>()).unwrap();
-    let mut words = changed(folder, |text| {
-        let (before, rest) = text.split_once("[simulation").unwrap();
-        let (_, after) = rest.split_once("[[loss]]").unwrap();
-        format!(
-            "{before}[data.movie]\npath = \"frame.csv\"\nfrom = 0.0\nto = 0.0\n\n[[loss]]{after}"
-        )
-    });
+    let data = "[data.movie]\npath = \"frame.csv\"\nfrom = 0.0\nto = 0.0\n\n";
+    let mut words = changed(folder, |text| replaced(text, "[simulation", "[[loss]]", data));
     let simulated = |word: &String| word.starts_with("simulation.");
     let at = words.iter().position(simulated).unwrap();
     words.drain(at - 1..=at);

@@ -2,8 +2,8 @@
 
 use crate::fit::{results, small, with};
 use crate::support::{
-    are_the_same, fail, fail_with, holds, kerrlight, kill, killed, root, sets, start, succeed,
-    told, until,
+    are_the_same, fail, fail_with, holds, kerrlight, kill, killed, replaced, root, sets, start,
+    succeed, told, until,
 };
 use std::path::Path;
 
@@ -13,10 +13,9 @@ fn of_a_movie(at: &Path) {
     let text = std::fs::read_to_string(at.join("source/fit.toml")).unwrap();
     // Its paths are this file's own: not those of the run, which the first line names.
     let (_, text) = text.split_once('\n').unwrap();
-    let (before, rest) = text.split_once("[simulation").unwrap();
-    let (_, after) = rest.split_once("[[loss]]").unwrap();
-    let data = "[data.movie]\npath = \"movie.csv\"\nfrom = 0.0\nto = 0.0\n\n[[loss]]";
-    std::fs::write(at.join("movie.toml"), format!("{before}{data}{after}")).unwrap();
+    let data = "[data.movie]\npath = \"movie.csv\"\nfrom = 0.0\nto = 0.0\n\n";
+    let text = replaced(text, "[simulation", "[[loss]]", data);
+    std::fs::write(at.join("movie.toml"), text).unwrap();
 }
 
 /// An array of telescopes as a file, and the words of a fit of what it sees.

@@ -108,6 +108,13 @@ pub fn sets<'a>(settings: &[&'a str]) -> Vec<&'a str> {
     settings.iter().flat_map(|setting| ["--set", *setting]).collect()
 }
 
+/// The text with another part in place of that from the first `from` to the next `to`, which stays.
+pub fn replaced(text: &str, from: &str, to: &str, with: &str) -> String {
+    let (before, rest) = text.split_once(from).expect(from);
+    let at = rest.find(to).expect(to);
+    format!("{before}{with}{}", &rest[at..])
+}
+
 /// All scene files of the repository with their texts.
 pub fn scenes() -> Vec<(PathBuf, String)> {
     let mut files: Vec<PathBuf> = std::fs::read_dir(root().join("scenes"))

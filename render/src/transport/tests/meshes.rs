@@ -63,8 +63,7 @@ fn exact_annulus_against_the_disc() {
         let mut base = scene(&[&format!("hole.spin={spin}")]);
         let ring = mesh(true, MeshVelocity::Keplerian);
         let with_mesh = prepared(base.clone(), vec![(ring, annulus(9.0, 15.0, sides))]);
-        base.disc =
-            Some(Disc { inner_edge: Some(9.0), outer_edge: 15.0, ..discs::disc(None) });
+        base.disc = Some(Disc { inner_edge: Some(9.0), outer_edge: 15.0, ..discs::disc(None) });
         let with_disc = PreparedScene::new(&base, None).unwrap();
         // Chords of the rings cut off this much.
         let flat = (PI / f64::from(sides)).cos();

@@ -170,11 +170,11 @@ mod tests {
             let change = change(allowed);
             let mut slopes = [0.0; 6];
             change.penalty(&x, 0.1, 1.0, &[], &mut slopes);
-            for k in 0..6 {
+            for (k, expected) in slopes.into_iter().enumerate() {
                 let difference = slope(1e-6, |h| {
                     change.penalty(&beside(&x, k, h), 0.1, 1.0, &[], &mut [0.0; 6])
                 });
-                assert!((difference - slopes[k]).abs() < 1e-8, "{allowed:?} {k}");
+                assert!((difference - expected).abs() < 1e-8, "{allowed:?} {k}");
             }
         }
     }
