@@ -93,7 +93,7 @@ pub fn survey(
         return Ok(None);
     };
     let known_sky = match shape {
-        Some(shape) => search.calibration(measured, shape, &others, &frames, count.div_ceil(2))?,
+        Some(shape) => search.calibration(measured, shape, &others, &frames, known_skies(count))?,
         None => None,
     };
     let envelope = expected.map(|(envelope, _)| envelope);
@@ -170,17 +170,22 @@ pub(super) fn held(
     Some(each.map(|(value, losses)| Held { value: *value, losses: losses.to_vec() }).collect())
 }
 
+/// Images of a known sky beside so many draws: what a method adds has an error from two on.
+fn known_skies(draws: usize) -> usize {
+    if draws == 0 { 0 } else { draws.div_ceil(2).max(2) }
+}
+
 /// Distance of frames over the least one, from which on there is a gap between scans.
 const GAP: f64 = 1.5;
 
 /// The part that each frame is held out with. Frames of a scan see the sky through nearly the same baselines, and would tell
 /// the fit what it is to predict: scans are held out whole, where there are two of them for each part. So are frames of several files at
 /// one hour of UTC.
-fn parts(times: &[f64], files: &[usize], folds: usize) -> Vec<usize> {
-    let least = cadence(times, files);
+fn parts(times: &[f64], files: &[usize], folds: usize, averaged_h: f64) -> Vec<usize> {
+    let apart = (GAP * cadence(times, files)).max(averaged_h);
     let mut scans = vec![0; times.len()];
     for (frame, pair) in times.windows(2).enumerate() {
-        scans[frame + 1] = scans[frame] + usize::from(pair[1] - pair[0] > GAP * least);
+        scans[frame + 1] = scans[frame] + usize::from(pair[1] - pair[0] > apart);
     }
     let is_enough = scans.last().is_some_and(|last| last + 1 >= 2 * folds);
     let each = if is_enough { scans } else { instants(times, files) };
@@ -261,7 +266,9 @@ impl Search<'_> {
         let Some(settings) = &self.file.strength else { return Some(Vec::new()) };
         let folds = settings.folds;
         let times = &measured.times;
-        let parts = parts(times, &measured.files, folds);
+        // Averages lie on the clock, so that those of a scan are less than two of their lengths apart.
+        let averaged_h = 2.0 * self.file.data.visibilities.average_s / 3600.0;
+        let parts = parts(times, &measured.files, folds, averaged_h);
         let part = |fold: usize, seen: bool| -> Vec<usize> {
             (0..times.len()).filter(|frame| (parts[*frame] != fold) == seen).collect()
         };
@@ -401,20 +408,28 @@ mod tests {
     #[test]
     fn exact_scans_are_held_out_whole() {
         let times = [0.0, 1.0, 2.0, 9.0, 10.0, 20.0, 21.0, 30.0];
-        assert_eq!(parts(&times, &[], 2), [0, 0, 0, 1, 1, 0, 0, 1]);
+        assert_eq!(parts(&times, &[], 2, 0.0), [0, 0, 0, 1, 1, 0, 0, 1]);
         assert_eq!(
-            parts(&times, &[], 3),
+            parts(&times, &[], 3, 0.0),
             [0, 1, 2, 0, 1, 2, 0, 1],
             "too few scans: frame by frame"
         );
-        assert_eq!(parts(&[0.0, 5.0, 10.0, 15.0], &[], 2), [0, 1, 0, 1], "frames without a gap");
+        assert_eq!(
+            parts(&[0.0, 5.0, 10.0, 15.0], &[], 2, 0.0),
+            [0, 1, 0, 1],
+            "frames without a gap"
+        );
+        // Averages of five minutes on the clock: a ragged scan has two that are nearer, and whole scans stay together.
+        let minutes = [2.5, 7.5, 22.5, 27.5, 34.0, 36.0, 42.5, 47.5];
+        assert_eq!(parts(&minutes, &[], 2, 10.0), [0, 0, 1, 1, 1, 1, 1, 1]);
+        assert_eq!(parts(&minutes.map(|x| 4.0 * x), &[], 2, 10.0), [0, 0, 1, 1, 0, 0, 1, 1]);
         // Two bands of one night a second apart, with scans and without gaps.
         let both = [0.0, 1.0, 10.0, 11.0, 40.0, 41.0, 50.0, 51.0, 80.0, 81.0, 120.0, 121.0];
         let bands = [0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1];
-        assert_eq!(parts(&both, &bands, 2), [0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 1, 1]);
+        assert_eq!(parts(&both, &bands, 2, 0.0), [0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 1, 1]);
         let steady = [0.0, 1.0, 10.0, 11.0, 20.0, 21.0];
-        assert_eq!(parts(&steady, &bands[..6], 2), [0, 0, 1, 1, 0, 0]);
+        assert_eq!(parts(&steady, &bands[..6], 2, 0.0), [0, 0, 1, 1, 0, 0]);
         // Files with a frame each have no cadence: every hour is an instant.
-        assert_eq!(parts(&[1.0, 2.0, 2.0, 3.0, 4.0], &[0, 1, 2, 3, 4], 2), [0, 1, 1, 0, 1]);
+        assert_eq!(parts(&[1.0, 2.0, 2.0, 3.0, 4.0], &[0, 1, 2, 3, 4], 2, 0.0), [0, 1, 1, 0, 1]);
     }
 }

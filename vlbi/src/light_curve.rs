@@ -43,6 +43,8 @@ pub struct LightCurve {
 
 /// Part of the power on baselines within a site that may be imaginary.
 const INCOHERENT: f64 = 0.05;
+/// Standard deviations of the power of noise that are chance.
+const BY_CHANCE: f64 = 3.0;
 /// Baselines shorter than this many metres are within a site.
 const SITE_M: f64 = 10e3;
 /// The same in wavelengths, where no one tells where the stations are: 10 km at 1.3 mm.
@@ -72,13 +74,16 @@ impl LightCurve {
     /// nothing for an unresolved source in the middle of the field, a half where phases are not calibrated.
     pub fn incoherent_part(observation: &Observation) -> Option<f64> {
         let near = observation.stokes_i().filter(|(row, _)| is_within_site(observation, row));
-        // Noise is in both parts, and would be most of what is weak.
-        let (imaginary, all) = near.fold((0.0, 0.0), |(imaginary, all), (_, i)| {
+        let (mut imaginary, mut all, mut scatter) = (0.0, 0.0, 0.0);
+        for (_, i) in near {
+            // Noise is in both parts, and would be most of what is weak.
             let noise = if i.noise_sigma > 0.0 { i.noise_sigma.powi(2) } else { 0.0 };
-            let power = i.visibility.norm_sqr() - 2.0 * noise;
-            (imaginary + i.visibility.im.powi(2) - noise, all + power)
-        });
-        Some(imaginary / all).filter(|part| *part > INCOHERENT)
+            imaginary += i.visibility.im.powi(2) - noise;
+            all += i.visibility.norm_sqr() - 2.0 * noise;
+            scatter += 2.0 * noise.powi(2);
+        }
+        let is_beyond = all > 0.0 && imaginary > INCOHERENT * all + BY_CHANCE * scatter.sqrt();
+        is_beyond.then(|| imaginary / all)
     }
 
     /// Samples from the first to the second hour.
@@ -275,7 +280,8 @@ mod tests {
             *turned *= c(0.6, 0.8);
         }
         // Less the noise in both parts.
-        let noise = 0.25 * 0.25;
+        observation.rows[1].noise_sigma = [0.03, 0.04, 0.06, 0.08];
+        let noise = 0.025 * 0.025;
         let expected = (0.64 * i * i - noise) / (i * i - 2.0 * noise);
         assert!((LightCurve::incoherent_part(&observation).unwrap() - expected).abs() < 1e-12);
     }

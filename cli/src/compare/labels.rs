@@ -121,6 +121,20 @@ pub fn described(value: &str) -> (String, usize) {
     }
 }
 
+/// The turn after which an angle is the same, degrees; none of other results.
+pub fn period(value: &str) -> Option<f64> {
+    match value {
+        "ring_position_angle_deg"
+        | "band_azimuth_deg"
+        | "band_azimuth_low_deg"
+        | "band_azimuth_high_deg"
+        | "polarization_beta2_deg" => Some(360.0),
+        // The electric vector has no head.
+        "polarization_net_evpa_deg" => Some(180.0),
+        _ => None,
+    }
+}
+
 /// One result of a case.
 pub fn result(results: &Value, value: &str) -> Option<f64> {
     if value == "chi2" {

@@ -296,7 +296,9 @@ fn run(
         let status = runner.run(case, &keeper);
         bar.inc(u64::from(status != Status::Open));
         session::reached(&bar);
-        one::keep_failure(folder, case, &status)?;
+        if let Err(error) = one::keep_failure(folder, case, &status) {
+            bar.suspend(|| eprintln!("warning: {}", plain::reasons(&error)));
+        }
         if let Status::Failed(why) = status {
             bar.suspend(|| eprintln!("failed: {}: {why}", case.name()));
             failed.insert(case.slug(), why);

@@ -7,6 +7,7 @@ use crate::answer::Answer;
 use crate::interrupt::{Interrupted, SignalGuard};
 use crate::lock::Lock;
 use crate::output::{self, Output};
+use crate::plain;
 use std::path::{Path, PathBuf};
 
 /// Another process runs the same case.
@@ -21,7 +22,8 @@ pub fn run(case: &Case, runner: &Runner<'_>, folder: &Path) -> anyhow::Result<An
     };
     let keeper = SignalGuard::saving("stopping after the fit's step; a second signal ends at once");
     let status = runner.run(case, &keeper);
-    keep_failure(folder, case, &status)?;
+    // Why a case failed counts more than that it cannot be kept.
+    let kept = keep_failure(folder, case, &status);
     match status {
         Status::Done(results) => {
             drop(lock);
@@ -33,6 +35,9 @@ pub fn run(case: &Case, runner: &Runner<'_>, folder: &Path) -> anyhow::Result<An
                 .with("results", results))
         }
         Status::Failed(why) => {
+            if let Err(error) = kept {
+                eprintln!("warning: {}", plain::reasons(&error));
+            }
             Err(Failed { failed: 1, all: 1, names: format!("{}: {why}", case.name()) }.into())
         }
         Status::Open => {

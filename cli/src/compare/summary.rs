@@ -1,7 +1,7 @@
 //! Summary of the cases of an experiment: all of them, and means over seeds.
 
 use super::cases::{Case, Status};
-use super::labels::{RESULTS, described, number};
+use super::labels::{RESULTS, described, number, period};
 use super::results::Results;
 use super::runner::TOGETHER;
 use crate::checksum;
@@ -213,7 +213,7 @@ impl<'a> Summary<'a> {
     /// One result of all cases that are at these levels.
     pub fn spread(&self, value: &str, levels: &[(&str, &str)]) -> Option<Spread> {
         let values = self.at(levels).into_iter().filter_map(|(_, results)| results.get(value));
-        Spread::of(&values.collect::<Vec<_>>())
+        Spread::of(&unwrapped(values.collect(), period(value)))
     }
 
     /// The same as a table, a line a case.
@@ -283,6 +283,15 @@ pub fn is_at(case: &Case, levels: &[(&str, &str)]) -> bool {
     levels.iter().all(|(factor, level)| case.level(factor) == Some(level))
 }
 
+/// Angles as the first of them has them, the short way round: 359 and 1 degrees are neighbours.
+fn unwrapped(mut values: Vec<f64>, period: Option<f64>) -> Vec<f64> {
+    if let (Some(period), Some(first)) = (period, values.first().copied()) {
+        let near = |x: f64| first + (x - first + 0.5 * period).rem_euclid(period) - 0.5 * period;
+        values.iter_mut().for_each(|x| *x = near(*x));
+    }
+    values
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -290,6 +299,9 @@ mod tests {
     #[test]
     fn exact_means_and_deviations() {
         assert_eq!(Spread::of(&[]), None);
+        assert_eq!(unwrapped(vec![359.0, 1.0, 358.0], Some(360.0)), [359.0, 361.0, 358.0]);
+        assert_eq!(unwrapped(vec![-89.0, 89.0], Some(180.0)), [-89.0, -91.0]);
+        assert_eq!(unwrapped(vec![359.0, 1.0], None), [359.0, 1.0]);
         let one = Spread::of(&[3.0]).unwrap();
         assert_eq!((one.mean, one.deviation, one.text(1)), (3.0, 0.0, "3.0".to_owned()));
         let three = Spread::of(&[1.0, 2.0, 3.0]).unwrap();

@@ -17,9 +17,12 @@ pub const FILE: &str = "inputs.json";
 pub fn read_again<R>(run: &Path, read: impl FnOnce() -> anyhow::Result<R>) -> anyhow::Result<R> {
     let (found, all) = output::with_reads(read);
     let (found, inputs) = (found?, Inputs::load(run)?);
-    if let Some((other, _)) = all.iter().find(|(path, _)| !inputs.holds(path)) {
+    let is_known = |(path, sum): &&(PathBuf, Sum)| {
+        inputs.holds(path) || inputs.files.iter().any(|known| known.sum == *sum)
+    };
+    if let Some((other, _)) = all.iter().find(|read| !is_known(read)) {
         bail!(
-            "{} was not there when {} was begun: take it away, or start a new run with -o",
+            "{} is none of the files that {} was begun with: take it away, or start a new run with -o",
             other.display(),
             run.display()
         );

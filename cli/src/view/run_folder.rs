@@ -6,6 +6,7 @@ use anyhow::{Context, bail, ensure};
 use kerrlight_common::numpy::{Archive, read_array};
 use kerrlight_render::scene::Scene;
 use kerrlight_render::volume::VolumeFile;
+use kerrlight_tomo::fit::flight;
 use std::path::{Path, PathBuf};
 
 /// Pictures that a fit was made of.
@@ -44,7 +45,13 @@ pub fn measured_of(folder: &Path, scene: &Scene) -> anyhow::Result<Option<Measur
     if !path.is_file() {
         return Ok(None);
     }
-    read(&path, scene.field_of_view_m()).with_context(|| path.display().to_string())
+    let measured = read(&path, scene.field_of_view_m());
+    let mut measured = measured.with_context(|| path.display().to_string())?;
+    // Scenes count the way of light to a finite radius, which times of frames leave out.
+    let later = if scene.effects.slow_light { flight(1.0 / scene.observer.radius) } else { 0.0 };
+    let times = measured.iter_mut().flat_map(|measured| &mut measured.times);
+    times.for_each(|time| *time += later);
+    Ok(measured)
 }
 
 fn read(path: &Path, field: f64) -> anyhow::Result<Option<Measured>> {

@@ -22,10 +22,10 @@ pub fn gauss_4(from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
     GAUSS_4.into_iter().map(move |(x, w)| (middle + half * x, half * w))
 }
 
-/// `n` ≥ 2 points from `from` to `to`, both ends included, in the unit of the ends.
+/// `n` points from `from` to `to`, both ends included, in the unit of the ends; a single one at `from`.
 pub fn equidistant(from: f64, to: f64, n: usize) -> impl ExactSizeIterator<Item = f64> {
     let step = (to - from) / (n.max(2) - 1) as f64;
-    (0..n).map(move |k| if k + 1 == n { to } else { from + step * k as f64 })
+    (0..n).map(move |k| if k > 0 && k + 1 == n { to } else { from + step * k as f64 })
 }
 
 /// Nodes in (0, 1), in order, and weights of the Gauss–Legendre rule with `n` ≥ 1 points:

@@ -196,7 +196,11 @@ impl<'a, T: Elementary, S: Sink<T>> Sampler<'a, T, S> {
         let captured = ray.outcome() == Outcome::Captured;
         // Each end that is not at infinity counts half.
         let (from, to) = mino_ends(n, self.at_infinity, captured);
-        let step = if n > 1 { (to - from) / (n - 1) as f64 } else { to - from };
+        let step = match n {
+            // The distance to an end of the ray is that to the next sample, if there were one.
+            1 => 1.0 / (1 + usize::from(self.at_infinity == [true; 2] && !captured)) as f64,
+            _ => (to - from) / (n - 1) as f64,
+        };
         for (k, share) in equidistant(from, to, n).enumerate() {
             let first = k == 0 && !self.at_infinity[0];
             let last = k + 1 == n && (captured || !self.at_infinity[1]);

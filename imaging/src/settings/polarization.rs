@@ -52,6 +52,14 @@ impl StaticPolarization {
         if !is_ratio && self.least_snr.is_some() {
             refuse!("polarization.least_snr is for data = \"polarimetric-ratios\"");
         }
+        let knows_phases = file.loss.iter().any(|loss| loss.data == LossKind::Visibilities);
+        let has_gains =
+            file.instrument.as_ref().is_some_and(|instrument| instrument.gains.is_some());
+        if !is_ratio && !knows_phases && !has_gains {
+            refuse!(
+                "polarization.data = \"polarized-visibilities\" needs [instrument.gains], or a loss of visibilities: nothing else tells the phases; \"polarimetric-ratios\" need none"
+            );
+        }
         let leaks = file.instrument.as_ref().is_some_and(|instrument| instrument.leakage.is_some());
         if leaks && is_ratio {
             refuse!(

@@ -98,9 +98,11 @@ pub fn recovered_at(
 ) -> Result<Volume, Error> {
     let region = file.region.limits();
     let shines = motion.injection.is_none_or(|start| motion.reference + since >= start.time);
+    // What is not carried knows the places of the time itself.
+    let is_carried = trainer.representation.is_carried();
     let was_inside = |[x, y, z]: [f64; 3]| {
         let radius = x.hypot(y).hypot(z);
-        let flow = motion.velocity.falling();
+        let flow = motion.velocity.falling().filter(|_| is_carried);
         flow.is_none_or(|flow| {
             (region.r_min..=region.r_max).contains(&flow.radius_before(radius, since))
         })

@@ -182,7 +182,10 @@ fn of_observation(
             let static_image = image().ok();
             let look =
                 static_image.as_ref().and_then(|text| QuickLook::new(text, observation, file));
-            let (Some(text), Some(look)) = (static_image, look) else { return volume() };
+            let (Some(text), Some(look)) = (static_image, look) else {
+                let said = "whether the data ask for motion was not tested: nothing is published of the image at this frequency; --model image fits one";
+                return Ok(volume()?.replacen('\n', &format!("\n{}{said}\n", guess::READ), 1));
+            };
             let text = if look.explains() { text } else { volume()? };
             let said = format!("\n{}{}\n", guess::READ, look.sentence());
             Ok(text.replacen('\n', &said, 1))

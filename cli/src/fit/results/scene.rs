@@ -109,7 +109,8 @@ impl Estimate<'_> {
     /// What scenes count of the way of light, and times of frames leave out, M.
     fn later(&self) -> anyhow::Result<f64> {
         let is_slow = self.file.effects.slow_light;
-        Ok(if is_slow { flight(&setup::observer(&self.file.observer)?) } else { 0.0 })
+        let observer = setup::observer(&self.file.observer)?;
+        Ok(if is_slow { flight(observer.inverse_radius()) } else { 0.0 })
     }
 
     /// Hole and observer.

@@ -16,7 +16,7 @@ impl Found<'_> {
         let Some((seen, _)) = &self.measured.visibilities else { return Ok(Vec::new()) };
         let model = evidence.model_visibilities(&self.movie)?.unwrap_or_default();
         let of_phases = self.file.loss.iter().find(|loss| loss.data == LossKind::ClosurePhases);
-        let least_snr = of_phases.and_then(|loss| loss.least_snr).unwrap_or(3.0);
+        let least_snr = of_phases.map_or(3.0, |loss| loss.least_snr.unwrap_or(0.0));
         let sets = ClosureSet::of(seen, ClosureKind::Phase, least_snr);
         // Hour, datum, its standard deviation and the image's phase, which is the one that is nearest to the datum.
         let mut triangles: BTreeMap<&[u16], Vec<[f64; 4]>> = BTreeMap::new();

@@ -6,20 +6,20 @@ use super::polarized::Polarized;
 use crate::fit::closures;
 use crate::fit::results::medium;
 use crate::report::Part;
-use kerrlight_imaging::settings::StartImage;
+use kerrlight_imaging::settings::{RingSettings, StartImage};
 use kerrlight_imaging::{Calibration, Envelope, Profile, ShapeFit, Survey, best_shape};
 use kerrlight_tomo::fit::settings::LossKind;
 
 impl Found<'_> {
     /// The ring in a sentence, where one is looked for.
     pub fn ring_sentence(&self) -> Option<String> {
-        self.file.ring.map(|_| ring(&self.survey, &self.shapes))
+        self.file.ring.map(|between| ring(&self.survey, &self.shapes, &between))
     }
 }
 
 /// The numbers of a ring where one is claimed, and why none is where the image or a simple shape has one.
-fn ring(survey: &Survey, shapes: &[ShapeFit]) -> String {
-    let Some(ring) = survey.found().ring else { return no_ring(shapes) };
+fn ring(survey: &Survey, shapes: &[ShapeFit], between: &RingSettings) -> String {
+    let Some(ring) = survey.found().ring else { return no_ring(survey, shapes, between) };
     if let Some(doubt) = doubt(survey, shapes) {
         return format!("The image looks like a ring, but {doubt}: no ring is claimed.");
     }
@@ -47,14 +47,21 @@ fn ring(survey: &Survey, shapes: &[ShapeFit]) -> String {
 }
 
 /// States that the image has no ring, and whether a simple shape with one fits the data better than those without.
-fn no_ring(shapes: &[ShapeFit]) -> String {
+fn no_ring(survey: &Survey, shapes: &[ShapeFit], between: &RingSettings) -> String {
     let none = "The image has no ring between the radii that were asked for";
     let Some(best) = best_shape(shapes.iter()).filter(|best| best.shape.is_ring()) else {
         return format!("{none}.");
     };
     let sizes = best.sizes.iter().map(|(name, value, unit)| format!("{name} {value:.0} {unit}"));
+    let radius = best.sizes.iter().find(|(name, ..)| *name == "diameter").map(|size| 0.5 * size.1);
+    let range = between.least_radius_uas..=between.most_radius_uas;
+    let means = match radius.is_none_or(|radius| range.contains(&radius)) {
+        false => "change ring.least_radius_uas and ring.most_radius_uas to look for it",
+        true if !survey.found().solution.has_converged => "the image did not come to a minimum",
+        true => "the data allow a ring and do not require it",
+    };
     format!(
-        "{none}, but of the simple shapes a {} fits best ({}): the data allow a ring and do not require it.",
+        "{none}, but of the simple shapes a {} fits best ({}): {means}.",
         best.shape.name(),
         sizes.collect::<Vec<_>>().join(", ")
     )

@@ -141,7 +141,7 @@ impl Sightlines {
         let wanted = request.of_rays(observer)?;
         let view = View::Screen(*observer);
         let tracer = BlockTracer::new(*hole, view, Integrator::Elliptic, TOLERANCE)?;
-        let (flight, mut memory) = (flight(observer), RayBlock::default());
+        let (flight, mut memory) = (flight(observer.inverse_radius()), RayBlock::default());
         let limits = Some(request.region.radii());
         let mut all = Self { pixels: alpha.len(), starts: vec![0], limits, ..Self::default() };
         for (block, (alpha, beta)) in alpha.chunks(BLOCK).zip(beta.chunks(BLOCK)).enumerate() {
@@ -272,10 +272,9 @@ impl Sightlines {
     }
 }
 
-/// Returns the part of the time of flight to an observer that times of frames leave out: r_o + 2 ln r_o at a finite radius,
-/// which grows without end. Times of frames mean the same at any distance then.
-pub fn flight(observer: &Observer) -> f64 {
-    let w = observer.inverse_radius();
+/// Returns the part of the time of flight to an observer at a radius of 1/w that times of frames leave out: r_o + 2 ln r_o at a finite
+/// one, which grows without end. Times of frames mean the same at any distance then.
+pub fn flight(w: f64) -> f64 {
     if w > 0.0 { 1.0 / w - 2.0 * w.ln() } else { 0.0 }
 }
 

@@ -284,18 +284,18 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
         )?;
     }
     check_prior(file)?;
-    check_axis(file)?;
+    check_axis(file, registry)?;
     enough_nodes_and_iterations(file)?;
     check_reference(file)
 }
 
 /// Refuses an axis that nothing learns, and flows that would have to turn with it.
-fn check_axis(file: &FitFile) -> Result<()> {
+fn check_axis(file: &FitFile, registry: &Registry) -> Result<()> {
     if file.axis == (AxisSearch::Known {}) {
         return Ok(());
     }
-    let learns = !matches!(file.representation.kind, Kind::LinearGrid | Kind::Mlp4d);
-    if axis(file)?.1.is_some() && !learns {
+    let is_solved = file.representation.kind == Kind::LinearGrid;
+    if axis(file)?.1.is_some() && (is_solved || !of_matter(file, registry)?.is_carried()) {
         refuse!(
             "representation.kind = \"{}\" learns no axis: use another one, [axis.known], or [axis.scan] with rate = 0",
             file.representation.kind.name()
