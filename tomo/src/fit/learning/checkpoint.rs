@@ -51,7 +51,6 @@ pub struct Header {
     /// Steps taken.
     pub step: u64,
     /// Steps taken by the state that is gone back to; none yet, without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub good_step: Option<u64>,
     /// Number of times it has gone back.
     pub setbacks: u32,

@@ -57,7 +57,6 @@ pub struct BandSettings {
     #[schemars(range(min = 4, max = 128), extend("unit" = "rings between the axis and region.r_max"))]
     pub nodes: usize,
     /// Emission beside the flare, in Q and in U independent of each other: a constant and what varies about it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub background: Option<BackgroundSettings>,
 }
 

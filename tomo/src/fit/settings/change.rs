@@ -18,7 +18,6 @@ pub struct ChangeSettings {
     pub spacing: f64,
     /// An emission s: births found in a round cost s/(s + e) of `weight` in the next. Needs births and
     /// `linear.rounds` of 2 or more.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "an emission"))]
     pub sharpen: Option<f64>,
 }

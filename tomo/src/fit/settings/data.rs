@@ -26,15 +26,12 @@ pub enum DataFiles {
         #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
         first_time: f64,
         /// Drops baselines shorter than this, wavelengths.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 0.0), extend("unit" = "wavelengths"))]
         uv_min: Option<f64>,
         /// Interstellar scattering that is part of the model.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
         scattering: Option<Scattering>,
         /// Adds jy/(1 + (|u|/uv)²)^(power/2) to all errors, for what the source varies and the model does not; not
         /// with polarised products.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
         variability: Option<Variability>,
     },
     /// The light curve of an unresolved source: CSV.
@@ -65,14 +62,11 @@ pub struct Loss {
     pub weight: f64,
     /// Standard deviation of a pixel (image) or of a movie's flux (light-curve), Jy; needed for these two, but not
     /// for light curves of their own.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-15, max = 1e15), extend("unit" = "Jy"))]
     pub sigma: Option<f64>,
     /// Stokes parameters of a light curve of its own; `["I"]` without it.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub stokes: Option<Vec<StokesParameter>>,
     /// Least signal-to-noise ratio of baselines in closures and ratios; 0 without it.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "a signal-to-noise ratio"))]
     pub least_snr: Option<f64>,
 }

@@ -53,7 +53,6 @@ pub struct FieldSettings {
     /// ν of the Matérn covariance.
     pub matern: Roughness,
     /// Treatment of negative parts of a Gaussian field, for which it is needed.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub negative: Option<Negative>,
     /// Nodes along each axis of the cube about the region.
     #[schemars(range(min = 4, max = 256), extend("unit" = "nodes along each axis"))]

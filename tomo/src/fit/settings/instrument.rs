@@ -12,11 +12,9 @@ use std::collections::BTreeMap;
 pub struct InstrumentSettings {
     /// Complex gains, one a station and frame. Needs one loss of visibilities, polarised visibilities or
     /// amplitudes. Every station needs a prior.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gains: Option<GainSettings>,
     /// Leakage between the feeds, the same in all frames. Needs polarised visibilities, circular feeds, and a
     /// linear-grid or a linear start.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub leakage: Option<LeakageSettings>,
 }
 
@@ -43,10 +41,8 @@ pub struct GainSettings {
     #[schemars(extend("additionalProperties" = {"minimum": 0.0, "maximum": 10.0}, "unit" = "a standard deviation of ln |g|"))]
     pub stations: BTreeMap<String, f64>,
     /// Priors of stations that are not listed: `EHT2017` or `ngEHT`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<String>,
     /// Standard deviation of ln |g| of stations that neither has.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "a standard deviation of ln |g|"))]
     pub amplitude: Option<f64>,
 }

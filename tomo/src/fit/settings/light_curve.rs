@@ -13,16 +13,12 @@ use std::path::PathBuf;
 #[allow(non_snake_case)]
 pub struct PerStokes {
     /// Stokes I, Jy.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub I: Option<f64>,
     /// Stokes Q, Jy.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub Q: Option<f64>,
     /// Stokes U, Jy.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub U: Option<f64>,
     /// Stokes V, Jy.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub V: Option<f64>,
 }
 
@@ -43,11 +39,9 @@ impl PerStokes {
 #[serde(deny_unknown_fields)]
 pub struct SimulatedCurve {
     /// Hours of UTC of the samples, hours; this or `times`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = -1e4, max = 1e4)), extend("unit" = "hours of UTC"))]
     pub times_h: Option<Vec<f64>>,
     /// A CSV with such a column, relative to this file.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub times: Option<PathBuf>,
     /// Time of the first sample, M.
     #[serde(default)]
@@ -58,13 +52,10 @@ pub struct SimulatedCurve {
     /// Noise that is added.
     pub noise: Noise,
     /// A background that is drawn and added to Q and U.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub background: Option<SimulatedBackground>,
     /// Scales the truth to this mean of I; as bright as its amplitudes without it.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_flux: Option<MeanFlux>,
     /// Samples later than this after the first are not fitted, minutes; their χ² judges the fit.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "minutes"))]
     pub validate_after_min: Option<f64>,
 }
@@ -110,36 +101,27 @@ pub struct MeasuredCurve {
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub first_time: f64,
     /// First and last hour of UTC, hours; all without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = -1e4, max = 1e4)), extend("unit" = "hours of UTC"))]
     pub utc_h: Option<[f64; 2]>,
     /// Samples that are averaged.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 1_000_000_000), extend("unit" = "samples"))]
     pub average: Option<usize>,
     /// Time over which samples are averaged, s.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub average_s: Option<f64>,
     /// Averages later than this after the one before are dropped, s: they bridge gaps.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "seconds"))]
     pub most_gap_s: Option<f64>,
     /// Standard deviations, Jy, in place of the file's.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma: Option<PerStokes>,
     /// Constant flux that is subtracted, Jy.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steady: Option<PerStokes>,
     /// Added to position angles, degrees east of north: takes Faraday rotation back.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -360.0, max = 360.0), extend("unit" = "degrees east of north"))]
     pub derotation_deg: Option<f64>,
     /// I of all samples in place of the file's, Jy.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -1e15, max = 1e15), extend("unit" = "Jy"))]
     pub intensity: Option<f64>,
     /// Samples later than this after the first are not fitted, minutes; their χ² judges the fit.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "minutes"))]
     pub validate_after_min: Option<f64>,
 }

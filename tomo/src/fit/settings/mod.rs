@@ -77,29 +77,21 @@ pub struct FitFile {
     /// Motion of the emitting matter: circles about an axis, or with a radial velocity.
     pub motion: Motion,
     /// Magnetic field of the gas and its polarised light; total intensity alone without it.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub polarization: Option<PolarizationLaw>,
     /// Chooses a number of the linear problem by cross-validation.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<HeldOutSettings>,
     /// Emission that changes while matter carries it; without this table it does not.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub change: Option<ChangeSettings>,
     /// Emission that does not move, recovered beside the rest: an image on the screen, or a constant flux of each
     /// Stokes parameter of a light curve.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub quiescent: Option<QuiescentSettings>,
     /// Simulated data, in place of measured ones.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub simulation: Option<Simulation>,
     /// Measured data.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub data: Option<DataFiles>,
     /// The search for numbers that have a prior in place of a value.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub search: Option<GeometrySearch>,
     /// Instrumental parameters that are fitted with the emission.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub instrument: Option<InstrumentSettings>,
     /// Terms of the loss, the sum of weight · χ² per datum.
     pub loss: Vec<Loss>,
@@ -109,13 +101,11 @@ pub struct FitFile {
     #[serde(default)]
     pub training: Training,
     /// The linear problem of voxels, for linear-grid, a linear start, a scan of axes and searches.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub linear: Option<Linear>,
     /// The rotation axis: known, fitted from a start, or searched.
     #[serde(default)]
     pub axis: AxisSearch,
     /// Geometries that are compared first, by a flare in an orbital band.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub band: Option<BandSettings>,
     /// The recovered volume.
     #[serde(default)]

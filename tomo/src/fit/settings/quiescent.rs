@@ -12,11 +12,9 @@ pub struct QuiescentSettings {
     #[schemars(range(min = 1e-15, max = 1e15), extend("unit" = "M of emission; Jy, of a light curve"))]
     pub upper: f64,
     /// Factor on ∫ |∇b|² dA over the screen, b in M and A in M²; needed, but not for light curves.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a factor"))]
     pub smoothness: Option<f64>,
     /// Factor on ∫ b dA; needed, but not for light curves.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a factor"))]
     pub sparsity: Option<f64>,
 }

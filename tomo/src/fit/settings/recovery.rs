@@ -40,7 +40,6 @@ pub struct Linear {
     #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "the largest emission"))]
     pub upper: f64,
     /// Mean flux of a frame, Jy; needed with closure quantities alone.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-15, max = 1e15), extend("unit" = "Jy"))]
     pub flux_jy: Option<f64>,
     /// Factor on ∫ |∇e|² dV.
@@ -53,7 +52,6 @@ pub struct Linear {
     pub sparsity: f64,
     /// Gaussian or log-normal prior of the voxels: every loss then has the weight 1. Not with `[change]` or
     /// `[quiescent]`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub prior: Option<PriorOfVoxels>,
     /// B-splines between the nodes; a scan of axes and a `[band]` use trilinear voxels.
     #[serde(default = "cubic")]
@@ -90,7 +88,6 @@ pub enum Start {
         /// Steps of each round of the fit to its solution, which ends within 5 % of it or after four rounds.
         steps: u64,
         /// Iterations in place of `linear.iterations`.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
         iterations: Option<usize>,
     },
 }

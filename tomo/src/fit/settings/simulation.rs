@@ -19,13 +19,10 @@ pub struct Simulation {
     /// The simulated emission.
     pub truth: Truth,
     /// Times of images.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub movie: Option<Movie>,
     /// The array that observes it, at times of its own.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observation: Option<Observation>,
     /// The light curve that is observed of it, at times of its own.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub light_curve: Option<SimulatedCurve>,
     /// Draws numbers that have a prior from it, with the seed of the fit, for calibration. With `screen.ring_rays`, along
     /// 16 times as many rays near the critical curve.
@@ -170,7 +167,6 @@ pub struct Truth {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub glyph: Vec<GlyphShape>,
     /// A field drawn from a prior of voxels with the fit's seed, in the cube about the region.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub field: Option<FieldSettings>,
     /// Rings on the screen about the hole, the same in every frame.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -195,7 +191,6 @@ pub struct Spot {
     #[schemars(range(min = -1e6, max = 1e6), extend("unit" = "M"))]
     pub wound_for: f64,
     /// Time in which it shines; always without it.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub shines: Option<Shines>,
 }
 
@@ -278,11 +273,9 @@ impl Tube {
 #[serde(deny_unknown_fields)]
 pub struct Shines {
     /// Time at which it has reached half of its brightness, M; ever since without it.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub from: Option<f64>,
     /// Time at which it has faded to half, M; for ever without it.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub until: Option<f64>,
     /// Time constant of the logistic rise and decay, M.
@@ -329,10 +322,8 @@ pub struct Observation {
     /// Modified Julian date.
     pub mjd: i32,
     /// Hours of UTC of the first scan and of one after the last; this or `gmst`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub utc: Option<[f64; 2]>,
     /// The same in hours of Greenwich mean sidereal time, beginning on the day `mjd`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub gmst: Option<[f64; 2]>,
     /// Number of scans, a frame each.
     #[schemars(range(min = 1, max = 1_000_000), extend("unit" = "scans"))]
@@ -348,14 +339,11 @@ pub struct Observation {
     /// Noise that is added; errors are thermal in both cases.
     pub noise: Noise,
     /// Gain errors of the stations.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub gains: Option<GainErrors>,
     /// Root mean square of |d| of the leakage, drawn once for each feed; needs a loss of polarised visibilities.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0), extend("unit" = "a root mean square of |d|"))]
     pub leakage: Option<f64>,
     /// Fraction of each amplitude that the fit adds to its error in quadrature.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "part of the amplitude"))]
     #[schemars(example = 0.02)]
     pub systematic: Option<f64>,

@@ -16,12 +16,10 @@ pub struct Hole {
     #[schemars(extend("minimum" = -1.0, "maximum" = 1.0, "unit" = "a/M"))]
     pub spin: Quantity,
     /// Mass, solar masses; needed for hours and microarcseconds.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-20, max = 1e15), extend("unit" = "solar masses"))]
     #[schemars(example = 4.154e6)]
     pub mass_msun: Option<f64>,
     /// Distance, kpc; needed for microarcseconds.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-9, max = 1e12), extend("unit" = "kpc"))]
     #[schemars(example = 8.178)]
     pub distance_kpc: Option<f64>,
@@ -39,7 +37,6 @@ pub struct Observer {
     #[schemars(extend("minimum" = -360.0, "maximum" = 360.0, "unit" = "degrees east of north"))]
     pub position_angle_deg: Quantity,
     /// Boyer–Lindquist radius of the observer, above 2 M; infinity without it.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = 1000.0)]
     pub radius: Option<f64>,
 }
@@ -66,7 +63,6 @@ pub struct Screen {
     #[serde(default)]
     pub width_of: WidthOf,
     /// Width on the sky, µas; that of `width` at the hole's mass and distance without it.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-6, max = 1e12), extend("unit" = "microarcseconds"))]
     #[schemars(example = 120.0)]
     pub field_uas: Option<f64>,
@@ -75,18 +71,15 @@ pub struct Screen {
     pub jy_per_pixel: f64,
     /// Rays of each pixel near the critical curve, whose mean is its light; without it one, or 16 where images of another
     /// program ask for means.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = 8)]
     #[schemars(range(min = 1, max = 1024), extend("unit" = "rays"))]
     pub ring_rays: Option<usize>,
     /// Rays of each pixel on a regular grid, a square number, whose mean is its light; without it one, or as many as images
     /// of another program ask for.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(example = 4)]
     #[schemars(range(min = 1, max = 64), extend("unit" = "rays"))]
     pub samples_per_pixel: Option<usize>,
     /// Pixel shape seen by visibilities; triangle for simulated data and delta for measured data without it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(example = PixelShape::Delta)]
     pub pulse: Option<PixelShape>,
 }
@@ -136,7 +129,6 @@ pub struct Region {
     #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "M"))]
     pub r_max: f64,
     /// Largest |z|, M; unlimited without it.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-3), extend("unit" = "M"))]
     #[schemars(example = 4.0)]
     pub z_width: Option<f64>,
@@ -193,14 +185,12 @@ pub struct Motion {
     /// Law of motion; positive Ω is right-handed about the axis. Numbers of `infall` are values or priors.
     pub velocity: Velocity<Quantity>,
     /// Rotation axis, a vector of any length; needed with `[axis.known]` and for simulations.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<[f64; 3]>,
     /// Time at which the volume is the recovered one, M.
     #[serde(default)]
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     pub reference_time: f64,
     /// Emission is dark before this time, M; always lit without it.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -1e9, max = 1e9), extend("unit" = "M"))]
     #[schemars(example = 0.0)]
     pub injection_time: Option<f64>,
