@@ -2,7 +2,7 @@
 
 use super::active::{Active, NONE};
 use super::data::Data;
-use super::ray_weights::{Buffers, Walk};
+use super::ray_weights::{Buffers, Place, Walk};
 use super::rows::{Held, Rows};
 use crate::representation::spline::STENCIL;
 use core::ops::Range;
@@ -54,19 +54,9 @@ impl<'a, T: Float + Default> Operator<'a, T> {
             }
             Held::Walked => {}
         }
-        let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
-        let mut weights = [T::zero(); STENCIL];
-        self.walk.frame(self.frames[k], wanted, buffers, |pixel, places| {
+        self.walk.frame(self.frames[k], Some(&self.active.cells), buffers, |pixel, places| {
             let mut sum = T::zero();
-            for at in places {
-                at.weights(degree, &mut weights);
-                for (corner, entry) in self.corners.iter().zip(weights) {
-                    let column = self.active.column[at.corner as usize + corner];
-                    if column != NONE {
-                        sum += entry * x[column as usize];
-                    }
-                }
-            }
+            self.entries(places, |column, entry| sum += entry * x[column as usize]);
             image[pixel as usize] += sum;
         });
     }
@@ -81,20 +71,27 @@ impl<'a, T: Float + Default> Operator<'a, T> {
             }
             Held::Walked => {}
         }
-        let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
-        let mut weights = [T::zero(); STENCIL];
-        self.walk.frame(self.frames[k], wanted, buffers, |pixel, places| {
+        self.walk.frame(self.frames[k], Some(&self.active.cells), buffers, |pixel, places| {
             let slope = slopes[pixel as usize];
-            for at in places.iter().filter(|_| slope != T::zero()) {
-                at.weights(degree, &mut weights);
-                for (corner, entry) in self.corners.iter().zip(weights) {
-                    let column = self.active.column[at.corner as usize + corner];
-                    if column != NONE {
-                        sums[column as usize] += entry * slope;
-                    }
-                }
+            if slope != T::zero() {
+                self.entries(places, |column, entry| sums[column as usize] += entry * slope);
             }
         });
+    }
+
+    /// Hands over what nodes of a ray take from the columns about them, node after node.
+    #[inline(always)]
+    pub fn entries(&self, places: &[Place<T>], mut take: impl FnMut(u32, T)) {
+        let (mut weights, degree) = ([T::zero(); STENCIL], self.walk.voxels.degree);
+        for at in places {
+            degree.products(at.within, at.weight, &mut weights);
+            for (corner, entry) in self.corners.iter().zip(weights) {
+                let column = self.active.column[at.corner as usize + corner];
+                if column != NONE {
+                    take(column, entry);
+                }
+            }
+        }
     }
 
     /// The same for all nodes of the grid.
@@ -104,7 +101,7 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         self.walk.frame(self.frames[k], None, buffers, |pixel, places| {
             let slope = slopes[pixel as usize];
             for at in places.iter().filter(|_| slope != T::zero()) {
-                at.weights(degree, &mut weights);
+                degree.products(at.within, at.weight, &mut weights);
                 for (corner, entry) in self.corners.iter().zip(weights) {
                     sums[at.corner as usize + corner] += entry * slope;
                 }

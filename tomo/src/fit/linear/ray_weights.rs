@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::fit::ForwardModel;
 use crate::fit::loss::regulariser::Shape;
-use crate::representation::spline::{Degree, STENCIL, Spline};
+use crate::representation::spline::{Degree, Spline};
 use crate::representation::{Allowed, Knots};
 use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::{Axis, Turned, pull_back};
@@ -75,14 +75,6 @@ pub(super) struct Place<T> {
     pub within: [T; 3],
     /// Weight of the value there in the pixel.
     pub weight: T,
-}
-
-impl<T: Float> Place<T> {
-    /// Writes the weights of the nodes of the cell, z fastest.
-    #[inline(always)]
-    pub fn weights(&self, degree: Degree, out: &mut [T; STENCIL]) {
-        degree.products(self.within, self.weight, out);
-    }
 }
 
 #[derive(Clone, Copy)]
@@ -291,28 +283,6 @@ impl<'a, T: Float> Walk<'a, T> {
         pull_back(self.axis, turned, CoordinatesMut::xyz(a, b, c));
     }
 
-    /// Returns the time at which the light of a node in a frame is emitted.
-    #[inline(always)]
-    fn time(&self, node: usize, frame: usize) -> T {
-        let delay = self.model.delay.get(node).copied().unwrap_or(T::zero());
-        self.model.times[frame] - delay
-    }
-
-    /// Returns whether a node shines in a frame.
-    #[inline(always)]
-    fn shines(&self, node: usize, frame: usize) -> bool {
-        self.model.earliest.is_none_or(|earliest| self.time(node, frame) >= earliest)
-    }
-
-    /// The share of a knot in a node's emission in a frame.
-    #[inline(always)]
-    fn share(&self, node: usize, frame: usize, knot: usize) -> T {
-        match self.knots.count {
-            1 => T::one(),
-            _ => self.knots.share(knot, self.time(node, frame)).0,
-        }
-    }
-
     #[inline(always)]
     fn places(
         &self,
@@ -332,16 +302,18 @@ impl<'a, T: Float> Walk<'a, T> {
             let Some((corner, within)) = self.geometry.locate([x[k], y[k], z[k]]) else {
                 continue;
             };
-            let is_wanted = wanted.is_none_or(|mask| mask[corner]);
-            if is_wanted && self.shines(node, frame) {
-                let share = self.share(node, frame, knot);
+            if wanted.is_some_and(|mask| !mask[corner]) {
+                continue;
+            }
+            let delay = self.model.delay.get(node).copied().unwrap_or(T::zero());
+            let time = self.model.times[frame] - delay;
+            let share = self.knots.share(knot, time).0;
+            if share > T::zero() && self.model.earliest.is_none_or(|earliest| time >= earliest) {
                 let weight = share * self.model.weight[node];
-                if share > T::zero() {
-                    let corner = nodes_before + corner as u32;
-                    buffers.places.push(Place { corner, within, weight });
-                    if self.model.planes.is_some() {
-                        buffers.nodes.push(node as u32);
-                    }
+                let corner = nodes_before + corner as u32;
+                buffers.places.push(Place { corner, within, weight });
+                if self.model.planes.is_some() {
+                    buffers.nodes.push(node as u32);
                 }
             }
         }

@@ -2,7 +2,7 @@
 
 use super::active::{Active, NONE};
 use super::operator::Operator;
-use super::ray_weights::{Buffers, Walk};
+use super::ray_weights::{Buffers, Place, Walk};
 use super::rows::{Held, Rows};
 use kerrlight_common::memory;
 use kerrlight_common::simd::Float;
@@ -88,9 +88,9 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         }
         let mut rows = Rows::default();
         let mut place = vec![NONE; self.active.count()];
-        let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
+        let wanted = Some(self.active.cells.as_slice());
         self.walk.frame(frame, wanted, &mut Buffers::default(), |pixel, places| {
-            rows.push(pixel, places, &self.active, &self.corners, degree, &mut place);
+            self.push(&mut rows, pixel, places, &mut place);
         });
         // Vectors grow ahead of their length, which is all that `bytes` counts.
         rows.columns.shrink_to_fit();
@@ -105,12 +105,35 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         }
         let mut row = Rows::default();
         let mut place = vec![NONE; self.active.count()];
-        let (wanted, degree) = (Some(self.active.cells.as_slice()), self.walk.voxels.degree);
-        self.walk.frame(frame, wanted, buffers, |pixel, places| {
+        self.walk.frame(frame, Some(&self.active.cells), buffers, |pixel, places| {
             row.clear();
-            row.push(pixel, places, &self.active, &self.corners, degree, &mut place);
+            self.push(&mut row, pixel, places, &mut place);
             take(&row);
         });
+    }
+
+    /// Adds up what a ray's nodes take from each column; `place` remembers where in the row a column is.
+    fn push(&self, rows: &mut Rows<T>, pixel: u32, places: &[Place<T>], place: &mut [u32]) {
+        let start = rows.columns.len();
+        self.entries(places, |column, entry| {
+            if entry == T::zero() {
+                return;
+            }
+            // `place` is never cleared: what earlier rows left in it lies before `start`, or
+            // another column stands there now.
+            let known = place[column as usize] as usize;
+            if known >= start && rows.columns.get(known) == Some(&column) {
+                rows.entries[known] += entry;
+            } else {
+                place[column as usize] = rows.columns.len() as u32;
+                rows.columns.push(column);
+                rows.entries.push(entry);
+            }
+        });
+        if rows.columns.len() > start {
+            rows.pixel.push(pixel);
+            rows.starts.push(rows.columns.len() as u32);
+        }
     }
 
     /// Bytes of the rows of a frame.

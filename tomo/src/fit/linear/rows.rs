@@ -1,8 +1,5 @@
 //! Rows of the sparse matrix from nodes to the pixels of a frame.
 
-use super::active::{Active, NONE};
-use super::ray_weights::Place;
-use crate::representation::spline::{Degree, STENCIL};
 use kerrlight_common::simd::Float;
 
 /// Rows of a frame that are not empty: `starts` of each, and where the last ends.
@@ -28,43 +25,6 @@ impl<T: Float> Rows<T> {
         self.starts.truncate(1);
         self.columns.clear();
         self.entries.clear();
-    }
-
-    /// Adds up what a ray's nodes take from each column; `place` remembers where in the row a column is.
-    pub fn push(
-        &mut self,
-        pixel: u32,
-        places: &[Place<T>],
-        active: &Active,
-        corners: &[usize],
-        degree: Degree,
-        place: &mut [u32],
-    ) {
-        let start = self.columns.len();
-        let mut weights = [T::zero(); STENCIL];
-        for at in places {
-            at.weights(degree, &mut weights);
-            for (corner, entry) in corners.iter().zip(weights) {
-                let column = active.column[at.corner as usize + corner];
-                if column == NONE || entry == T::zero() {
-                    continue;
-                }
-                // `place` is never cleared: what earlier rows left in it lies before `start`, or
-                // another column stands there now.
-                let known = place[column as usize] as usize;
-                if known >= start && self.columns.get(known) == Some(&column) {
-                    self.entries[known] += entry;
-                } else {
-                    place[column as usize] = self.columns.len() as u32;
-                    self.columns.push(column);
-                    self.entries.push(entry);
-                }
-            }
-        }
-        if self.columns.len() > start {
-            self.pixel.push(pixel);
-            self.starts.push(self.columns.len() as u32);
-        }
     }
 
     pub fn forward(&self, x: &[T], image: &mut [T]) {
