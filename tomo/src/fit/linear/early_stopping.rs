@@ -119,7 +119,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
             let x = operator.active.expand(&inner);
             let prices = self.change.prices(&x, self.voxels.shape());
             let terms = Penalised { prices: &prices, ..self.penalised(data) };
-            let mut objective = Objective::new(&operator, data, &terms);
+            let mut objective = Objective::new(&operator, data, terms);
             let found = run.minimise(&mut objective, &inner, iterations / 2);
             value = objective.finite(found.value, &found.x)?;
             inner = found.x;
@@ -149,8 +149,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let mut run = Run::new(self, &settings, &mut watch);
         let active = self.active(is_active);
         let operator = Operator::new(self.walk(), active, self.frames, settings.memory);
-        let terms = self.penalised(data);
-        let mut objective = Objective::new(&operator, data, &terms);
+        let mut objective = Objective::new(&operator, data, self.penalised(data));
         let start = operator.active.gather(x);
         let Descended { x: inner, value, ending } =
             run.minimise(&mut objective, &start, iterations);

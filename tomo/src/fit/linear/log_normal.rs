@@ -126,8 +126,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         // Beside a prior every datum counts as its error says, here as beside a Gaussian one.
         let data = self.data()?.together(self.frames);
         let operator = Operator::new(self.walk(), self.all(), self.frames, settings.memory);
-        let terms = self.penalised(&data);
-        let objective = Objective::new(&operator, &data, &terms);
+        let objective = Objective::new(&operator, &data, self.penalised(&data));
         let mut posterior = Posterior { objective, prior, upper: self.upper };
         let count = prior.count();
         let steps = Lbfgs::new(count, MEMORY);

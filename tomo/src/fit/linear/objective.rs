@@ -94,18 +94,14 @@ impl Penalised<'_> {
 pub(super) struct Objective<'a, 'b, T: Float> {
     pub operator: &'b Operator<'a, T>,
     pub data: &'b Data<'a, T>,
-    pub terms: &'b Penalised<'b>,
+    pub terms: Penalised<'b>,
     dark: Option<Vec<T>>,
     /// Values and gradients and products with second derivatives that were computed.
     pub evaluations: usize,
 }
 
 impl<'a, 'b, T: Float + Default> Objective<'a, 'b, T> {
-    pub fn new(
-        operator: &'b Operator<'a, T>,
-        data: &'b Data<'a, T>,
-        terms: &'b Penalised<'b>,
-    ) -> Self {
+    pub fn new(operator: &'b Operator<'a, T>, data: &'b Data<'a, T>, terms: Penalised<'b>) -> Self {
         // For products with second derivatives, which only of quadratic data are constant.
         let dark = if data.is_quadratic() { operator.dark(data) } else { None };
         Self { operator, data, terms, dark, evaluations: 0 }

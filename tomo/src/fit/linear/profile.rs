@@ -62,8 +62,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         let free: Vec<T> = here.iter().map(|x| T::of(*x)).collect();
         let images = operator.images(&free);
         let moved = moved(&data, self.frames, &images, tangents);
-        let terms = self.penalised(&data);
-        let mut objective = Objective::new(&operator, &data, &terms);
+        let mut objective = Objective::new(&operator, &data, self.penalised(&data));
         let taken: Vec<Vec<f64>> = moved.bent.iter().map(|bent| operator.adjoint(bent)).collect();
         let following = taken.iter().map(|b| solved(&mut objective, b, iterations));
         let (absorbed, left): (Vec<Vec<f64>>, Vec<Vec<f64>>) = following.unzip();

@@ -77,8 +77,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         let nodes = vec![false; problem.unknowns()];
         // No node counts: there are no rows to keep.
         let operator = Operator::new(problem.walk(), problem.active(&nodes), problem.frames, 0);
-        let terms = problem.penalised(data);
-        let mut objective = Objective::new(&operator, data, &terms);
+        let mut objective = Objective::new(&operator, data, problem.penalised(data));
         let dark = vec![0.0; problem.beside()];
         let found = self.minimise(&mut objective, &dark, self.settings.iterations);
         self.evaluations += objective.evaluations;
@@ -151,8 +150,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         let data = problem.data()?;
         let operator = Operator::new(problem.walk(), problem.all(), &frames, self.settings.memory);
         self.bytes = self.bytes.max(operator.bytes());
-        let terms = problem.penalised(&data);
-        let mut objective = Objective::new(&operator, &data, &terms);
+        let mut objective = Objective::new(&operator, &data, problem.penalised(&data));
         let found = self.coarse_field(&mut objective, coarse.iterations)?;
         self.evaluations += objective.evaluations;
         let Some((x, lit)) = found else { return Ok(None) };
@@ -201,8 +199,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
         let problem = self.problem;
         // Rows of all nodes are not worth their memory for a single evaluation.
         let operator = Operator::new(problem.walk(), problem.all(), problem.frames, 0);
-        let terms = problem.penalised(data);
-        let mut objective = Objective::new(&operator, data, &terms);
+        let mut objective = Objective::new(&operator, data, problem.penalised(data));
         let (value, gradient) = objective.everywhere(&self.lit);
         self.evaluations += 1;
         let slope = gradient.iter().fold(0.0f64, |most, g| most.max(g.abs()));
@@ -228,7 +225,7 @@ impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
             _ => problem.change.prices(x, problem.voxels.shape()),
         };
         let terms = Penalised { prices: &prices, ..problem.penalised(data) };
-        let mut objective = Objective::new(&operator, data, &terms);
+        let mut objective = Objective::new(&operator, data, terms);
         let (dark, dark_slope) = objective.nothing();
         let start = operator.active.gather(x);
         let Descended { x: mut inner, ending, .. } =

@@ -86,8 +86,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
         self.check(&settings)?;
         let data = self.data()?;
         let operator = Operator::new(self.walk(), self.all(), self.frames, settings.memory);
-        let terms = self.penalised(&data);
-        let mut objective = Objective::new(&operator, &data, &terms);
+        let mut objective = Objective::new(&operator, &data, self.penalised(&data));
         let mut watch = |_: &LinearProgress| ControlFlow::Continue(());
         let mut run = Run::new(self, &settings, &mut watch);
         if start.is_none() && !data.is_convex() {

@@ -39,8 +39,7 @@ fn posterior<R>(
 ) -> R {
     let data = problem.data().unwrap().together(problem.frames);
     let operator = Operator::new(problem.walk(), problem.all(), problem.frames, usize::MAX);
-    let terms = problem.penalised(&data);
-    let objective = Objective::new(&operator, &data, &terms);
+    let objective = Objective::new(&operator, &data, problem.penalised(&data));
     f(&mut Posterior { objective, prior, upper: problem.upper })
 }
 

@@ -87,8 +87,7 @@ fn exact_slopes_beside_a_quiescent_image() {
         let problem = problem(&model, &terms, &[]);
         let operator = Operator::new(problem.walk(), problem.all(), &FRAMES, usize::MAX);
         let data = problem.data().unwrap();
-        let penalised = problem.penalised(&data);
-        let mut objective = Objective::new(&operator, &data, &penalised);
+        let mut objective = Objective::new(&operator, &data, problem.penalised(&data));
         let x: Vec<f64> = random(problem.unknowns(), 1).iter().map(|x| 0.5 + x).collect();
         let direction = random(problem.unknowns(), 2);
         let (mut gradient, h) = (Vec::new(), 1e-5);
