@@ -61,13 +61,20 @@ impl PolarizedView {
         self.unit_of(self.views(lines, hole, velocity).iter().flatten().flatten())
     }
 
+    /// The light of all nodes, ray by ray; none where matter would be faster than light.
     fn views(
         &self,
         lines: &Sightlines,
         hole: &Kerr,
         velocity: &AngularVelocity,
     ) -> Vec<Vec<Option<SynchrotronView>>> {
-        let along = |ray| self.along(lines, ray, hole, velocity);
+        let [alpha, beta] = &self.screen;
+        let along = |ray: usize| -> Vec<Option<SynchrotronView>> {
+            let pixel = lines.pixel[ray] as usize;
+            let screen = ScreenPoint::new(hole, self.sin_inclination, alpha[pixel], beta[pixel]);
+            let nodes = lines.starts[ray]..lines.starts[ray + 1];
+            nodes.map(|k| self.node(lines, k, &screen, hole, velocity)).collect()
+        };
         (0..lines.rays()).into_par_iter().map(along).collect()
     }
 
@@ -80,65 +87,30 @@ impl PolarizedView {
         if sum > 0.0 { sum / count } else { 1.0 }
     }
 
-    /// The nodes of a ray.
-    fn along(
-        &self,
-        lines: &Sightlines,
-        ray: usize,
-        hole: &Kerr,
-        velocity: &AngularVelocity,
-    ) -> Vec<Option<SynchrotronView>> {
-        let [alpha, beta] = &self.screen;
-        let pixel = lines.pixel[ray] as usize;
-        let screen = ScreenPoint::new(hole, self.sin_inclination, alpha[pixel], beta[pixel]);
-        let nodes = lines.starts[ray]..lines.starts[ray + 1];
-        nodes.map(|k| self.node(&Node::new(lines, k), &screen, hole, velocity)).collect()
-    }
-
     fn node(
         &self,
-        node: &Node,
+        lines: &Sightlines,
+        k: usize,
         screen: &ScreenPoint,
         hole: &Kerr,
         velocity: &AngularVelocity,
     ) -> Option<SynchrotronView> {
-        let Node { r, n: [x, y, u], .. } = *node;
-        let frame = ZamoFrame::at(hole, r, x.hypot(y), u)?;
-        let omega = self.axis.vector().map(|axis| velocity.rate(r) * axis);
-        let gas = Gas::falling(&frame, node.n, (omega, velocity.fall(r)))?;
-        self.law.view(&frame, screen, frame.covariant(node.momentum(hole)), gas)
-    }
-}
-
-/// A node of a ray.
-struct Node {
-    r: f64,
-    n: [f64; 3],
-    /// Angular momentum of the arriving photon.
-    turn: [f64; 3],
-    /// d(1/r)/dτ of the backward ray.
-    radial: f64,
-}
-
-impl Node {
-    fn new(lines: &Sightlines, k: usize) -> Self {
         let of = |columns: &[Vec<f64>; 3]| [0, 1, 2].map(|c| columns[c][k]);
-        let position = of(&lines.position);
+        // Angular momentum L of the arriving photon, and d(1/r)/dτ of the backward ray.
+        let (position, turn, radial) = (of(&lines.position), of(&lines.momentum), lines.radial[k]);
         let r = norm(position);
-        let (n, turn) = (position.map(|x| x / r), of(&lines.momentum));
-        Node { r, n, turn, radial: lines.radial[k] }
-    }
-
-    /// (p_t, p_r, p_θ, p_φ) of the arriving photon of unit energy.
-    fn momentum(&self, hole: &Kerr) -> [f64; 4] {
-        let [x, y, _] = self.n;
+        let n = position.map(|x| x / r);
+        let [x, y, u] = n;
         let sin = x.hypot(y);
+        let frame = ZamoFrame::at(hole, r, sin, u)?;
+        let omega = self.axis.vector().map(|axis| velocity.rate(r) * axis);
+        let gas = Gas::falling(&frame, n, (omega, velocity.fall(r)))?;
         let (cos_phi, sin_phi) = if sin > 0.0 { (x / sin, y / sin) } else { (1.0, 0.0) };
         // With L = p_θ φ̂ − p_φ θ̂/sin θ: p_θ = L·φ̂ and p_φ = L_z.
-        let polar = self.turn[1] * cos_phi - self.turn[0] * sin_phi;
+        let polar = turn[1] * cos_phi - turn[0] * sin_phi;
         // p_r = (dr/dτ)/Δ: backwards dr/dτ = −r² d(1/r)/dτ, and the photon has the opposite.
-        let radial = self.radial * self.r * self.r / hole.delta(self.r);
-        [-1.0, radial, polar, self.turn[2]]
+        let momentum = [-1.0, radial * r * r / hole.delta(r), polar, turn[2]];
+        self.law.view(&frame, screen, frame.covariant(momentum), gas)
     }
 }
 
