@@ -30,28 +30,19 @@ pub enum Law {
 impl Law {
     /// Returns the velocity in a geometry, about an axis.
     fn velocity(&self, geometry: &Geometry, axis: Axis) -> Result<AngularVelocity, Error> {
-        match self {
-            Law::Infall(drag) => infall(*drag, geometry, axis),
-            // Matter about another axis meets the component of the spin along it: −a about −z.
-            _ => Ok(self.circular(geometry.get(Parameter::Spin) * axis.vector()[2])),
-        }
-    }
-
-    fn circular(&self, spin: f64) -> AngularVelocity {
-        match self {
+        // Matter about another axis meets the component of the spin along it: −a about −z.
+        let drag = geometry.get(Parameter::Spin) * axis.vector()[2];
+        Ok(match self {
+            Law::CircularOrbits => AngularVelocity::Keplerian { drag },
             Law::Fixed(law) => law.clone(),
-            _ => AngularVelocity::Keplerian { drag: spin },
-        }
+            Law::Infall(own) => {
+                let [xi, beta_r, beta_phi] = Parameter::FLOW.map(|of| geometry.get(of));
+                let mixture = Mixture { xi, beta_r, beta_phi };
+                let family = infall::Family { spin: own.unwrap_or(drag), mixture };
+                AngularVelocity::Falling(Arc::new(Falling::new(infall::Law::Family(family))?))
+            }
+        })
     }
-}
-
-/// The family's flow in a geometry.
-fn infall(drag: Option<f64>, geometry: &Geometry, axis: Axis) -> Result<AngularVelocity, Error> {
-    let [xi, beta_r, beta_phi] = Parameter::FLOW.map(|parameter| geometry.get(parameter));
-    let spin = drag.unwrap_or(geometry.get(Parameter::Spin) * axis.vector()[2]);
-    let mixture = Mixture { xi, beta_r, beta_phi };
-    let law = infall::Law::Family(infall::Family { spin, mixture });
-    Ok(AngularVelocity::Falling(Arc::new(Falling::new(law)?)))
 }
 
 /// Properties that all geometries share: the screen, where emission is looked for, the law of motion and the frames.
