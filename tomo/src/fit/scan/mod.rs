@@ -15,7 +15,6 @@ use crate::representation::Degree;
 use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::Axis;
 use rayon::prelude::*;
-use refine::Refinement;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// The data of a scan, and what is looked for in them.
@@ -136,7 +135,12 @@ struct Scanner<'a, T: Float> {
     cancelled: AtomicBool,
 }
 
-impl<T: Float + Default> Scanner<'_, T> {
+impl<'a, T: Float + Default> Scanner<'a, T> {
+    fn new(problem: &'a AxisProblem<'a, T>, watch: &'a ScanWatch<'a>, expected: usize) -> Self {
+        let (solved, cancelled) = (AtomicUsize::new(0), AtomicBool::new(false));
+        Self { problem, watch, solved, expected, cancelled }
+    }
+
     /// The loss of each axis; none if the scan was cancelled. Axes are shared among threads, and each
     /// has its own sums: their number does not change a bit.
     fn losses(&self, axes: &[Axis], effort: Effort) -> Result<Option<Vec<AxisLoss>>, Error> {
@@ -179,9 +183,7 @@ impl<T: Float + Default> Scanner<'_, T> {
         }
         Ok(Some(AxisLoss { axis, loss }))
     }
-}
 
-impl<T: Float + Default> Scanner<'_, T> {
     /// The best refined axis of the opposite hemisphere; where all have come over to this one, the lattice's best
     /// there, with the loss of the fine problem.
     fn opposite(
@@ -221,25 +223,19 @@ fn search<T: Float + Default>(
     watch: &ScanWatch<'_>,
 ) -> Result<Option<AxisScan>, Error> {
     let settings = settings.checked()?;
-    let scanner = Scanner {
-        problem,
-        watch,
-        solved: AtomicUsize::new(0),
-        // A candidate takes its own point and a hexagon for each length of steps; moves add more.
-        expected: settings.directions + settings.candidates * (7 + 6 * settings.halvings),
-        cancelled: AtomicBool::new(false),
-    };
+    // A candidate takes its own point and a hexagon for each length of steps; moves add more.
+    let expected = settings.directions + settings.candidates * (7 + 6 * settings.halvings);
+    let scanner = Scanner::new(problem, watch, expected);
     let Some(map) = scanner.losses(&lattice(settings.directions), settings.coarse)? else {
         return Ok(None);
     };
     told_apart(&map)?;
     let candidates = candidates(&map, settings.candidates, settings.distance());
-    let refinement =
-        Refinement { scanner: &scanner, effort: settings.fine, halvings: settings.halvings };
     let mut found = Vec::new();
     for candidate in candidates {
         // A lattice point stands for what lies within half a spacing of it.
-        match refinement.run(candidate, 0.5 * settings.distance())? {
+        let step = 0.5 * settings.distance();
+        match scanner.refined(candidate, step, settings.fine, settings.halvings)? {
             Some(refined) => found.push(refined),
             None => return Ok(None),
         }
@@ -284,14 +280,7 @@ pub fn refine_axis(
     let fine = Effort { nodes, iterations: ITERATIONS };
     let AxisSettings { fine: effort, halvings, .. } =
         AxisSettings { fine, ..AxisSettings::default() }.checked()?;
-    let scanner = Scanner {
-        problem,
-        watch,
-        solved: AtomicUsize::new(0),
-        expected: 1 + 8 * (1 + halvings),
-        cancelled: AtomicBool::new(false),
-    };
-    Refinement { scanner: &scanner, effort, halvings }.run(from, STEP)
+    Scanner::new(problem, watch, 1 + 8 * (1 + halvings)).refined(from, STEP, effort, halvings)
 }
 
 /// The best points that are not near better ones; one of the hemisphere opposite to the best is among them.

@@ -5,30 +5,26 @@ use crate::Error;
 use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::Axis;
 
-/// A pattern search: six directions about the best one so far, half as far away when none is better; at the end
-/// the lowest point of the paraboloid through the last seven.
-pub(super) struct Refinement<'a, 's, T: Float> {
-    pub scanner: &'a Scanner<'s, T>,
-    pub effort: Effort,
-    pub halvings: usize,
-}
-
 /// Steps of one length.
 const MOVES: usize = 6;
 
-impl<T: Float + Default> Refinement<'_, '_, T> {
-    /// None if the scan was cancelled.
-    pub fn run(&self, from: Axis, step: f64) -> Result<Option<AxisLoss>, Error> {
-        let Some(losses) = self.scanner.losses(&[from], self.effort)? else { return Ok(None) };
+impl<T: Float + Default> Scanner<'_, T> {
+    /// A pattern search: six directions about the best one so far, half as far away when none is better; at the end
+    /// the lowest point of the paraboloid through the last seven. None if the scan was cancelled.
+    pub(super) fn refined(
+        &self,
+        from: Axis,
+        mut step: f64,
+        effort: Effort,
+        halvings: usize,
+    ) -> Result<Option<AxisLoss>, Error> {
+        let Some(losses) = self.losses(&[from], effort)? else { return Ok(None) };
         let mut best = losses[0];
-        let mut step = step;
         let mut lowest = None;
-        for level in 0..=self.halvings {
+        for level in 0..=halvings {
             for _ in 0..MOVES {
                 let about = around(best.axis, step, level);
-                let Some(losses) = self.scanner.losses(&about, self.effort)? else {
-                    return Ok(None);
-                };
+                let Some(losses) = self.losses(&about, effort)? else { return Ok(None) };
                 let differences: Vec<f64> = losses.iter().map(|at| at.loss - best.loss).collect();
                 // Axes move on the tangent plane, where the corners are tan(step) away.
                 lowest =
@@ -43,7 +39,7 @@ impl<T: Float + Default> Refinement<'_, '_, T> {
         }
         let Some(lowest) = lowest else { return Ok(Some(best)) };
         // The paraboloid is a guess, which counts only if the loss there is less.
-        let losses = self.scanner.losses(&[lowest], self.effort)?;
+        let losses = self.losses(&[lowest], effort)?;
         Ok(losses.map(|losses| if losses[0].loss < best.loss { losses[0] } else { best }))
     }
 }
