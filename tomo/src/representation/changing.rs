@@ -44,11 +44,9 @@ impl Knots {
     /// If the spacing is not above 0, or there would be more than 10,000.
     pub fn between([from, to]: [f64; 2], spacing: f64, allowed: Allowed) -> Result<Self, Error> {
         let steps = ((to - from) / spacing).ceil();
-        // Negated, so that a NaN is refused too.
-        if !(spacing > 0.0 && steps.is_finite() && steps < 10_000.0) {
-            let allowed = "above 0, with at most 10,000 in the time of the data";
-            return Err(Error::out_of_range("spacing of knots", spacing, allowed));
-        }
+        let ok = spacing > 0.0 && steps.is_finite() && steps < 10_000.0;
+        let most = "above 0, with at most 10,000 in the time of the data";
+        Error::check("spacing of knots", spacing, ok, most)?;
         // Data of one moment have two knots, too, a whole spacing apart: shares divide by it.
         let steps = (steps as usize).max(1);
         let spacing = (to - from).max(spacing) / steps as f64;
@@ -148,17 +146,11 @@ impl<T: Float> Changing<T> {
         knots: Knots,
         carrier: Option<Carrier>,
     ) -> Result<Self, Error> {
-        if carrier.is_none() && knots.allowed == Allowed::Births {
-            let allowed = "a motion that carries births";
-            return Err(Error::out_of_range("carrier", f64::NAN, allowed));
-        }
-        if inner.dimension() != 3 {
-            let dimension = inner.dimension() as f64;
-            return Err(Error::out_of_range("dimension of a changing field", dimension, "3"));
-        }
-        if knots.count == 0 {
-            return Err(Error::out_of_range("knots", 0.0, "1 or more"));
-        }
+        let (check, dimension) = (Error::check, inner.dimension());
+        let has_carrier = carrier.is_some() || knots.allowed != Allowed::Births;
+        check("carrier", f64::NAN, has_carrier, "a motion that carries births")?;
+        check("dimension of a changing field", dimension as f64, dimension == 3, "3")?;
+        check("knots", 0.0, knots.count > 0, "1 or more")?;
         Ok(Self { inner, knots, carrier })
     }
 

@@ -73,12 +73,9 @@ impl BandPrior {
                 return Err(Error::out_of_range(field, bad, "above 0, one or more"));
             }
         }
-        if self.means.is_empty() || self.means.iter().any(|x| !(*x >= 0.0 && x.is_finite())) {
-            return Err(Error::out_of_range("means", f64::NAN, "0 or above, one or more"));
-        }
-        if self.backgrounds.is_empty() {
-            return Err(Error::out_of_range("backgrounds", 0.0, "one or more"));
-        }
+        let ok = !self.means.is_empty() && self.means.iter().all(|x| *x >= 0.0 && x.is_finite());
+        Error::check("means", f64::NAN, ok, "0 or above, one or more")?;
+        Error::check("backgrounds", 0.0, !self.backgrounds.is_empty(), "one or more")?;
         Ok(self)
     }
 }

@@ -129,10 +129,8 @@ impl<T: Float> ForwardModel<T> {
     pub fn seen(mut self, factors: Option<&[Stokes]>, seen: &Observable) -> Result<Self, Error> {
         let parameters = seen.parameters();
         let known = factors.map_or(0, <[Stokes]>::len);
-        if factors.is_some() && known != self.points() {
-            let allowed = "as many as nodes";
-            return Err(Error::out_of_range("Stokes factors", known as f64, allowed));
-        }
+        let ok = factors.is_none() || known == self.points();
+        Error::check("Stokes factors", known as f64, ok, "as many as nodes")?;
         // Before the planes: pixels of one image are the way from one of them to the next.
         if seen.is_flux() {
             (self.pixels, self.is_flux) = (1, true);
@@ -179,10 +177,8 @@ impl<T: Float> ForwardModel<T> {
     pub fn beside(mut self, image: Quiescent) -> Result<Self, Error> {
         let image = image.checked()?;
         let pixels = image.pixels * image.signed.len();
-        if pixels != self.pixels {
-            let allowed = "as many as the images of a frame have";
-            return Err(Error::out_of_range("quiescent pixels", pixels as f64, allowed));
-        }
+        let allowed = "as many as the images of a frame have";
+        Error::check("quiescent pixels", pixels as f64, pixels == self.pixels, allowed)?;
         self.quiescent = Some(image);
         Ok(self)
     }

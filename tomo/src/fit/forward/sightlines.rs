@@ -301,20 +301,13 @@ impl SightlineRequest {
     }
 
     fn check_equal(&self, per_ray: usize, observer: &Observer) -> Result<(), Error> {
-        let refuse = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
+        let check = Error::check;
         // The first chord would be infinitely long.
-        if observer.is_at_infinity() {
-            let allowed = "a finite radius with nodes equidistant in Mino time";
-            return refuse("observer radius", f64::INFINITY, allowed);
-        }
+        let allowed = "a finite radius with nodes equidistant in Mino time";
+        check("observer radius", f64::INFINITY, !observer.is_at_infinity(), allowed)?;
         // Samples of a ray have no velocities.
-        if self.momentum {
-            return refuse("redshift", 1.0, "off with nodes equidistant in Mino time");
-        }
-        if per_ray < 2 {
-            return refuse("samples per ray", per_ray as f64, "at least 2");
-        }
-        Ok(())
+        check("redshift", 1.0, !self.momentum, "off with nodes equidistant in Mino time")?;
+        check("samples per ray", per_ray as f64, per_ray >= 2, "at least 2")
     }
 }
 

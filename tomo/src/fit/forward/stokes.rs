@@ -42,10 +42,8 @@ impl PolarizedView {
         velocity: &AngularVelocity,
     ) -> Result<Vec<Stokes>, Error> {
         self.law.check()?;
-        if lines.radial.len() != lines.points() {
-            let allowed = "nodes with momenta";
-            return Err(Error::out_of_range("polarization", lines.points() as f64, allowed));
-        }
+        let ok = lines.radial.len() == lines.points();
+        Error::check("polarization", lines.points() as f64, ok, "nodes with momenta")?;
         // The unit may be the mean field of all nodes: no factor is known before all are seen.
         let views = self.views(lines, hole, velocity);
         let unit = self.unit.unwrap_or_else(|| self.unit_of(views.iter().flatten().flatten()));

@@ -116,20 +116,15 @@ impl Prior {
     /// # Errors
     /// Names the number that is out of its range.
     pub fn checked(self) -> Result<Self, Error> {
-        let wrong = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
+        let check = Error::check;
         match self {
             Prior::Uniform { low, high } | Prior::Isotropic { low, high } => {
-                if !(low.is_finite() && high.is_finite() && high > low) {
-                    return wrong("high", high, "above low");
-                }
+                let ok = low.is_finite() && high.is_finite() && high > low;
+                check("high", high, ok, "above low")?;
             }
             Prior::Normal { mean, sigma } => {
-                if !mean.is_finite() {
-                    return wrong("mean", mean, "a finite number");
-                }
-                if !(sigma > 0.0 && sigma.is_finite()) {
-                    return wrong("sigma", sigma, "above 0");
-                }
+                check("mean", mean, mean.is_finite(), "a finite number")?;
+                check("sigma", sigma, sigma > 0.0 && sigma.is_finite(), "above 0")?;
             }
         }
         Ok(self)

@@ -34,20 +34,16 @@ impl<'a, T: Float> Data<'a, T> {
         pixels: usize,
         of_movie: usize,
     ) -> Result<Self, Error> {
-        let range = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
-        if frames.is_empty() {
-            return range("frames", 0.0, "1 or more");
-        }
-        if let Some(bad) = frames.iter().find(|frame| **frame >= of_movie) {
-            return range("frame", *bad as f64, "one of the movie");
+        let check = Error::check;
+        check("frames", 0.0, !frames.is_empty(), "1 or more")?;
+        for frame in frames {
+            check("frame", *frame as f64, *frame < of_movie, "one of the movie")?;
         }
         for Weighted { weight, term } in terms {
-            if term.pixels() != pixels || term.frames() != of_movie {
-                return range("pixels of the data", term.pixels() as f64, "those of the rays");
-            }
-            if !(weight.is_finite() && *weight >= 0.0) {
-                return range("weight of the data", *weight, "0 or above");
-            }
+            let fits = term.pixels() == pixels && term.frames() == of_movie;
+            check("pixels of the data", term.pixels() as f64, fits, "those of the rays")?;
+            let ok = weight.is_finite() && *weight >= 0.0;
+            check("weight of the data", *weight, ok, "0 or above")?;
         }
         let scaled = |data: &Weighted<'a, T>| -> Option<Weighted<'a, T>> {
             let count = data.count(frames);
@@ -55,9 +51,7 @@ impl<'a, T: Float> Data<'a, T> {
             (count > 0 && weight > 0.0).then_some(Weighted { weight, term: data.term })
         };
         let terms: Vec<_> = terms.iter().filter_map(scaled).collect();
-        if terms.is_empty() {
-            return range("data in the frames", 0.0, "1 or more");
-        }
+        check("data in the frames", 0.0, !terms.is_empty(), "1 or more")?;
         let count = terms.iter().map(|data| data.count(frames)).sum();
         Ok(Self { terms, count })
     }

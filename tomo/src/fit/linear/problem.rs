@@ -117,11 +117,8 @@ impl<T: Float + Default> LinearProblem<'_, T> {
 
     /// Refuses a prior of other nodes.
     pub(super) fn check_prior(&self, nodes: usize) -> Result<(), Error> {
-        if nodes == self.unknowns() {
-            return Ok(());
-        }
-        let allowed = "those of the grid at one knot";
-        Err(Error::out_of_range("nodes of the prior", nodes as f64, allowed))
+        let ok = nodes == self.unknowns();
+        Error::check("nodes of the prior", nodes as f64, ok, "those of the grid at one knot")
     }
 
     pub(super) fn check(&self, settings: &LinearSettings) -> Result<(), Error> {

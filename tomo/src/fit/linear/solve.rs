@@ -114,10 +114,8 @@ impl<T: Float + Default> LinearProblem<'_, T> {
     /// # Errors
     /// If a number is out of its range, or the field has other nodes.
     pub fn misfit(&self, emission: &[T]) -> Result<f64, Error> {
-        if emission.len() != self.unknowns() {
-            let allowed = "as many as the nodes at all knots";
-            return Err(Error::out_of_range("values", emission.len() as f64, allowed));
-        }
+        let ok = emission.len() == self.unknowns();
+        Error::check("values", emission.len() as f64, ok, "as many as the nodes at all knots")?;
         // Dark nodes add nothing to an image.
         let shines: Vec<bool> = emission.iter().map(|x| *x != T::zero()).collect();
         let data = self.data()?;

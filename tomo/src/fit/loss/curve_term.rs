@@ -23,17 +23,12 @@ impl StokesCurveTerm {
     /// # Errors
     /// If numbers are not whole frames, not finite, or a standard deviation is not above 0.
     pub fn new(parameters: usize, data: Vec<Option<FluxDatum>>) -> Result<Self, Error> {
-        let range = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
-        if parameters == 0 || !data.len().is_multiple_of(parameters) || data.is_empty() {
-            return range("light-curve numbers", data.len() as f64, "whole frames, 1 or more");
-        }
+        let (check, count) = (Error::check, data.len());
+        let whole = parameters > 0 && count.is_multiple_of(parameters) && count > 0;
+        check("light-curve numbers", count as f64, whole, "whole frames, 1 or more")?;
         for [flux, sigma] in data.iter().flatten() {
-            if !flux.is_finite() {
-                return range("light-curve flux", *flux, "finite numbers");
-            }
-            if !(*sigma > 0.0 && sigma.is_finite()) {
-                return range("light-curve sigma", *sigma, "above 0");
-            }
+            check("light-curve flux", *flux, flux.is_finite(), "finite numbers")?;
+            check("light-curve sigma", *sigma, *sigma > 0.0 && sigma.is_finite(), "above 0")?;
         }
         Ok(Self { parameters, data })
     }

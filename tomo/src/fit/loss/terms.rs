@@ -80,10 +80,8 @@ impl<T: Float> ImageTerm<T> {
     /// # Errors
     /// If σ is not positive, or the movie is not whole frames of finite numbers.
     pub fn new(movie: Vec<T>, pixels: usize, noise_sigma: f64) -> Result<Self, Error> {
-        if pixels == 0 || movie.is_empty() || !movie.len().is_multiple_of(pixels) {
-            let allowed = "whole frames, 1 or more";
-            return Err(Error::out_of_range("movie numbers", movie.len() as f64, allowed));
-        }
+        let whole = pixels > 0 && !movie.is_empty() && movie.len().is_multiple_of(pixels);
+        Error::check("movie numbers", movie.len() as f64, whole, "whole frames, 1 or more")?;
         let movie = movie.into_iter().map(Float::double).collect();
         Self::of(Frames::of(movie, pixels), noise_sigma)
     }
@@ -93,14 +91,13 @@ impl<T: Float> ImageTerm<T> {
     /// # Errors
     /// If σ is not positive, a pixel is not finite, or images cannot be read.
     pub fn of(movie: Frames<f64>, noise_sigma: f64) -> Result<Self, Error> {
-        let range = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
-        if !(noise_sigma > 0.0 && noise_sigma.is_finite()) {
-            return range("image sigma", noise_sigma, "above 0");
-        }
+        let check = Error::check;
+        let positive = noise_sigma > 0.0 && noise_sigma.is_finite();
+        check("image sigma", noise_sigma, positive, "above 0")?;
         for image in movie.images() {
             // As the fit sees it: a double beyond the largest single is infinite there.
-            if let Some(bad) = image?.iter().find(|pixel| !T::of(**pixel).is_finite()) {
-                return range("movie pixel", *bad, "finite numbers");
+            for pixel in &*image? {
+                check("movie pixel", *pixel, T::of(*pixel).is_finite(), "finite numbers")?;
             }
         }
         let inverse_variance = T::of(noise_sigma.powi(-2));
@@ -203,15 +200,14 @@ impl LightCurveTerm {
     /// # Errors
     /// If a σ is not positive, a flux not finite, or their numbers differ.
     pub fn new(flux: Vec<f64>, noise_sigma: &[f64], pixels: usize) -> Result<Self, Error> {
-        let range = |field, value, allowed| Err(Error::out_of_range(field, value, allowed));
-        if flux.len() != noise_sigma.len() || flux.is_empty() {
-            return range("light-curve sigmas", noise_sigma.len() as f64, "as many as fluxes");
+        let (check, count) = (Error::check, noise_sigma.len());
+        let ok = flux.len() == count && count > 0;
+        check("light-curve sigmas", count as f64, ok, "as many as fluxes")?;
+        for flux in &flux {
+            check("light-curve flux", *flux, flux.is_finite(), "finite numbers")?;
         }
-        if let Some(bad) = flux.iter().find(|flux| !flux.is_finite()) {
-            return range("light-curve flux", *bad, "finite numbers");
-        }
-        if let Some(bad) = noise_sigma.iter().find(|s| !(**s > 0.0 && s.is_finite())) {
-            return range("light-curve sigma", *bad, "above 0");
+        for sigma in noise_sigma {
+            check("light-curve sigma", *sigma, *sigma > 0.0 && sigma.is_finite(), "above 0")?;
         }
         let inverse_variance = noise_sigma.iter().map(|sigma| sigma.powi(-2)).collect();
         Ok(Self { pixels, images: 1, flux, inverse_variance })
