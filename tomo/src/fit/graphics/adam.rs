@@ -13,7 +13,8 @@ pub struct Learning {
     pub parameters: Buffer,
     /// The gradient.
     pub gradient: Buffer,
-    moments: [Buffer; 2],
+    /// The mean gradient, or the means that Adam has of it, and of its squares.
+    pub moments: [Buffer; 2],
     rule: Buffer,
     learn: Bound,
     count: usize,
@@ -90,11 +91,6 @@ impl Learning {
     pub fn learn(&self, commands: &mut Commands) {
         let count = self.count as u32;
         commands.dispatch(&self.learn, [count.min(ROW).div_ceil(64), count.div_ceil(ROW)]);
-    }
-
-    /// The mean gradient, or the means that Adam has of it.
-    pub fn means(&self) -> &Buffer {
-        &self.moments[0]
     }
 
     /// Parameters and moments.

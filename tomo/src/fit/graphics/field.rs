@@ -37,25 +37,21 @@ impl Field {
         most: Option<usize>,
         of_places: bool,
     ) -> Result<Self, Error> {
-        let Learning { parameters, gradient, .. } = learning;
         Ok(match representation.built_in() {
             Some(BuiltIn::Network(network)) => {
                 let shape = shape(network.settings());
-                Self::Network(Network::new(
-                    device, &shape, points, parameters, gradient, most, of_places,
-                )?)
+                Self::Network(Network::new(device, &shape, points, learning, most, of_places)?)
             }
             Some(BuiltIn::Grid(grid)) => {
                 let levels = voxels(grid.settings());
-                Self::Voxels(Voxels::new(device, &levels, points, parameters, gradient, of_places)?)
+                Self::Voxels(Voxels::new(device, &levels, points, learning, of_places)?)
             }
             Some(BuiltIn::FeatureGrid(grid)) => {
                 let levels = levels(grid.settings());
                 let shape = behind(grid.settings(), &levels);
-                let network =
-                    Network::new(device, &shape, points, parameters, gradient, most, of_places)?;
+                let network = Network::new(device, &shape, points, learning, most, of_places)?;
                 Self::Features(Features::new(
-                    device, &levels, network, points, parameters, gradient, of_places,
+                    device, &levels, network, points, learning, of_places,
                 )?)
             }
             None => {

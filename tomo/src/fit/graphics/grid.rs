@@ -1,5 +1,6 @@
 //! Grids on the device: voxels, and features that a network turns into emission.
 
+use super::adam::Learning;
 use super::bytes::words;
 use super::kernels::{self, compiled};
 use super::network::{Network, Task, run};
@@ -84,8 +85,7 @@ struct Binding<'a> {
     rows: &'a Buffer,
     slopes: &'a Buffer,
     sums: [&'a Buffer; 2],
-    parameters: &'a Buffer,
-    gradient: &'a Buffer,
+    learning: &'a Learning,
     of_places: bool,
 }
 
@@ -103,7 +103,7 @@ impl Binding<'_> {
             level,
             extent,
             places,
-            self.parameters,
+            &self.learning.parameters,
             self.rows,
             values,
             bends,
@@ -111,7 +111,7 @@ impl Binding<'_> {
             self.slopes,
             self.sums[0],
             self.sums[1],
-            self.gradient,
+            &self.learning.gradient,
             of_places,
         ];
         let buffers: Vec<_> = bindings.iter().map(|k| (*k, all[*k as usize])).collect();
@@ -158,8 +158,7 @@ impl Voxels {
         device: &Compute,
         levels: &Levels,
         points: &Points,
-        parameters: &Buffer,
-        gradient: &Buffer,
+        learning: &Learning,
         of_places: bool,
     ) -> Result<Self, GpuError> {
         let source = [ACTIVATIONS, SHADER].join("\n");
@@ -169,18 +168,8 @@ impl Voxels {
         let sums = [peak, &device.storage(8 * levels.parameters() as u64)?];
         // Kernels of voxels are not bound to rows.
         let rows = slopes;
-        let binding = Binding {
-            device,
-            kernels,
-            block,
-            points,
-            rows,
-            slopes,
-            sums,
-            parameters,
-            gradient,
-            of_places,
-        };
+        let binding =
+            Binding { device, kernels, block, points, rows, slopes, sums, learning, of_places };
         let uniforms = levels.uniforms(device)?;
         let there = [0, 1, 2, 3, 4, 6, 7];
         let forward = vec![binding.bind(0, &uniforms[0], &there, points.room)?];
@@ -226,8 +215,7 @@ impl Features {
         levels: &Levels,
         network: Network,
         points: &Points,
-        parameters: &Buffer,
-        gradient: &Buffer,
+        learning: &Learning,
         of_places: bool,
     ) -> Result<Self, GpuError> {
         let source = [ACTIVATIONS, SHADER].join("\n");
@@ -237,18 +225,8 @@ impl Features {
         let (rows, slopes) = (&network.memory.rows, &network.memory.slopes[network.of_inputs]);
         let blocks = network.blocks.iter().map(|block| {
             let block = &block.uniform;
-            let binding = Binding {
-                device,
-                kernels,
-                block,
-                points,
-                rows,
-                slopes,
-                sums,
-                parameters,
-                gradient,
-                of_places,
-            };
+            let binding =
+                Binding { device, kernels, block, points, rows, slopes, sums, learning, of_places };
             let features = uniforms
                 .iter()
                 .map(|level| binding.bind(2, level, &[0, 1, 2, 3, 4, 5], network.stride));

@@ -155,7 +155,7 @@ impl GraphicsFit {
     ) -> Result<(Loss, Vec<f32>, [f64; 3]), Error> {
         self.load(stretch, from)?;
         let pending = self.loss(stretch, 0, false)?;
-        let mut buffers = vec![self.pixels.records(), &self.learning.gradient];
+        let mut buffers = vec![&self.pixels.records, &self.learning.gradient];
         buffers.extend(self.visibilities.as_ref().map(Visibilities::losses));
         let read = self.device.read_as(&buffers, bytes::read)?;
         let gradient = read[1][..from.parameters.len()].to_vec();
@@ -223,7 +223,7 @@ impl StepDevice for GraphicsFit {
             pending.push(self.loss(stretch, k, true)?);
         }
         let [parameters, first, second] = learning.buffers();
-        let mut buffers = vec![parameters, first, second, pixels.records()];
+        let mut buffers = vec![parameters, first, second, &pixels.records];
         buffers.extend(self.visibilities.as_ref().map(Visibilities::losses));
         let mut read = device.read_as(&buffers, bytes::read)?;
         let (others, terms) = match read.len() {

@@ -46,8 +46,8 @@ impl Turning {
         device.write(&of_matrices, &words(&table))?;
         let (work, rule) = (device.storage(4 * numbers as u64)?, device.uniform(&[0; 32])?);
         let turn = |of, to| device.uniform(&words(&[of, to, 0, 0]));
-        let Learning { parameters, gradient, .. } = learning;
-        let buffers = [&rule, &of_matrices, gradient, learning.means(), parameters, &work];
+        let Learning { parameters, gradient, moments: [means, _], .. } = learning;
+        let buffers = [&rule, &of_matrices, gradient, means, parameters, &work];
         let binding = Binding { device, buffers, turns: &[turn(0, 1)?, turn(1, 0)?] };
         let tasks = binding.tasks(matrices)?;
         Ok(Some(Self { muon, rule, tasks }))

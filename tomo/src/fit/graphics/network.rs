@@ -1,5 +1,6 @@
 //! A fully connected network on the device, block of points by block of points.
 
+use super::adam::Learning;
 use super::bytes::words;
 use super::kernels::compiled;
 use super::pixels::Points;
@@ -74,8 +75,7 @@ struct Binding<'a> {
     block: &'a Buffer,
     memory: &'a Memory,
     points: &'a Points,
-    parameters: &'a Buffer,
-    gradient: &'a Buffer,
+    learning: &'a Learning,
 }
 
 impl Network {
@@ -88,8 +88,7 @@ impl Network {
         device: &Compute,
         shape: &Shape,
         points: &Points,
-        parameters: &Buffer,
-        gradient: &Buffer,
+        learning: &Learning,
         most: Option<usize>,
         of_places: bool,
     ) -> Result<Self, GpuError> {
@@ -109,7 +108,7 @@ impl Network {
             let numbers = [k * stride, stride, shape.start, count].map(|x| x as u32);
             let uniform = device.uniform(&words(&numbers))?;
             let (memory, kernels, block) = (&memory, &kernels[..], &uniform);
-            let binding = Binding { device, kernels, block, memory, points, parameters, gradient };
+            let binding = Binding { device, kernels, block, memory, points, learning };
             let (forward, backward) =
                 (binding.forward(shape, stride)?, binding.backward(shape, stride)?);
             Ok(Block { uniform, forward, backward })
@@ -255,8 +254,9 @@ impl Binding<'_> {
         turn: usize,
         stride: usize,
     ) -> Result<Option<Task>, GpuError> {
-        let Self { device, kernels, block, points, parameters, memory, .. } = self;
+        let Self { device, kernels, block, points, learning, memory, .. } = self;
         let Points { bends, cotangents, extent, .. } = points;
+        let parameters = &learning.parameters;
         let (rows, encoded) = (&memory.rows, shape.encoded());
         let Some((layer, slopes)) = memory.behind_units.as_ref().filter(|_| shape.skip == Some(k))
         else {
@@ -304,7 +304,7 @@ impl Binding<'_> {
             encoding,
             extent,
             places,
-            self.parameters,
+            &self.learning.parameters,
             rows,
             values,
             bends,
@@ -323,8 +323,9 @@ impl Binding<'_> {
     }
 
     fn add_up(&self) -> Result<Bound, GpuError> {
-        let Binding { block, points, memory, gradient, .. } = self;
-        let buffers = [(0, *block), (3, &points.extent), (10, *gradient), (12, &memory.parts)];
+        let Binding { block, points, memory, learning, .. } = *self;
+        let gradient = &learning.gradient;
+        let buffers = [(0, block), (3, &points.extent), (10, gradient), (12, &memory.parts)];
         self.device.bind(&self.kernels[7], &buffers)
     }
 }

@@ -95,9 +95,12 @@ pub struct Pixels {
     pairs: Buffer,
     mask: Buffer,
     fall: Option<FallTable>,
-    fluxes: Buffer,
-    slopes: Buffer,
-    records: Buffer,
+    /// Light of pairs.
+    pub fluxes: Buffer,
+    /// dL/dpixel of pairs.
+    pub slopes: Buffer,
+    /// Records: sums of squares, and points.
+    pub records: Buffer,
     forward: [Bound; 3],
     sums: [Bound; 2],
     spread: Bound,
@@ -256,24 +259,9 @@ impl Pixels {
         device.write(&self.slopes, &floats(slopes))
     }
 
-    /// Light of pairs.
-    pub fn fluxes_buffer(&self) -> &Buffer {
-        &self.fluxes
-    }
-
-    /// dL/dpixel of pairs.
-    pub fn slopes_buffer(&self) -> &Buffer {
-        &self.slopes
-    }
-
     /// Forgets the records.
     pub fn forget(&self, commands: &mut Commands) {
         commands.clear(&self.records);
-    }
-
-    /// Records: sums of squares, and points.
-    pub fn records(&self) -> &Buffer {
-        &self.records
     }
 }
 

@@ -68,7 +68,7 @@ impl Visibilities {
         let buffers = [
             &task,
             &places,
-            pixels.fluxes_buffer(),
+            &pixels.fluxes,
             &visibilities,
             &piece,
             &model,
@@ -81,7 +81,7 @@ impl Visibilities {
             &precision,
             &residuals,
             &pulls,
-            pixels.slopes_buffer(),
+            &pixels.slopes,
             &losses,
         ];
         let tasks = bound(device, buffers)?;
