@@ -11,8 +11,10 @@ use kerrlight_common::simd::{Float, panel};
 pub struct Packed<T> {
     layers: Vec<Panels<T>>,
     output: Lines<T>,
-    scales: [T; 4],
-    part: T,
+    /// Factors of coordinates, in their order.
+    pub scales: [T; 4],
+    /// The part of the first that enters without sine and cosine.
+    pub part: T,
 }
 
 #[derive(Default)]
@@ -72,16 +74,6 @@ impl<T: Float + Default> Packed<T> {
     /// Weights and bias of the output layer, then zeros.
     pub fn output(&self) -> &[T] {
         self.output.read()
-    }
-
-    /// Returns the factors of coordinates, in their order.
-    pub fn scales(&self) -> &[T; 4] {
-        &self.scales
-    }
-
-    /// The part of the first that enters without sine and cosine.
-    pub fn part(&self) -> T {
-        self.part
     }
 }
 

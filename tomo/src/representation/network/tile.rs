@@ -77,8 +77,8 @@ impl<T: Float + Default> Activations<T> {
         let (set, layout, points) = (network.instruction_set, &network.layout, at.len());
         self.points = points;
         let output = MatrixMut { numbers: self.rows[0].all(), stride: layout.rows[0].stride };
-        let (scales, degree) = (&packed.scales()[..at.dimension()], network.settings.degree);
-        dispatch(set, Encode { at, scales, part: packed.part(), degree, output });
+        let (scales, degree) = (&packed.scales[..at.dimension()], network.settings.degree);
+        dispatch(set, Encode { at, scales, part: packed.part, degree, output });
         for (k, layer) in layout.hidden().iter().enumerate() {
             let (before, after) = self.rows.split_at_mut(k + 1);
             let input = matrix(&before[k], layout.rows[k]);
@@ -165,7 +165,7 @@ impl<T: Float + Default> Tile<T> {
         if let Some(mut gradient) = coordinates {
             let rows = matrix(&self.passed.rows[0], layout.rows[0]);
             let cotangents = matrix(&self.encoded, layout.rows[0]);
-            let (scales, part) = (&packed.scales()[..gradient.dimension()], packed.part());
+            let (scales, part) = (&packed.scales[..gradient.dimension()], packed.part);
             encode_vjp(rows, cotangents, scales, part, network.settings.degree, &mut gradient);
         }
     }
