@@ -1,8 +1,8 @@
 //! Shaders of other crates on an open device: buffers that stay there, kernels, and commands in their order.
 
-use super::device::{Adapter, Device, Mapped, Needs};
+use super::device::{Adapter, Device, Needs};
 use super::error::GpuError;
-use super::kernel::{mapped, readable};
+use super::kernel::readable;
 use super::times::{KernelTime, Stopwatch};
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -323,11 +323,7 @@ impl Compute {
             self.device.queue.submit([encoder.finish()]);
             copies
         })?;
-        let (sent, came) = std::sync::mpsc::channel::<Mapped>();
-        self.device.map(&copies, &sent)?;
-        self.device.finish()?;
-        let read: Vec<T> =
-            copies.iter().map(|buffer| mapped(&came, buffer, &made)).collect::<Result<_, _>>()?;
+        let read = self.device.read(&copies, made)?;
         copies.iter().for_each(wgpu::Buffer::unmap);
         *self.readers.lock().unwrap_or_else(PoisonError::into_inner) = copies;
         Ok(read)

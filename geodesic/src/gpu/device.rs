@@ -5,7 +5,6 @@ use core::cell::Cell;
 use core::future::Future;
 use core::task::{Context, Poll, Waker};
 use std::panic::{self, AssertUnwindSafe};
-use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, Once, PoisonError};
 
 /// A graphics device of this computer.
@@ -100,9 +99,6 @@ impl Adapter {
         }
     }
 }
-
-/// Outcome of mapping a buffer.
-pub(super) type Mapped = Result<(), wgpu::BufferAsyncError>;
 
 /// A device that is open.
 #[derive(Debug)]
@@ -224,22 +220,30 @@ impl Device {
         }
     }
 
-    /// Has buffers mapped for reading when what was submitted is done; `sent` then gets what became of each.
-    pub fn map(&self, buffers: &[wgpu::Buffer], sent: &Sender<Mapped>) -> Result<(), GpuError> {
+    /// Maps buffers when everything that was submitted is done, and reads the bytes of each.
+    pub fn read<T>(
+        &self,
+        buffers: &[wgpu::Buffer],
+        made: impl Fn(&[u8]) -> T,
+    ) -> Result<Vec<T>, GpuError> {
+        let (sent, came) = std::sync::mpsc::channel::<Result<(), wgpu::BufferAsyncError>>();
         self.attempt(0, || {
             for buffer in buffers {
                 let sent = sent.clone();
                 let told = move |mapped| sent.send(mapped).unwrap_or(());
                 buffer.map_async(wgpu::MapMode::Read, .., told);
             }
-        })
-    }
-
-    /// Waits until everything that was submitted is done.
-    pub fn finish(&self) -> Result<(), GpuError> {
+        })?;
         let done = self.poll(wgpu::PollType::wait_indefinitely());
         self.alive()?;
-        done
+        done?;
+        let failed = |what: &dyn core::fmt::Display| GpuError::Failed(what.to_string());
+        let read = |buffer: &wgpu::Buffer| -> Result<T, GpuError> {
+            came.recv().map_err(|error| failed(&error))?.map_err(|error| failed(&error))?;
+            let view = buffer.get_mapped_range(..).map_err(|error| failed(&error))?;
+            Ok(made(&view))
+        };
+        buffers.iter().map(read).collect()
     }
 
     fn poll(&self, until: wgpu::PollType) -> Result<(), GpuError> {

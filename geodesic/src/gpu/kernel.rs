@@ -1,6 +1,6 @@
 //! A shader with its bindings, run on bytes.
 
-use super::device::{Device, Mapped};
+use super::device::Device;
 use super::error::GpuError;
 use crate::screen::view::View;
 use crate::spacetime::kerr::Kerr;
@@ -83,10 +83,7 @@ impl Program {
             self.submit(device, entries, invocations, &buffers, &outputs);
             outputs.into_iter().map(|(_, read)| read).collect::<Vec<_>>()
         })?;
-        let (sent, came) = std::sync::mpsc::channel();
-        device.map(&read, &sent)?;
-        device.finish()?;
-        read.iter().map(|buffer| copy(&came, buffer)).collect()
+        device.read(&read, <[u8]>::to_vec)
     }
 
     fn submit(
@@ -213,23 +210,4 @@ pub(super) fn readable(device: &Device, size: u64) -> wgpu::Buffer {
         usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
         mapped_at_creation: false,
     })
-}
-
-pub(super) fn copy(
-    came: &std::sync::mpsc::Receiver<Mapped>,
-    buffer: &wgpu::Buffer,
-) -> Result<Vec<u8>, GpuError> {
-    mapped(came, buffer, <[u8]>::to_vec)
-}
-
-/// Reads the bytes of a buffer, once it is mapped.
-pub(super) fn mapped<T>(
-    came: &std::sync::mpsc::Receiver<Mapped>,
-    buffer: &wgpu::Buffer,
-    made: impl Fn(&[u8]) -> T,
-) -> Result<T, GpuError> {
-    let failed = |what: &dyn core::fmt::Display| GpuError::Failed(what.to_string());
-    came.recv().map_err(|error| failed(&error))?.map_err(|error| failed(&error))?;
-    let view = buffer.get_mapped_range(..).map_err(|error| failed(&error))?;
-    Ok(made(&view))
 }

@@ -1,8 +1,8 @@
 //! Times of kernels, by the clock of the device.
 
-use super::device::{Device, Mapped};
+use super::device::Device;
 use super::error::GpuError;
-use super::kernel::{copy, readable};
+use super::kernel::readable;
 use std::sync::Arc;
 
 /// Time that a kernel took.
@@ -89,10 +89,7 @@ impl Stopwatch {
             device.queue.submit([encoder.finish()]);
             to
         })?;
-        let (sent, came) = std::sync::mpsc::channel::<Mapped>();
-        device.map(std::slice::from_ref(&to), &sent)?;
-        device.finish()?;
-        let bytes = copy(&came, &to)?;
+        let bytes = device.read(&[to], <[u8]>::to_vec)?.concat();
         let ticks = bytes.as_chunks::<8>().0.iter().map(|word| u64::from_le_bytes(*word));
         let ticks: Vec<u64> = ticks.collect();
         let took =
