@@ -3,7 +3,7 @@
 //!
 //! `cargo bench -p kerrlight-geodesic --features affine`
 
-use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use kerrlight_geodesic::simd::{Crossings, InstructionSet, Samples};
 use kerrlight_geodesic::{Inclination, Kerr, Observer, Path, Quantities, Ray, Tracer};
 use std::hint::black_box;
@@ -81,19 +81,15 @@ fn samples(c: &mut Criterion) {
     let mut group = c.benchmark_group("64 rays x 100 samples of a traced path");
     group.throughput(Throughput::Elements(6400));
     group.bench_function("everything", |b| {
-        b.iter_batched(
-            || (),
-            |()| {
-                let mut sum = 0.0;
-                for path in &paths {
-                    for k in 0..100 {
-                        sum += path.at(path.mino_total() * f64::from(k) / 100.0).inverse_radius;
-                    }
+        b.iter(|| {
+            let mut sum = 0.0;
+            for path in &paths {
+                for k in 0..100 {
+                    sum += path.at(path.mino_total() * f64::from(k) / 100.0).inverse_radius;
                 }
-                black_box(sum)
-            },
-            BatchSize::SmallInput,
-        );
+            }
+            black_box(sum)
+        });
     });
     group.finish();
 }

@@ -41,7 +41,7 @@ fn parts(
         batch.set(pairs.iter().copied());
         batch.gather(&trainer.objective.model, paper::axis(), mask);
     });
-    let count = network_parameters(network);
+    let count = Representation::<f32>::parameters(network);
     let (mut gradient, mut values) = (vec![0.0; count], vec![0.0; batch.points()]);
     let mut workspace = Workspace::new();
     let link = |_: core::ops::Range<usize>, values: &[f32], out: &mut [f32]| {
@@ -57,10 +57,6 @@ fn parts(
     let (mut memory, mut parameters) = (AdamState::new(count), state.now.parameters.clone());
     let adam = least(|| memory.step(1e-9, &gradient, &mut parameters));
     ([gather, through, adam], batch.points())
-}
-
-fn network_parameters(network: &Network) -> usize {
-    Representation::<f32>::parameters(network)
 }
 
 fn measure(batch: BatchSize, set: InstructionSet) {
