@@ -101,7 +101,7 @@ impl Convert {
             .chain(&self.leakage)
             .try_for_each(|table| output.must_differ_from(table))?;
         self.check_numbers()?;
-        let (_, mut observation) = interferometry::read(&self.input)?;
+        let mut observation = interferometry::read(&self.input)?;
         self.complete(&mut observation)?;
         let flags = Flags {
             stations: self.flag_station.clone(),

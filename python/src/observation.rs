@@ -157,7 +157,7 @@ impl Visibilities {
     #[staticmethod]
     fn decode(py: Python<'_>, bytes: &[u8]) -> PyResult<(Self, String)> {
         let (format, observation) = detached(py, || decode(bytes))?;
-        Ok((Visibilities { observation }, format.to_string()))
+        Ok((Visibilities { observation }, format.to_owned()))
     }
 
     /// Makes an observation from columns.

@@ -76,7 +76,7 @@ fn light_curve(path: &Path) -> anyhow::Result<LightCurve> {
     if !matches!(extension.to_ascii_lowercase().as_str(), "uvfits" | "fits") {
         return files::parse_light_curve(&output::read_text(path)?).with_context(name);
     }
-    let observation = interferometry::read(path)?.1;
+    let observation = interferometry::read(path)?;
     interferometry::warn_of_repeats(&name(), &observation);
     let curve = LightCurve::of_sites(&observation.with_repeats_merged());
     if curve.samples.is_empty() {
@@ -204,7 +204,7 @@ fn visibilities<R>(
     path: &Path,
     of: impl FnOnce(Observation, &str) -> Result<R, Error>,
 ) -> anyhow::Result<R> {
-    let (_, observation) = interferometry::read(path)?;
+    let observation = interferometry::read(path)?;
     let (name, all) = (path.display().to_string(), observation.rows.len());
     let without = all - observation.stokes_i().count();
     interferometry::warn_of_repeats(&name, &observation);

@@ -1,19 +1,18 @@
 //! Contents of an observation.
 
 use crate::answer::Answer;
-use kerrlight_vlbi::files::Format;
 use kerrlight_vlbi::observation::{Basis, Observation, Repeats, Row};
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Describes visibilities.
-pub fn describe(name: &str, format: Format, observation: &Observation) -> Answer {
+pub fn describe(name: &str, format: &str, observation: &Observation) -> Answer {
     let text = text(name, format, observation);
     let [times, baselines] = counts(observation);
     let position = observation.position.map(|p| json!({"ra_h": p.ra_hours, "dec_deg": p.dec_deg}));
     let channels: Vec<f64> = observation.channels.iter().map(|c| c.frequency_hz).collect();
     let [first, last] = span(observation);
-    Answer::text(text).with("file", name).with("format", format.to_string()).with_all(json!({
+    Answer::text(text).with("file", name).with("format", format).with_all(json!({
         "source": observation.source,
         "position": position,
         "mjd": observation.mjd,
@@ -51,7 +50,7 @@ fn span(observation: &Observation) -> [f64; 2] {
     [times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max)]
 }
 
-fn text(name: &str, format: Format, observation: &Observation) -> String {
+fn text(name: &str, format: &str, observation: &Observation) -> String {
     let rows = &observation.rows;
     let or_unknown = |value: Option<String>| value.unwrap_or_else(|| "not told".to_owned());
     let position = observation.position;

@@ -10,13 +10,14 @@ use crate::answer::{self, Answer};
 use crate::output::{self, Output};
 use anyhow::{Context, bail};
 use clap::ValueEnum;
-use kerrlight_vlbi::files::{self, EhtTable, Format};
+use kerrlight_vlbi::files::{self, EhtTable};
 use kerrlight_vlbi::observation::{Observation, Repeats};
 use std::path::Path;
 
 /// Reads visibilities in any format.
-pub fn read(path: &Path) -> anyhow::Result<(Format, Observation)> {
-    files::decode(&output::read(path)?).with_context(|| path.display().to_string())
+pub fn read(path: &Path) -> anyhow::Result<Observation> {
+    let decoded = files::decode(&output::read(path)?);
+    Ok(decoded.with_context(|| path.display().to_string())?.1)
 }
 
 /// Says of rows that are there more than once what becomes of them where times are compared.

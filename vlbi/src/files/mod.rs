@@ -74,44 +74,23 @@ impl FileError {
     }
 }
 
-/// The formats that [`decode`] tells apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Format {
-    /// Random groups with an antenna table.
-    Uvfits,
-    /// eht-imaging's text: a heading with all that is known, 20 columns.
-    ObsText,
-    /// A table of total intensity: kerrlight's CSV, or the EHT's public csv and txt.
-    Table,
-}
-
-impl core::fmt::Display for Format {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Format::Uvfits => "UVFITS",
-            Format::ObsText => "eht-imaging text",
-            Format::Table => "table of visibilities",
-        })
-    }
-}
-
-/// Reads an observation from a file in any of the formats, told apart by how it begins.
+/// Reads an observation from a file in any of the formats, told apart by how it begins: UVFITS, eht-imaging text, or a
+/// table of visibilities (kerrlight's CSV, the EHT's public csv and txt); with the name of the format.
 ///
 /// # Errors
 /// If it begins like none of them, or is damaged.
-pub fn decode(bytes: &[u8]) -> Result<(Format, Observation), Error> {
+pub fn decode(bytes: &[u8]) -> Result<(&'static str, Observation), Error> {
     if bytes.starts_with(b"SIMPLE  =") {
-        return Ok((Format::Uvfits, read_uvfits(bytes)?));
+        return Ok(("UVFITS", read_uvfits(bytes)?));
     }
     let text = core::str::from_utf8(bytes).map_err(|error| {
         FileError::byte(error.valid_up_to(), "neither UVFITS nor a text of visibilities")
     })?;
     let text = without_mark(text);
     if obs_text::is_obs_text(text) {
-        return Ok((Format::ObsText, parse_obs_text(text)?));
+        return Ok(("eht-imaging text", parse_obs_text(text)?));
     }
-    Ok((Format::Table, parse_table(text)?))
+    Ok(("table of visibilities", parse_table(text)?))
 }
 
 /// Refuses to write what is no number, and names it.
@@ -277,18 +256,15 @@ mod tests {
     fn exact_formats_are_told_apart() {
         let format = |bytes: &[u8]| decode(bytes).unwrap().0;
         let [obs, csv, eht] = &texts()[..] else { unreachable!("three texts") };
-        assert_eq!(format(obs.as_bytes()), Format::ObsText);
-        assert_eq!(
-            (format(csv.as_bytes()), format(eht.as_bytes())),
-            (Format::Table, Format::Table)
-        );
+        assert_eq!(format(obs.as_bytes()), "eht-imaging text");
+        assert_eq!([csv, eht].map(|text| format(text.as_bytes())), ["table of visibilities"; 2]);
         for text in [obs, csv, eht] {
             let marked = format!("\u{feff}{text}");
             let all = |text: &str| format!("{:?}", decode(text.as_bytes()).unwrap());
             assert_eq!(all(&marked), all(text));
         }
         let uvfits = write_uvfits(&uvfits::tests::small()).unwrap();
-        assert_eq!(format(&uvfits), Format::Uvfits);
+        assert_eq!(format(&uvfits), "UVFITS");
         let message = decode(&[0x89, b'P', b'N', b'G', 0xff]).unwrap_err().to_string();
         assert!(message.contains("neither UVFITS"), "{message}");
     }

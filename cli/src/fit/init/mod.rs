@@ -86,7 +86,7 @@ fn head(path: &Path, plain: &str) -> String {
 fn of_files(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Result<String> {
     let mut observations = Vec::new();
     for path in data {
-        observations.push(crate::interferometry::read(path)?.1);
+        observations.push(crate::interferometry::read(path)?);
     }
     let first = observations.first().context("no file of data")?;
     let source = known(first);
@@ -123,7 +123,7 @@ fn of_files(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Resu
 fn of_data(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Result<String> {
     let [data] = data else { return of_files(data, toml, model) };
     if model == Some(Model::Image) {
-        let (_, observation) = crate::interferometry::read(data)?;
+        let observation = crate::interferometry::read(data)?;
         return of_observation(&observation, data, toml, model);
     }
     let path = toml::Value::String(seen_from(toml, data)?).to_string();
@@ -133,7 +133,7 @@ fn of_data(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Resul
     }
     let name = data.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let first = match crate::interferometry::read(data) {
-        Ok((_, observation)) => return of_observation(&observation, data, toml, model),
+        Ok(observation) => return of_observation(&observation, data, toml, model),
         Err(first) => first,
     };
     // A table may hold a light curve, and a FITS file or a table an image.
