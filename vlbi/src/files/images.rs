@@ -4,7 +4,7 @@ use super::{FileError, shortened};
 use crate::Error;
 use crate::operator::ImageGrid;
 use crate::simulate::{Movie, StokesMovie};
-use kerrlight_common::frames::{Frames, Sink};
+use kerrlight_common::frames::Frames;
 use kerrlight_common::memory;
 use kerrlight_common::numpy::{
     Archive, ArchiveWriter, NumpyError, Stream, read_array, write_archive, write_array,
@@ -183,18 +183,6 @@ pub fn npz_frames(file: impl Read + Seek) -> std::result::Result<WithSize, Error
 
 fn frames_of<R: Read>(array: Stream<R>) -> std::result::Result<WithSize, Error> {
     let shape = array.shape().to_vec();
-    frames_with(&shape, |pixels, sink| array.chunks(pixels, sink))
-}
-
-/// Images of an array of this shape, (height, width) or (frames, height, width). `make` is given the number of pixels of
-/// an image, and hands over one image after the other: they need not fit into memory.
-///
-/// # Errors
-/// Those of `make`; if the array has another shape, or a number that is not finite.
-pub fn frames_with(
-    shape: &[u64],
-    make: impl FnOnce(usize, &mut Sink<'_, f64, Error>) -> std::result::Result<(), Error>,
-) -> std::result::Result<WithSize, Error> {
     let (count, [height, width]) = match shape[..] {
         [height, width] => (1, [height, width]),
         [count, height, width] => (count, [height, width]),
@@ -210,7 +198,7 @@ pub fn frames_with(
     let what = || format!("an image of {width} x {height} pixels");
     memory::afford(what, memory::movie(1.0, pixels as f64))?;
     let frames = Frames::made(count, pixels, |sink| {
-        make(pixels, &mut |image: &[f64]| {
+        array.chunks(pixels, |image: &[f64]| -> std::result::Result<(), Error> {
             all_finite(image, [width, height])?;
             Ok(sink(image)?)
         })
