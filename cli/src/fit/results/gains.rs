@@ -12,7 +12,7 @@ use kerrlight_tomo::fit::setup::FitData;
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::gains::{GainDistance, GainTable, StationGain};
-use kerrlight_vlbi::observation::{Observation, Row};
+use kerrlight_vlbi::observation::Observation;
 use serde::Serialize;
 
 /// The table of all gains.
@@ -182,10 +182,11 @@ impl Gains {
         Ok(Gains { beside: table.clone(), table, distance })
     }
 
-    /// Multiplies visibilities of a model by g₁ ḡ₂ of their stations at their times; by 1 where a station has none.
-    pub fn put_on(&self, observation: &Observation, rows: &[&Row], model: &mut [Complex64]) {
+    /// Multiplies a model's visibilities of all rows that have Stokes I by g₁ ḡ₂ of their stations at their times; by 1
+    /// where a station has none.
+    pub fn put_on(&self, observation: &Observation, model: &mut [Complex64]) {
         let gains = self.beside.by_station();
-        for (row, v) in rows.iter().zip(model) {
+        for ((row, _), v) in observation.stokes_i().zip(model) {
             let gain = |name: &str| gains.at(name, row.time_h).unwrap_or(1.0.into());
             let [first, second] = observation.names(row).map(gain);
             *v *= first * second.conj();

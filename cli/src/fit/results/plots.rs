@@ -40,8 +40,7 @@ pub fn amplitudes(
     let mut model = evidence.model_visibilities(movie)?.unwrap_or_default();
     let rows: Vec<_> = observation.stokes_i().collect();
     if let Some(gains) = gains {
-        let rows: Vec<_> = rows.iter().map(|(row, _)| *row).collect();
-        gains.put_on(observation, &rows, &mut model);
+        gains.put_on(observation, &mut model);
     }
     let with = if gains.is_some() { ", with the gains that were found" } else { "" };
     let length = |uv: [f64; 2]| uv[0].hypot(uv[1]) * 1e-9;

@@ -48,8 +48,7 @@ impl Estimate<'_> {
         }
         let mut model = self.evidence().model_visibilities(&found.movie)?.unwrap_or_default();
         if let Some(gains) = &found.gains {
-            let rows: Vec<_> = rows.iter().map(|(row, _)| *row).collect();
-            gains.put_on(observation, &rows, &mut model);
+            gains.put_on(observation, &mut model);
         }
         let uv: Vec<[f64; 2]> = rows.iter().map(|(row, _)| row.uv).collect();
         let residuals = rows.iter().zip(&model).map(|((_, i), model)| model - i.visibility);
