@@ -314,3 +314,10 @@ fn parse(text: &str) -> anyhow::Result<FitFile> {
     }
     FitFile::parse(text).map_err(work::explained)
 }
+
+/// The built-in experiment with changes.
+#[cfg(test)]
+fn built_in_with(changes: &[&str]) -> FitFile {
+    let change = |text: String, change: &&str| assigned(&text, change).unwrap();
+    parse(&changes.iter().fold(BUILT_IN.to_owned(), change)).unwrap()
+}

@@ -98,17 +98,12 @@ fn steps(file: &FitFile, losses: &[f64]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::{BUILT_IN, assigned};
-
-    fn file(changes: &[&str]) -> FitFile {
-        let change = |text: String, change: &&str| assigned(&text, change).unwrap();
-        FitFile::parse(&changes.iter().fold(BUILT_IN.to_owned(), change)).unwrap()
-    }
+    use crate::fit::built_in_with;
 
     #[test]
     fn exact_wide_voxels_are_named_with_their_number() {
         let of = |nodes: &str| {
-            voxels(&file(&[
+            voxels(&built_in_with(&[
                 "representation=linear-grid",
                 nodes,
                 "screen.pixels=32",
@@ -126,7 +121,7 @@ mod tests {
     fn exact_long_periods_are_named_with_their_degree() {
         let of = |kind: &str, degree: &str| {
             let loss = "loss=[{data=\"image\",weight=1.0}]";
-            encoding(&file(&[kind, degree, loss, "screen.pixels=32", "screen.width=26"]))
+            encoding(&built_in_with(&[kind, degree, loss, "screen.pixels=32", "screen.width=26"]))
         };
         let [three, four] = [3, 4].map(|degree| format!("representation.network.degree={degree}"));
         for kind in ["representation=bhnerf", "representation=mlp4d"] {
@@ -136,12 +131,12 @@ mod tests {
         }
         assert_eq!(of("representation=grid", &three), None);
         // The built-in fit is one of visibilities.
-        assert_eq!(encoding(&file(&["representation=bhnerf", &three])), None);
+        assert_eq!(encoding(&built_in_with(&["representation=bhnerf", &three])), None);
     }
 
     #[test]
     fn exact_a_loss_that_falls_is_named() {
-        let file = file(&["training.steps=400"]);
+        let file = built_in_with(&["training.steps=400"]);
         let falling: Vec<f64> = (0..12).map(|k| 2.0 - 0.05 * f64::from(k)).collect();
         let said = steps(&file, &falling).unwrap();
         // From the mean of 1.725 to that of 1.525.

@@ -155,12 +155,7 @@ impl Reached {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::{BUILT_IN, assigned};
-
-    fn file(changes: &[&str]) -> FitFile {
-        let change = |text: String, change: &&str| assigned(&text, change).unwrap();
-        FitFile::parse(&changes.iter().fold(BUILT_IN.to_owned(), change)).unwrap()
-    }
+    use crate::fit::built_in_with;
 
     /// A ball of 1 M about a place at `r` on the x axis.
     fn ball(r: f64) -> Volume {
@@ -175,7 +170,7 @@ mod tests {
 
     #[test]
     fn exact_light_that_is_cut_off_is_named() {
-        let file = file(&["region.r_min=2", "region.r_max=10", "region.z_width=4"]);
+        let file = built_in_with(&["region.r_min=2", "region.r_max=10", "region.z_width=4"]);
         assert!(edges(&file, &ball(6.0)).is_empty());
         for (r, key) in [(9.8, "region.r_max"), (2.2, "region.r_min")] {
             let found = edges(&file, &ball(r));
@@ -201,12 +196,14 @@ mod tests {
         );
         let kinds = ["grid", "feature-grid", "bhnerf"].map(|kind| format!("representation={kind}"));
         for kind in &kinds {
-            assert_eq!(ceiling(&file(&[kind])), Some(("representation.activation", 1.0)));
-            let soft = file(&[kind, "representation.activation=softplus"]);
+            assert_eq!(ceiling(&built_in_with(&[kind])), Some(("representation.activation", 1.0)));
+            let soft = built_in_with(&[kind, "representation.activation=softplus"]);
             assert_eq!(ceiling(&soft), None);
         }
-        let linear =
-            file(&["representation=linear-grid", "linear={upper=4.0,rounds=1,iterations=1}"]);
+        let linear = built_in_with(&[
+            "representation=linear-grid",
+            "linear={upper=4.0,rounds=1,iterations=1}",
+        ]);
         assert_eq!(ceiling(&linear), Some(("linear.upper", 4.0)));
     }
 }

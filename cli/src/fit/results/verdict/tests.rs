@@ -1,7 +1,7 @@
 //! The verdict of the truth itself, through all that a fit's data pass through.
 
 use super::*;
-use crate::fit::{assigned, data, parse};
+use crate::fit::{built_in_with, data};
 use kerrlight_tomo::fit::Objective;
 use kerrlight_tomo::fit::setup::{self, Instrument};
 use std::path::Path;
@@ -9,11 +9,7 @@ use std::path::Path;
 /// The verdict of the simulated movie times `scale`, of the built-in experiment with changes.
 fn of_truth(changes: &[&str], scale: f32) -> DataVerdict {
     let small = ["screen.pixels=20", "simulation.observation.scans=24"];
-    let text = small
-        .iter()
-        .chain(changes)
-        .fold(crate::fit::BUILT_IN.to_owned(), |text, change| assigned(&text, change).unwrap());
-    let file = parse(&text).unwrap();
+    let file = built_in_with(&[&small[..], changes].concat());
     let instrument = Instrument::new(&file).unwrap();
     let measured = data::measure(&file, &instrument, Path::new(".")).unwrap();
     let motion = setup::motion(&file, measured.times.clone()).unwrap();
