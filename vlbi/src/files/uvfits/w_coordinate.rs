@@ -1,6 +1,6 @@
 //! w of baselines: (u, v) come with the data, w from where the stations are.
 
-use crate::earth::{Frame, SourcePosition, View};
+use crate::earth::{Frame, View};
 use crate::observation::{Observation, Row};
 use kerrlight_common::units::SPEED_OF_LIGHT;
 
@@ -14,61 +14,39 @@ const TRIAL: usize = 64;
 /// positions, source or day are not known, or do not make the (u, v) of the data.
 pub fn w_seconds<'a>(observation: &Observation, rows: impl Iterator<Item = &'a Row>) -> Vec<f64> {
     let rows: Vec<&Row> = rows.collect();
-    Baselines::of(observation)
-        .and_then(|baselines| baselines.w_seconds(&rows))
-        .unwrap_or_else(|| vec![0.0; rows.len()])
+    known(observation, &rows).unwrap_or_else(|| vec![0.0; rows.len()])
 }
 
-/// Sources of (u, v, w).
-struct Baselines<'a> {
-    observation: &'a Observation,
-    source: SourcePosition,
-    mjd: i32,
-    positions: Vec<[f64; 3]>,
-}
-
-impl<'a> Baselines<'a> {
-    fn of(observation: &'a Observation) -> Option<Self> {
-        let positions = observation.stations.iter().map(|station| station.position);
-        Some(Self {
-            observation,
-            source: observation.position?,
-            mjd: observation.mjd?,
-            positions: positions.collect::<Option<_>>()?,
-        })
-    }
-
-    fn w_seconds(&self, rows: &[&Row]) -> Option<Vec<f64>> {
-        let step = rows.len().div_ceil(TRIAL).max(1);
-        let trial: Vec<&Row> = rows.iter().step_by(step).copied().collect();
-        let miss = |frame| Some((self.miss(&trial, frame)?, frame));
-        let frames = [Frame::Catalogue, Frame::OfDate].into_iter().filter_map(miss);
-        let (miss, frame) = frames.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let uvw = (miss < LARGEST_MISS).then(|| self.uvw(rows, frame))??;
-        Some(uvw.into_iter().map(|[_, _, w]| w).collect())
-    }
-
-    /// Root mean square distance of (u, v) from those of the rows, over the root mean square of the latter.
-    fn miss(&self, rows: &[&Row], frame: Frame) -> Option<f64> {
+fn known(observation: &Observation, rows: &[&Row]) -> Option<Vec<f64>> {
+    let (source, mjd) = (observation.position?, observation.mjd?);
+    let positions = observation.stations.iter().map(|station| station.position);
+    let positions: Vec<[f64; 3]> = positions.collect::<Option<_>>()?;
+    // In seconds of light.
+    let uvw = |rows: &[&Row], frame| -> Option<Vec<[f64; 3]>> {
+        let mut view_at = View::of_day(source, mjd, frame);
+        let uvw = |row: &&Row| {
+            let [first, second] = row.stations.map(|k| positions[usize::from(k)]);
+            Some(view_at(row.time_h).ok()?.uvw(first, second, SPEED_OF_LIGHT))
+        };
+        rows.iter().map(uvw).collect()
+    };
+    let step = rows.len().div_ceil(TRIAL).max(1);
+    let trial: Vec<&Row> = rows.iter().step_by(step).copied().collect();
+    // Root mean square distance of (u, v) from those of the rows, over the root mean square of the latter.
+    let miss = |frame| -> Option<(f64, Frame)> {
         let (mut distance, mut length) = (0.0, 0.0);
-        for (row, [u, v, _]) in rows.iter().zip(self.uvw(rows, frame)?) {
-            let frequency_hz = self.observation.frequency_of(row)?;
+        for (row, [u, v, _]) in trial.iter().zip(uvw(&trial, frame)?) {
+            let frequency_hz = observation.frequency_of(row)?;
             let [a, b] = row.uv.map(|x| x / frequency_hz);
             distance += (a - u).powi(2) + (b - v).powi(2);
             length += a * a + b * b;
         }
-        Some((distance / length).sqrt())
-    }
-
-    /// (u, v, w) of rows in seconds of light.
-    fn uvw(&self, rows: &[&Row], frame: Frame) -> Option<Vec<[f64; 3]>> {
-        let mut view_at = View::of_day(self.source, self.mjd, frame);
-        let uvw = |row: &&Row| {
-            let [first, second] = row.stations.map(|k| self.positions[usize::from(k)]);
-            Some(view_at(row.time_h).ok()?.uvw(first, second, SPEED_OF_LIGHT))
-        };
-        rows.iter().map(uvw).collect()
-    }
+        Some(((distance / length).sqrt(), frame))
+    };
+    let frames = [Frame::Catalogue, Frame::OfDate].into_iter().filter_map(miss);
+    let (miss, frame) = frames.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let uvw = (miss < LARGEST_MISS).then(|| uvw(rows, frame))??;
+    Some(uvw.into_iter().map(|[_, _, w]| w).collect())
 }
 
 #[cfg(test)]
