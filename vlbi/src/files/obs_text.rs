@@ -140,14 +140,9 @@ fn sexagesimal(words: &[&str], name: &str) -> Result<f64, String> {
 }
 
 fn row(line: &str, names: &Names) -> Result<Row, String> {
-    let mut cells = [""; COLUMNS];
-    let mut count = 0;
-    for cell in line.split_whitespace() {
-        if count < COLUMNS {
-            cells[count] = cell;
-        }
-        count += 1;
-    }
+    let mut words = line.split_whitespace();
+    let cells: [&str; COLUMNS] = core::array::from_fn(|_| words.next().unwrap_or_default());
+    let count = line.split_whitespace().count();
     if count != COLUMNS {
         return Err(format!("{count} columns: {COLUMNS} are expected"));
     }

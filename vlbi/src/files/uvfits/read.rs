@@ -161,17 +161,11 @@ fn position(header: &fits::Header<'_>) -> Result<Option<SourcePosition>, FileErr
     };
     let pointing = header.number("OBSRA")?.zip(header.number("OBSDEC")?);
     // Writers that do not know the axes have zeros there.
-    let centre = axis("RA")?.zip(axis("DEC")?).filter(|centre| *centre != (0.0, 0.0));
+    let axes = axis("RA")?.zip(axis("DEC")?);
+    let centre = axes.filter(|centre| *centre != (0.0, 0.0));
     let is_same = |(a, b): (f64, f64), (c, d): (f64, f64)| (a - c).abs().max((b - d).abs()) < 1e-6;
-    let (ra, dec) = match (pointing, centre) {
-        (None, None) => match axis("RA")?.zip(axis("DEC")?) {
-            Some(zeros) => zeros,
-            None => return Ok(None),
-        },
-        (Some(pointing), Some(centre)) if is_same(pointing, centre) => pointing,
-        (_, Some(centre)) => centre,
-        (Some(pointing), None) => pointing,
-    };
+    let same = pointing.filter(|pointing| centre.is_some_and(|centre| is_same(*pointing, centre)));
+    let Some((ra, dec)) = same.or(centre).or(pointing).or(axes) else { return Ok(None) };
     let position = SourcePosition::new(ra.rem_euclid(360.0) / 15.0, dec);
     position.map(Some).map_err(|error| header.error("OBSRA", error))
 }

@@ -58,13 +58,15 @@ pub fn source(units: &[Unit<'_>], layout: &Layout) -> Result<Option<Source>, Fil
         table.text(row, "SOURCE")
     };
     let number = only(&units[0], layout, "SOURCE").map_err(|error| {
-        let values = layout.selector("SOURCE");
-        let values = values.map(|parameter| values_named(&units[0], layout, parameter, name));
-        match (values, error) {
-            (Some(names), FileError::Byte { offset, message }) if !names.is_empty() => {
+        let parameter = layout.selector("SOURCE").into_iter();
+        let there = parameter.flat_map(|parameter| values(&units[0], layout, parameter));
+        let named = |k: i64| Some(format!("{k} is {}", name(k)?));
+        let names: Vec<String> = there.take(SHOWN).filter_map(named).collect();
+        match error {
+            FileError::Byte { offset, message } if !names.is_empty() => {
                 FileError::byte(offset, format!("{message} ({})", names.join(", ")))
             }
-            (_, error) => error,
+            error => error,
         }
     })?;
     let (Some(number), Some(unit)) = (number, unit) else { return Ok(None) };
@@ -85,17 +87,6 @@ pub fn source(units: &[Unit<'_>], layout: &Layout) -> Result<Option<Source>, Fil
     let position = SourcePosition::new(ra.rem_euclid(360.0) / 15.0, dec);
     let position = position.map_err(|error| fail(error.to_string()))?;
     Ok(Some(Source { name: name(number).unwrap_or_default(), position }))
-}
-
-/// `number name` of the sources that there are.
-fn values_named(
-    unit: &Unit<'_>,
-    layout: &Layout,
-    parameter: Parameter,
-    name: impl Fn(i64) -> Option<String>,
-) -> Vec<String> {
-    let values = values(unit, layout, parameter).into_iter().take(SHOWN);
-    values.filter_map(|k| Some(format!("{k} is {}", name(k)?))).collect()
 }
 
 /// Refuses a header whose coordinates or times are others than those that are read.
