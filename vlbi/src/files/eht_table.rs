@@ -70,13 +70,13 @@ pub fn to_eht_table(observation: &Observation, style: EhtTable) -> Result<String
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    const TXT: &str = "# SRC:M87 DATE(MJD):57853 FREQ:229.0707GHz\n\
+    pub const TXT: &str = "# SRC:M87 DATE(MJD):57853 FREQ:229.0707GHz\n\
         # time(UTC)      T1     T2   U(lambda)        V(lambda)         Iamp(Jy)    Iphase(d)   Isigma(Jy)\n\
         02.15138894      AA     LM   1868288384.0000  -3689129984.0000  0.01103669   -122.7523  0.00446794\n";
-    const CSV: &str = "#SRC:M87,DATE(MJD):57853,FREQ:229.0707GHz\n\
+    pub const CSV: &str = "#SRC:M87,DATE(MJD):57853,FREQ:229.0707GHz\n\
         #time(UTC),T1,T2,U(lambda),V(lambda),Iamp(Jy),Iphase(d),Isigma(Jy)\n\
         02.15138894,AA,LM,1868288384.0000,-3689129984.0000,0.01103669,-122.7523,0.00446794\n";
 

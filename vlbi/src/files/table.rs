@@ -201,21 +201,15 @@ pub fn to_csv(observation: &Observation, comments: bool) -> Result<String, Error
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files::eht_table::tests::{CSV, TXT};
     use crate::files::uvfits::tests::small;
     use crate::observation::Channel;
 
-    const EHT: &str = "# SRC:M87 DATE(MJD):57853 FREQ:229.0707GHz\n\
-        # time(UTC)  T1  T2  U(lambda)  V(lambda)  Iamp(Jy)  Iphase(d)  Isigma(Jy)\n\
-        02.15138894  AA  LM  1868288384.0000  -3689129984.0000  0.01103669  -122.7523  0.00446794\n";
-
     #[test]
     fn exact_txt_and_csv_of_the_eht() {
-        let csv = "#SRC:M87,DATE(MJD):57853,FREQ:229.0707GHz\n\
-            #time(UTC),T1,T2,U(lambda),V(lambda),Iamp(Jy),Iphase(d),Isigma(Jy)\n\
-            02.15138894,AA,LM,1868288384.0000,-3689129984.0000,0.01103669,-122.7523,0.00446794\n";
-        let observation = parse(EHT).unwrap();
+        let observation = parse(TXT).unwrap();
         // Products that are not there have an error of NaN, which is equal to nothing.
-        assert_eq!(format!("{:?}", parse(csv).unwrap()), format!("{observation:?}"));
+        assert_eq!(format!("{:?}", parse(CSV).unwrap()), format!("{observation:?}"));
         assert_eq!((observation.source.as_str(), observation.mjd), ("M87", Some(57853)));
         let i = observation.rows[0].product(0).unwrap();
         assert!((i.visibility.arg().to_degrees() + 122.7523).abs() < 1e-12);
@@ -224,7 +218,7 @@ mod tests {
 
     #[test]
     fn exact_round_trip() {
-        let observation = parse(EHT).unwrap();
+        let observation = parse(TXT).unwrap();
         let back = parse(&to_csv(&observation, true).unwrap()).unwrap();
         assert_eq!(format!("{back:?}"), format!("{observation:?}"));
     }
