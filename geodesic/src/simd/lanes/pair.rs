@@ -34,6 +34,16 @@ impl<V: Neg<Output = V>> Neg for Pair<V> {
     }
 }
 
+/// Functions of each half alone.
+macro_rules! lanewise {
+    ($($method:ident($($other:ident),*))*) => {$(
+        #[inline(always)]
+        fn $method(self, $($other: Self),*) -> Self {
+            Self(self.0.$method($($other.0),*), self.1.$method($($other.1),*))
+        }
+    )*};
+}
+
 impl<T: Element, V: Lanes<T>> Lanes<T> for Pair<V> {
     type Mask = (V::Mask, V::Mask);
     const LANES: usize = 2 * V::LANES;
@@ -56,38 +66,7 @@ impl<T: Element, V: Lanes<T>> Lanes<T> for Pair<V> {
             self.1.write(x.add(V::LANES));
         }
     }
-    #[inline(always)]
-    fn mul_add(self, b: Self, c: Self) -> Self {
-        Self(self.0.mul_add(b.0, c.0), self.1.mul_add(b.1, c.1))
-    }
-    #[inline(always)]
-    fn neg_mul_add(self, b: Self, c: Self) -> Self {
-        Self(self.0.neg_mul_add(b.0, c.0), self.1.neg_mul_add(b.1, c.1))
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self(self.0.sqrt(), self.1.sqrt())
-    }
-    #[inline(always)]
-    fn recip(self) -> Self {
-        Self(self.0.recip(), self.1.recip())
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        Self(self.0.abs(), self.1.abs())
-    }
-    #[inline(always)]
-    fn min(self, o: Self) -> Self {
-        Self(self.0.min(o.0), self.1.min(o.1))
-    }
-    #[inline(always)]
-    fn max(self, o: Self) -> Self {
-        Self(self.0.max(o.0), self.1.max(o.1))
-    }
-    #[inline(always)]
-    fn copysign(self, o: Self) -> Self {
-        Self(self.0.copysign(o.0), self.1.copysign(o.1))
-    }
+    lanewise!(mul_add(b, c) neg_mul_add(b, c) sqrt() recip() abs() min(o) max(o) copysign(o));
     #[inline(always)]
     fn lt(self, o: Self) -> Self::Mask {
         (self.0.lt(o.0), self.1.lt(o.1))
