@@ -56,14 +56,17 @@ pub fn section(id: &str, heading: &str, content: &str) -> String {
     format!("<section id=\"{id}\">\n<h2>{heading}</h2>\n{content}</section>\n")
 }
 
+fn paragraphs(text: &[String]) -> String {
+    text.iter().map(|text| format!("<p>{}</p>\n", escape(text))).collect()
+}
+
 fn notice(notice: &Notice) -> String {
     let class = match notice.tone {
         Tone::Good => "good",
         Tone::Plain => "plain",
         Tone::Bad => "bad",
     };
-    let text: String =
-        notice.text.iter().map(|text| format!("<p>{}</p>\n", escape(text))).collect();
+    let text = paragraphs(&notice.text);
     let headline = escape(&notice.headline);
     format!(
         "<section id=\"notice\" class=\"{class}\" role=\"note\">\n<p><strong>{headline}</strong></p>\n{text}</section>\n"
@@ -71,14 +74,12 @@ fn notice(notice: &Notice) -> String {
 }
 
 fn summary(sentences: &[String]) -> String {
-    let paragraph = |sentence: &String| format!("<p>{}</p>\n", escape(sentence));
-    let text: String = sentences.iter().map(paragraph).collect();
+    let text = paragraphs(sentences);
     if text.is_empty() { text } else { format!("<section id=\"summary\">\n{text}</section>\n") }
 }
 
 fn part(part: &Part) -> String {
-    let paragraph = |sentence: &String| format!("<p>{}</p>\n", escape(sentence));
-    let text: String = part.text.iter().map(paragraph).collect();
+    let text = paragraphs(&part.text);
     if text.is_empty() {
         text
     } else {
@@ -146,15 +147,18 @@ fn figure(figure: &Figure) -> String {
     )
 }
 
+/// An SVG with its description and caption.
+fn drawing(svg: &str, alt: &str, caption: &str) -> String {
+    let (alt, caption) = (escape(alt), escape(caption));
+    format!(
+        "<figure class=\"plot\"><div class=\"wide\" role=\"img\" aria-label=\"{alt}\">{svg}</div>\n\
+         <figcaption>{caption}</figcaption></figure>\n"
+    )
+}
+
 fn drawings(drawings: &[Drawing]) -> String {
     let one = |(k, Drawing { svg, caption, alt }): (usize, &Drawing)| {
-        format!(
-            "<figure class=\"plot\"><div class=\"wide\" role=\"img\" aria-label=\"{}\">{}</div>\n\
-             <figcaption>{}</figcaption></figure>\n",
-            escape(alt),
-            super::plot::inline(svg, &format!("drawing{k}-")),
-            escape(caption)
-        )
+        drawing(&super::plot::inline(svg, &format!("drawing{k}-")), alt, caption)
     };
     drawings.iter().enumerate().map(one).collect()
 }
@@ -163,13 +167,7 @@ fn plots(plots: &[LinePlot]) -> anyhow::Result<String> {
     let mut all = String::new();
     for (k, plot) in plots.iter().enumerate() {
         let (svg, caption) = plot.draw(&format!("plot{k}-"))?;
-        let _ = write!(
-            all,
-            "<figure class=\"plot\"><div class=\"wide\" role=\"img\" aria-label=\"{}\">{svg}</div>\n\
-             <figcaption>{}</figcaption></figure>\n",
-            escape(&plot.title),
-            escape(&caption)
-        );
+        all += &drawing(&svg, &plot.title, &caption);
     }
     Ok(if all.is_empty() { all } else { format!("<div class=\"plots\">\n{all}</div>\n") })
 }

@@ -66,12 +66,9 @@ impl Figures<'_> {
 
     fn one(&self, k: usize, asked: &FigureAsked, drawn: &mut Drawn) -> anyhow::Result<()> {
         let name = |kind: &str| format!("{}-{kind}", k + 1);
+        let named = |kind: &str, figure: Option<Figure>| figure.map(|figure| (name(kind), figure));
         match asked.kind {
-            FigureKind::Volumes => {
-                if let Some(figure) = self.volumes(asked)? {
-                    drawn.figures.push((name("volumes"), figure));
-                }
-            }
+            FigureKind::Volumes => drawn.figures.extend(named("volumes", self.volumes(asked)?)),
             FigureKind::Axes => {
                 let cases = self.chosen(asked).filter(|(case, _)| case.seed == 1);
                 // One more says that there are more.
@@ -90,16 +87,8 @@ impl Figures<'_> {
                     }
                 }
             }
-            FigureKind::Map => {
-                if let Some(figure) = self.map(asked)? {
-                    drawn.figures.push((name("map"), figure));
-                }
-            }
-            FigureKind::Images => {
-                if let Some(figure) = self.images(asked)? {
-                    drawn.figures.push((name("images"), figure));
-                }
-            }
+            FigureKind::Map => drawn.figures.extend(named("map", self.map(asked)?)),
+            FigureKind::Images => drawn.figures.extend(named("images", self.images(asked)?)),
             FigureKind::Time => drawn.plots.extend(self.times(asked)?),
             FigureKind::Curve => drawn.plots.extend(self.curve(asked)),
             FigureKind::Coverage => drawn.plots.extend(self.coverage(asked)?),
