@@ -196,6 +196,9 @@ impl Beams {
     }
 }
 
+/// Quantities of rays that beams are made of.
+const WANTED: Quantities = Quantities { azimuth: true, time: false, velocity: false };
+
 fn sky(end: &PathPoint<Number>) -> Sky {
     let n = end.direction;
     let by = |k: usize| n.map(|x| x.slope[k]);
@@ -224,13 +227,7 @@ pub fn of_ray(
     tolerance: f64,
     path: &mut Path<Number>,
 ) -> Result<Option<Sky>, Error> {
-    trace_series(
-        tolerance,
-        hole,
-        ray,
-        Quantities { azimuth: true, time: false, velocity: false },
-        path,
-    )?;
+    trace_series(tolerance, hole, ray, WANTED, path)?;
     let escaped = path.outcome() == Outcome::Escaped;
     Ok(escaped.then(|| sky(&path.at(path.mino_total()))))
 }
@@ -286,13 +283,7 @@ fn beams(
         let mut path = Path::empty();
         for (first, second) in first.iter().zip(second) {
             let ray = view.beam(hole, *first, *second)?;
-            trace_series(
-                tolerance,
-                &lifted,
-                &ray,
-                Quantities { azimuth: true, time: false, velocity: false },
-                &mut path,
-            )?;
+            trace_series(tolerance, &lifted, &ray, WANTED, &mut path)?;
             beams.take(&path, crossings);
         }
         Ok(beams)
