@@ -19,7 +19,7 @@ pub use pictures::{
 };
 pub use plot::{Axis, LinePlot, Marks, Series};
 pub use sky::{SkyPanel, sky};
-pub use triangle::{Triangle, Variable};
+pub use triangle::{Variable, triangle};
 pub use view::{Motion, View3d, rates, thinned};
 
 use crate::output::Output;

@@ -19,39 +19,41 @@ pub struct Variable {
     pub truth: Option<f64>,
 }
 
-/// The triangle.
-#[derive(Debug)]
-pub struct Triangle {
-    /// Its numbers.
-    pub variables: Vec<Variable>,
-}
-
 /// Side of a panel, pixels.
 const PANEL: f64 = 230.0;
 const DRAWS: &str = "#0072B2";
 const TRUTH: &str = "#D55E00";
 
-impl Triangle {
-    /// The picture as text.
-    pub fn svg(&self) -> String {
-        let n = self.variables.len();
-        let (mut plots, mut layouts, mut structure) = (Vec::new(), Vec::new(), Vec::new());
-        for row in 0..n {
-            for column in 0..=row {
-                let panel = if row == column { self.alone(row) } else { self.pair(row, column) };
-                layouts.push(self.layout(&panel, row, column));
-                plots.push(panel);
-                structure.push(vec![row * n + column]);
+/// The picture of several numbers as SVG.
+pub fn triangle(variables: &[Variable]) -> String {
+    let n = variables.len();
+    let (mut plots, mut layouts, mut structure) = (Vec::new(), Vec::new(), Vec::new());
+    for (row, y) in variables.iter().enumerate() {
+        for (column, x) in variables[..=row].iter().enumerate() {
+            let panel = if row == column { y.alone() } else { pair(x, y) };
+            let mut layout = layout(&panel, x, (row != column).then_some(y));
+            if row + 1 == n {
+                layout = layout.with_x_label(x.name.clone());
             }
+            if row == column {
+                layout = layout.with_y_label("draws");
+            } else if column == 0 {
+                layout = layout.with_y_label(y.name.clone());
+            }
+            layouts.push(layout);
+            plots.push(panel);
+            structure.push(vec![row * n + column]);
         }
-        let figure = Figure::new(n, n).with_structure(structure).with_plots(plots);
-        let figure = figure.with_layouts(layouts).with_cell_size(PANEL, PANEL).with_spacing(6.0);
-        SvgBackend::new().render_scene(&figure.render())
     }
+    let figure = Figure::new(n, n).with_structure(structure).with_plots(plots);
+    let figure = figure.with_layouts(layouts).with_cell_size(PANEL, PANEL).with_spacing(6.0);
+    SvgBackend::new().render_scene(&figure.render())
+}
 
-    fn alone(&self, k: usize) -> Vec<Plot> {
-        let Variable { values, truth, .. } = &self.variables[k];
-        let [low, high] = self.range(k);
+impl Variable {
+    fn alone(&self) -> Vec<Plot> {
+        let Variable { values, truth, .. } = self;
+        let [low, high] = self.range();
         let bins = (values.len() as f64).sqrt().ceil().clamp(6.0, 30.0) as usize;
         let histogram = Histogram::new()
             .with_data(values.iter().copied())
@@ -66,24 +68,9 @@ impl Triangle {
         all
     }
 
-    fn pair(&self, row: usize, column: usize) -> Vec<Plot> {
-        let (x, y) = (&self.variables[column], &self.variables[row]);
-        let points = x.values.iter().copied().zip(y.values.iter().copied());
-        let mut all =
-            vec![Plot::from(ScatterPlot::new().with_data(points).with_color(DRAWS).with_size(2.5))];
-        if let (Some(a), Some(b)) = (x.truth, y.truth) {
-            all.push(upright(a, self.range(row)));
-            let [low, high] = self.range(column);
-            all.push(Plot::from(
-                LinePlot::new().with_data([(low, b), (high, b)]).with_color(TRUTH),
-            ));
-        }
-        all
-    }
-
     /// Returns the range from below the least to above the largest value.
-    fn range(&self, k: usize) -> [f64; 2] {
-        let Variable { values, truth, .. } = &self.variables[k];
+    fn range(&self) -> [f64; 2] {
+        let Variable { values, truth, .. } = self;
         let all = || values.iter().copied().chain(*truth);
         let (low, high) =
             (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
@@ -91,25 +78,31 @@ impl Triangle {
         let margin = 0.08 * (high - low).max(1e-9 * high.abs()).max(1e-12);
         [low - margin, high + margin]
     }
+}
 
-    fn layout(&self, plots: &[Plot], row: usize, column: usize) -> Layout {
-        let (n, [low, high]) = (self.variables.len(), self.range(column));
-        let mut layout = Layout::auto_from_plots(plots)
-            .with_x_axis_min(low)
-            .with_x_axis_max(high)
-            .with_ticks(3)
-            .with_tick_size(11)
-            .with_label_size(13);
-        if row + 1 == n {
-            layout = layout.with_x_label(self.variables[column].name.clone());
-        }
-        if row == column {
-            return layout.with_y_label("draws");
-        }
-        let [low, high] = self.range(row);
-        layout = layout.with_y_axis_min(low).with_y_axis_max(high);
-        if column == 0 { layout.with_y_label(self.variables[row].name.clone()) } else { layout }
+fn pair(x: &Variable, y: &Variable) -> Vec<Plot> {
+    let points = x.values.iter().copied().zip(y.values.iter().copied());
+    let mut all =
+        vec![Plot::from(ScatterPlot::new().with_data(points).with_color(DRAWS).with_size(2.5))];
+    if let (Some(a), Some(b)) = (x.truth, y.truth) {
+        all.push(upright(a, y.range()));
+        let [low, high] = x.range();
+        all.push(Plot::from(LinePlot::new().with_data([(low, b), (high, b)]).with_color(TRUTH)));
     }
+    all
+}
+
+/// Axes with the range of `x` to the right and, of a pair, that of `y` upward.
+fn layout(plots: &[Plot], x: &Variable, y: Option<&Variable>) -> Layout {
+    let [low, high] = x.range();
+    let layout = Layout::auto_from_plots(plots)
+        .with_x_axis_min(low)
+        .with_x_axis_max(high)
+        .with_ticks(3)
+        .with_tick_size(11)
+        .with_label_size(13);
+    let Some([low, high]) = y.map(Variable::range) else { return layout };
+    layout.with_y_axis_min(low).with_y_axis_max(high)
 }
 
 fn upright(x: f64, [low, high]: [f64; 2]) -> Plot {
@@ -127,8 +120,7 @@ mod tests {
             values: (0..20).map(|k| factor * f64::from(k)).collect(),
             truth: Some(factor * 3.0),
         };
-        let triangle = Triangle { variables: vec![variable("spin", 0.01), variable("tilt", 2.0)] };
-        let svg = triangle.svg();
+        let svg = triangle(&[variable("spin", 0.01), variable("tilt", 2.0)]);
         assert!(svg.starts_with("<svg") && svg.contains("spin") && svg.contains("tilt"));
         // Twenty draws of the one pair.
         assert!(svg.matches("<circle").count() >= 20, "{}", svg.matches("<circle").count());

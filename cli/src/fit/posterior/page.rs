@@ -4,7 +4,7 @@ use super::PAGE;
 use super::predictive;
 use super::summary::{Interval, Summary};
 use crate::output::Output;
-use crate::report::{self, Drawing, Report, Triangle, Variable};
+use crate::report::{self, Drawing, Report, Variable};
 use kerrlight_render::volume::ranks::Ranks;
 use kerrlight_render::volume::slices::{Outlines, Through};
 use kerrlight_render::volume::{Shown, Volume, VolumeFile, vti};
@@ -32,7 +32,7 @@ pub fn write(found: &Summary, prepared: &Problem, folder: &Path) -> anyhow::Resu
     let triangle = triangle(found);
     if let Some(triangle) = &triangle {
         file("geometries.csv")?.write(table(&found.geometry).as_bytes())?;
-        file("triangle.svg")?.write(triangle.svg().as_bytes())?;
+        file("triangle.svg")?.write(triangle.svg.as_bytes())?;
     }
     let hole_radius = prepared.instrument.hole.horizon();
     let report = Report {
@@ -40,7 +40,7 @@ pub fn write(found: &Summary, prepared: &Problem, folder: &Path) -> anyhow::Resu
         summary: found.sentences(),
         details: details(found),
         figures: figures(found, &noise, hole_radius)?,
-        drawings: triangle.iter().map(drawing).collect(),
+        drawings: triangle.into_iter().collect(),
         ..Report::default()
     };
     report.write(&file(PAGE)?)
@@ -83,24 +83,20 @@ fn figures(
     Ok(all)
 }
 
-fn triangle(found: &Summary) -> Option<Triangle> {
+fn triangle(found: &Summary) -> Option<Drawing> {
     let one = |interval: &Interval| Variable {
         name: interval.parameter.name().replace("_deg", " (°)").replace('_', " "),
         values: interval.values.clone(),
         truth: interval.truth,
     };
     let variables: Vec<Variable> = found.geometry.iter().map(one).collect();
-    (!variables.is_empty()).then_some(Triangle { variables })
-}
-
-fn drawing(triangle: &Triangle) -> Drawing {
-    Drawing {
-        svg: triangle.svg(),
+    (!variables.is_empty()).then(|| Drawing {
+        svg: report::triangle(&variables),
         caption: "Draws of the geometry: each parameter's distribution on the diagonal, each pair's below it. Orange: what was \
                   simulated, where the data are a simulation."
             .to_owned(),
         alt: "Triangle of the marginal distributions of all unknown parameters.".to_owned(),
-    }
+    })
 }
 
 fn table(geometry: &[Interval]) -> String {
