@@ -209,12 +209,25 @@ impl Task {
 
     /// The bytes of the uniform.
     pub fn bytes(&self) -> [u8; TASK_BYTES] {
+        let Task { hole, view, .. } = self;
+        let wide = |x: f64| two_floats(x).map(f32::to_bits);
+        let (inclination, azimuth, lens) = match view {
+            View::Screen(observer) => (observer.inclination(), observer.azimuth(), [[0.0; 4]; 4]),
+            View::Camera(camera) => (camera.inclination(), camera.azimuth(), camera.lens()),
+        };
         let mut words = Vec::with_capacity(TASK_BYTES / 4);
-        self.hole_words(&mut words);
-        self.place_words(&mut words);
-        self.lens_words(&mut words);
+        words.extend([hole.spin(), 1.0 / hole.horizon()].into_iter().flat_map(wide));
+        let radii = [hole.horizon(), hole.inner_horizon(), hole.horizon_gap()];
+        words.extend(radii.map(|radius| (radius as f32).to_bits()));
+        words.push(0);
+        let place = [inclination.sin(), inclination.cos(), self.inverse_radius()];
+        words.extend(place.into_iter().flat_map(wide));
+        words.extend([self.end as f32, azimuth as f32].map(f32::to_bits));
+        for part in 0..2 {
+            words.extend(lens.iter().flatten().map(|x| wide(*x)[part]));
+        }
         words.extend([self.rays, self.crossings, self.samples]);
-        words.push(u32::from(self.view.observer().is_none()));
+        words.push(u32::from(view.observer().is_none()));
         words.extend([self.row, u32::from(self.quadratures)]);
         words.extend([(self.sphere as f32).to_bits(), 0]);
         let mut bytes = [0; TASK_BYTES];
@@ -222,32 +235,6 @@ impl Task {
             place.copy_from_slice(&word.to_le_bytes());
         }
         bytes
-    }
-
-    fn hole_words(&self, words: &mut Vec<u32>) {
-        push_wide(words, [self.hole.spin(), 1.0 / self.hole.horizon()]);
-        let radii = [self.hole.horizon(), self.hole.inner_horizon(), self.hole.horizon_gap()];
-        words.extend(radii.map(|radius| (radius as f32).to_bits()));
-        words.push(0);
-    }
-
-    fn place_words(&self, words: &mut Vec<u32>) {
-        let (inclination, azimuth) = match &self.view {
-            View::Screen(observer) => (observer.inclination(), observer.azimuth()),
-            View::Camera(camera) => (camera.inclination(), camera.azimuth()),
-        };
-        push_wide(words, [inclination.sin(), inclination.cos(), self.inverse_radius()]);
-        words.extend([self.end as f32, azimuth as f32].map(f32::to_bits));
-    }
-
-    fn lens_words(&self, words: &mut Vec<u32>) {
-        let lens = match &self.view {
-            View::Screen(_) => [[0.0; 4]; 4],
-            View::Camera(camera) => camera.lens(),
-        };
-        for part in 0..2 {
-            words.extend(lens.iter().flatten().map(|x| two_floats(*x)[part].to_bits()));
-        }
     }
 
     fn inverse_radius(&self) -> f64 {
@@ -262,10 +249,6 @@ impl Task {
         let w = self.inverse_radius();
         if w > 0.0 { self.hole.tortoise(w) } else { 0.0 }
     }
-}
-
-fn push_wide<const N: usize>(words: &mut Vec<u32>, numbers: [f64; N]) {
-    words.extend(numbers.iter().flat_map(|x| two_floats(*x)).map(f32::to_bits));
 }
 
 /// The bytes of points (`x[k]`, `y[k]`): (α, β) in M of a screen, or places in a camera's picture plane.
