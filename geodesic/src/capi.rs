@@ -101,7 +101,7 @@ pub struct RayColumns {
     pub turning_radius: *mut f64,
     /// Equatorial crossings of each ray.
     pub crossing_count: *mut u32,
-    /// Estimated errors of r (M), θ and azimuth (radians) and delay (M) of each ray.
+    /// Estimated errors of r (relative), θ and azimuth (radians) and delay (M) of each ray.
     pub uncertainty: *mut f64,
     /// The first crossings.
     pub crossings: PointColumns,

@@ -85,6 +85,12 @@ fn scene_of_exr(path: &Path) -> anyhow::Result<(String, Option<String>)> {
     let attributes = exr::decode_attributes(file).with_context(name)?;
     let scene = attributes.get("scene").cloned();
     let scene = scene.with_context(|| format!("{} holds no scene of kerrlight", name()))?;
+    if attributes.contains_key("frame") && scene.contains("total_flux_jy") {
+        eprintln!(
+            "warning: {}: frames of a film share the scale of the first; this picture has one of its own",
+            name()
+        );
+    }
     let files = attributes.get("files").or(attributes.get("frame_files"));
     Ok((scene, files.cloned()))
 }

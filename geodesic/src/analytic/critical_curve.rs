@@ -45,8 +45,8 @@ pub struct CriticalPoint {
 }
 
 /// Change of a ray over half an orbit (from one polar turning point to the other) on or next to a
-/// spherical photon orbit: the distance from the orbit grows by e^γ, the azimuth by δ, and Mino
-/// time by τ.
+/// spherical photon orbit: the distance from the orbit grows by e^γ, the azimuth by δ, and
+/// Boyer–Lindquist time by τ.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HalfOrbit {
     /// Lyapunov exponent γ: successive images are demagnified by e^−γ.
