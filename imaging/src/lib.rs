@@ -97,4 +97,4 @@ pub use problem::{FluxPrior, ImageProblem};
 pub use ring::Ring;
 pub use shapes::{Shape, ShapeFit, best_shape, fit_shapes};
 pub use solve::Solution;
-pub use survey::{Stage, SurveyWatch, image, survey};
+pub use survey::{Stage, SurveyWatch, image, known_skies, survey};

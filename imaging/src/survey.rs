@@ -170,8 +170,9 @@ pub(super) fn held(
     Some(each.map(|(value, losses)| Held { value: *value, losses: losses.to_vec() }).collect())
 }
 
-/// Images of a known sky beside so many draws: what a method adds has an error from two on.
-fn known_skies(draws: usize) -> usize {
+/// Returns the number of images of a known sky beside so many draws: half as many, and two at least, from which on what a method
+/// adds has an error.
+pub fn known_skies(draws: usize) -> usize {
     if draws == 0 { 0 } else { draws.div_ceil(2).max(2) }
 }
 
@@ -181,14 +182,21 @@ const GAP: f64 = 1.5;
 /// The part that each frame is held out with. Frames of a scan see the sky through nearly the same baselines, and would tell
 /// the fit what it is to predict: scans are held out whole, where there are two of them for each part. So are frames of several files at
 /// one hour of UTC.
-fn parts(times: &[f64], files: &[usize], folds: usize, averaged_h: f64) -> Vec<usize> {
-    let apart = (GAP * cadence(times, files)).max(averaged_h);
-    let mut scans = vec![0; times.len()];
-    for (frame, pair) in times.windows(2).enumerate() {
-        scans[frame + 1] = scans[frame] + usize::from(pair[1] - pair[0] > apart);
-    }
-    let is_enough = scans.last().is_some_and(|last| last + 1 >= 2 * folds);
-    let each = if is_enough { scans } else { instants(times, files) };
+fn parts(times: &[f64], files: &[usize], folds: usize, average_h: f64) -> Vec<usize> {
+    let scans = |apart: f64| {
+        let mut scans = vec![0; times.len()];
+        for (frame, pair) in times.windows(2).enumerate() {
+            scans[frame + 1] = scans[frame] + usize::from(pair[1] - pair[0] > apart);
+        }
+        scans
+    };
+    // Averages lie on the clock: those of a scan are less than two of their lengths apart, and a ragged one has two that are
+    // much nearer. Shorter gaps tell scans where longer ones leave too few.
+    let near = GAP * cadence(times, files);
+    let far = near.max((2.0 - 1e-6) * average_h);
+    let is_enough = |scans: &Vec<usize>| scans.last().is_some_and(|last| last + 1 >= 2 * folds);
+    let each = [far, near].map(scans).into_iter().find(is_enough);
+    let each = each.unwrap_or_else(|| instants(times, files));
     each.into_iter().map(|of| of % folds).collect()
 }
 
@@ -266,9 +274,8 @@ impl Search<'_> {
         let Some(settings) = &self.file.strength else { return Some(Vec::new()) };
         let folds = settings.folds;
         let times = &measured.times;
-        // Averages lie on the clock, so that those of a scan are less than two of their lengths apart.
-        let averaged_h = 2.0 * self.file.data.visibilities.average_s / 3600.0;
-        let parts = parts(times, &measured.files, folds, averaged_h);
+        let average_h = self.file.data.visibilities.average_s / 3600.0;
+        let parts = parts(times, &measured.files, folds, average_h);
         let part = |fold: usize, seen: bool| -> Vec<usize> {
             (0..times.len()).filter(|frame| (parts[*frame] != fold) == seen).collect()
         };
@@ -421,8 +428,12 @@ mod tests {
         );
         // Averages of five minutes on the clock: a ragged scan has two that are nearer, and whole scans stay together.
         let minutes = [2.5, 7.5, 22.5, 27.5, 34.0, 36.0, 42.5, 47.5];
-        assert_eq!(parts(&minutes, &[], 2, 10.0), [0, 0, 1, 1, 1, 1, 1, 1]);
-        assert_eq!(parts(&minutes.map(|x| 4.0 * x), &[], 2, 10.0), [0, 0, 1, 1, 0, 0, 1, 1]);
+        let more = minutes.iter().map(|x| x + 90.0);
+        let night: Vec<f64> = minutes.iter().copied().chain(more).collect();
+        assert_eq!(parts(&night, &[], 2, 5.0), [0, 0, 1, 1, 1, 1, 1, 1, 0, 0, 1, 1, 1, 1, 1, 1]);
+        // Gaps of one to two averages are those of scans where there are no others.
+        let close = [2.5, 7.5, 15.5, 20.5, 28.5, 33.5, 41.5, 46.5];
+        assert_eq!(parts(&close, &[], 2, 5.0), [0, 0, 1, 1, 0, 0, 1, 1]);
         // Two bands of one night a second apart, with scans and without gaps.
         let both = [0.0, 1.0, 10.0, 11.0, 40.0, 41.0, 50.0, 51.0, 80.0, 81.0, 120.0, 121.0];
         let bands = [0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1];

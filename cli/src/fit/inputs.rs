@@ -5,6 +5,7 @@ use crate::file_sums::FileSums;
 use crate::output;
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// The settings in the folder of a run.
@@ -17,8 +18,11 @@ pub const FILE: &str = "inputs.json";
 pub fn read_again<R>(run: &Path, read: impl FnOnce() -> anyhow::Result<R>) -> anyhow::Result<R> {
     let (found, all) = output::with_reads(read);
     let (found, inputs) = (found?, Inputs::load(run)?);
+    // The same data may lie elsewhere now, as many files as before.
+    let paths: BTreeSet<&PathBuf> = all.iter().map(|(path, _)| path).collect();
+    let is_moved = paths.len() <= inputs.files.len();
     let is_known = |(path, sum): &&(PathBuf, Sum)| {
-        inputs.holds(path) || inputs.files.iter().any(|known| known.sum == *sum)
+        inputs.holds(path) || is_moved && inputs.files.iter().any(|known| known.sum == *sum)
     };
     if let Some((other, _)) = all.iter().find(|read| !is_known(read)) {
         bail!(

@@ -238,4 +238,11 @@ fn bad_settings_of_polarisation_are_named() {
         let error = StaticImageFile::parse(&settings().replace(from, to)).unwrap_err().to_string();
         assert!(error.contains(says), "{to}: {error}");
     }
+    // Phases that nothing tells.
+    let text = settings().replace("polarimetric-ratios", "polarized-visibilities");
+    assert!(StaticImageFile::parse(&text).is_ok());
+    let (before, gains) = text.split_once("[instrument.gains]").unwrap();
+    let (_, after) = gains.split_once("\n[").unwrap();
+    let error = StaticImageFile::parse(&format!("{before}[{after}")).unwrap_err().to_string();
+    assert!(error.contains("needs [instrument.gains]"), "{error}");
 }

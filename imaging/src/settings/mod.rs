@@ -75,7 +75,7 @@ pub struct ImageSettings {
     /// Iterations from one start, at most.
     #[schemars(range(min = 1, max = 1_000_000), extend("unit" = "iterations"))]
     pub iterations: usize,
-    /// Fits of the image measured once more with other noise, and half as many of a simple shape, which give errors; needs a
+    /// Fits of the image measured once more with other noise, and half as many of a simple shape, two at least, which give errors; needs a
     /// loss of amplitudes or visibilities.
     #[schemars(range(min = 2, max = 1000), extend("unit" = "draws"))]
     pub draws: Option<usize>,

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StaticPolarization {
-    /// `polarimetric-ratios` or `polarized-visibilities`.
+    /// `polarimetric-ratios`, or `polarized-visibilities`, which need `instrument.gains` or a loss of visibilities.
     pub data: LossKind,
     /// Ratios: least signal-to-noise ratio in Stokes I of baselines; 0 without it.
     #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a signal-to-noise ratio"))]

@@ -178,11 +178,14 @@ fn of_observation(
         (Some(Model::Image), _) => image(),
         (Some(Model::Volume), _) | (None, None) => volume(),
         (None, Some(source)) if !source.varies => image(),
-        (None, Some(_)) => {
+        (None, Some(source)) => {
             let static_image = image().ok();
             let look =
                 static_image.as_ref().and_then(|text| QuickLook::new(text, observation, file));
             let (Some(text), Some(look)) = (static_image, look) else {
+                if source.image.is_some() {
+                    return volume();
+                }
                 let said = "whether the data ask for motion was not tested: nothing is published of the image at this frequency; --model image fits one";
                 return Ok(volume()?.replacen('\n', &format!("\n{}{said}\n", guess::READ), 1));
             };

@@ -187,7 +187,7 @@ fn searched(
         + Shape::ALL.len()
         + values(&file.strength)
         + draws
-        + draws.div_ceil(2)
+        + kerrlight_imaging::known_skies(draws)
         + of_polarized;
     let keeper = SignalGuard::brief(STOPPED);
     let bar = progress::counting(all as u64, "solution");
