@@ -9,7 +9,7 @@ use crate::output;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use kerrlight_common::toml_file::shown;
-use kerrlight_vlbi::noise::{Corruptions, GainErrors};
+use kerrlight_vlbi::noise::{Corruptions, GainErrors, SCATTERED};
 use kerrlight_vlbi::operator::{Method, Pulse};
 use kerrlight_vlbi::schedule;
 use kerrlight_vlbi::simulate::{self, StokesMovie};
@@ -218,7 +218,7 @@ impl Observe {
         lines.push(format!("pulse {:?}", self.pulse));
         lines.push(transform);
         if self.scatter_sgra {
-            lines.push("scattering of Sgr A* (Johnson et al. 2018)".to_owned());
+            lines.push(SCATTERED.to_owned());
         }
         let Corruptions { gains, .. } = self.corruptions();
         if gains != GainErrors::default() {

@@ -3,8 +3,7 @@
 use super::subject::Subject;
 use crate::interrupt::SignalGuard;
 use anyhow::Context;
-use kerrlight_common::units::JY_PER_SQUARE_UAS;
-use kerrlight_render::picture::Raster;
+use kerrlight_render::picture::{Raster, own_unit};
 use kerrlight_render::scene::{Rings, Scene};
 
 /// Pixels of the longer side.
@@ -16,7 +15,7 @@ pub fn white(subject: &Subject) -> anyhow::Result<f64> {
     let scene = small(&subject.scene);
     let raster = Raster::new(&scene, subject.assets.clone()).context("the scene")?;
     // Pictures of gas are in physical units, the page in those of the scene.
-    let unit = if scene.gas.is_some() { JY_PER_SQUARE_UAS } else { 1.0 };
+    let unit = own_unit(&scene);
     let keeper = SignalGuard::brief("stopped; nothing is written");
     let picture = raster.render(&|_| !keeper.stopped())?.picture;
     let lit = |name: &str| {

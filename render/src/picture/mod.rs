@@ -25,7 +25,7 @@ pub use journal::{AnyJournal, Found, Journal};
 pub use raw::Frame;
 pub use requested::REQUESTED;
 pub use rings::{RingStrata, Stratum};
-pub use tally::Summary;
+pub use tally::{Summary, own_unit};
 
 pub use crate::transport::{Plan, Step};
 
@@ -38,7 +38,7 @@ use grid::Grid;
 use kerrlight_geodesic::RayDevice;
 use rings::Resolver;
 use std::sync::Arc;
-use tally::{Tally, own_unit};
+use tally::Tally;
 
 /// Told how many more rows of pixels are done; returns whether to go on.
 pub type Progress<'a> = dyn Fn(usize) -> bool + Sync + 'a;

@@ -185,7 +185,7 @@ impl Summary {
 
 /// Factor from the scene's unit of intensity to that of a file whose flux is not requested: gas
 /// shines in physical units.
-pub(super) fn own_unit(scene: &Scene) -> f64 {
+pub fn own_unit(scene: &Scene) -> f64 {
     if scene.gas.is_some() { JY_PER_SQUARE_UAS } else { 1.0 }
 }
 

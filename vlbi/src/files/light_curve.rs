@@ -2,6 +2,7 @@
 
 use super::{FileError, cells, number, sigma};
 use crate::Error;
+use crate::earth::MJD_ZERO;
 use crate::light_curve::{Flux, LightCurve, Sample};
 use core::fmt::Write;
 use kerrlight_common::stokes::StokesParameter;
@@ -11,8 +12,6 @@ const TIMES: [&str; 10] =
     ["time_utc_h", "time", "t", "utc", "ut", "utc_h", "time_h", "time_hr", "hour", "hours"];
 /// Names of a column of times in days, of which the part of the first day counts.
 const DAYS: [&str; 4] = ["mjd", "time_mjd", "jd", "time_jd"];
-/// Days of a Julian date and what is left of it at midnight.
-const JULIAN: f64 = 2_400_000.5;
 
 /// Place of times, and their unit.
 #[derive(Clone, Copy)]
@@ -232,7 +231,7 @@ fn hours(cell: &str, days: bool, first_day: &mut Option<f64>) -> Result<f64, Str
     let hours = match days {
         true => {
             // Told by its size, whatever the column is called.
-            let mjd = if time > JULIAN { time - JULIAN } else { time };
+            let mjd = if time > MJD_ZERO { time - MJD_ZERO } else { time };
             24.0 * (mjd - *first_day.get_or_insert(mjd.floor()))
         }
         false => time,

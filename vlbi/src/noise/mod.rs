@@ -11,7 +11,7 @@ mod thermal;
 
 pub use gains::{GainErrors, apply_gains};
 pub use leakage::apply_leakage;
-pub use scattering::{ScatteringKernel, scatter, unscatter};
+pub use scattering::{SCATTERED, ScatteringKernel, scatter, unscatter};
 pub use thermal::add_thermal_noise;
 
 use crate::Error;

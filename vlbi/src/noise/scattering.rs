@@ -5,6 +5,9 @@ use crate::observation::{MissingMetadata, Observation, Row};
 use core::f64::consts::{LN_2, PI};
 use kerrlight_common::units::{MICROARCSECOND, SPEED_OF_LIGHT};
 
+/// Line of the history of simulated visibilities that are scattered.
+pub const SCATTERED: &str = "scattering of Sgr A* (Johnson et al. 2018)";
+
 /// The mean kernel of diffractive scattering by a thin screen (Psaltis et al. 2018, arXiv:1805.01242; Johnson et al. 2018,
 /// ApJ 865, 104). Phases of the screen have the power spectrum |q|^−(α + 2) exp(−|q|² r_in²) P(φ), where the wander of the
 /// magnetic field gives P = (1 + k sin²(φ − φ₀))^−(α/2 + 1), their dipole model.

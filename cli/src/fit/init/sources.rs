@@ -2,6 +2,7 @@
 
 use crate::plain;
 use kerrlight_vlbi::earth::SourcePosition;
+use kerrlight_vlbi::noise::SCATTERED;
 use kerrlight_vlbi::observation::Observation;
 
 /// A source whose mass and distance are known.
@@ -113,11 +114,9 @@ const BAND_HZ: core::ops::RangeInclusive<f64> = 200e9..=260e9;
 /// and without scattering where `kerrlight observe` has simulated none.
 pub fn known(observation: &Observation) -> Option<Source> {
     let source = *found(observation)?;
-    let told = |words: [&str; 2]| {
-        let is_told = |line: &String| words.iter().all(|word| line.contains(word));
-        observation.history.iter().any(is_told)
-    };
-    let is_sharp = told(["kerrlight", " observe"]) && !told(["scattering of", "Sgr A*"]);
+    let told = |is_told: fn(&str) -> bool| observation.history.iter().any(|line| is_told(line));
+    let is_simulated = told(|line| line.contains("kerrlight ") && line.contains(" observe"));
+    let is_sharp = is_simulated && !told(|line| line.contains(SCATTERED));
     let source = Source { blur: source.blur.filter(|_| !is_sharp), ..source };
     let is_far = observation.frequency_hz.is_some_and(|hz| !BAND_HZ.contains(&hz));
     Some(match is_far {
@@ -163,7 +162,7 @@ mod tests {
         assert!(is_blurred(&seen));
         seen.history = vec!["kerrlight 0.1.0 observe".to_owned()];
         assert!(!is_blurred(&seen));
-        seen.history.push("scattering of Sgr A* (Johnson et al. 2018)".to_owned());
+        seen.history.push(SCATTERED.to_owned());
         assert!(is_blurred(&seen));
     }
 
