@@ -51,13 +51,15 @@ impl Uncertainty {
         }
     }
 
-    /// The larger of both in every component.
+    /// The larger of both in every component; NaN where one of them is.
     pub fn max(self, o: Self) -> Self {
+        // `f64::max` would take the number: an error that nobody could compute is not a small one.
+        let larger = |a: f64, b: f64| if a > b || a.is_nan() { a } else { b };
         Uncertainty {
-            radius: self.radius.max(o.radius),
-            theta: self.theta.max(o.theta),
-            azimuth: self.azimuth.max(o.azimuth),
-            delay: self.delay.max(o.delay),
+            radius: larger(self.radius, o.radius),
+            theta: larger(self.theta, o.theta),
+            azimuth: larger(self.azimuth, o.azimuth),
+            delay: larger(self.delay, o.delay),
         }
     }
 }

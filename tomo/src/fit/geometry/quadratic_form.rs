@@ -98,19 +98,11 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
             (form.bends.clone().try_inverse()?, columns.clone().try_inverse()?);
         let lowest: Vec<DVector<f64>> = form.slopes.iter().map(|g| -(&inverse * g)).collect();
         let middles: Vec<DVector<f64>> = lowest.iter().cloned().map(near).collect();
-        let count = middles.len() as f64;
-        let mean_of = |all: &[DVector<f64>]| {
-            all.iter().fold(DVector::zeros(columns.ncols()), |sum, m| sum + m) / count
-        };
-        let (mean, lowest) = (mean_of(&middles), mean_of(&lowest));
+        let mean = mean_of(&middles);
         let mut moved = &inverse * &form.uncertain * &inverse;
-        if middles.len() > 1 {
-            // Variance of a mean, Σ/(n (n − 1)), wider since so few have to tell the scatter.
-            for middle in &middles {
-                let away = middle - &mean;
-                moved += &away * away.transpose() * (few(count) / (count * (count - 1.0)));
-            }
-        }
+        // Of the lowest places themselves: those that are brought back to where was looked lie closer together.
+        moved += covariance_of_mean(&lowest);
+        let lowest = mean_of(&lowest);
         if let Some(scatter) = scatter {
             // Slopes scatter by noise, which is taken to be as large as the residuals.
             moved += sandwich_excess(scatter, form, &inverse) * inflation;
@@ -137,6 +129,21 @@ fn sandwich_excess(scatter: &DMatrix<f64>, form: &Form, inverse: &DMatrix<f64>) 
     let mut more = SymmetricEigen::new(scatter - &form.bends);
     more.eigenvalues.apply(|x| *x = x.max(0.0));
     inverse * more.recompose() * inverse
+}
+
+fn mean_of(places: &[DVector<f64>]) -> DVector<f64> {
+    places.iter().sum::<DVector<f64>>() / places.len() as f64
+}
+
+/// Returns the covariance of the mean of places from their scatter; nothing for one alone.
+fn covariance_of_mean(places: &[DVector<f64>]) -> DMatrix<f64> {
+    let (n, count, mean) = (places[0].len(), places.len() as f64, mean_of(places));
+    let scatter = places.iter().fold(DMatrix::zeros(n, n), |sum, place| {
+        let away = place - &mean;
+        sum + &away * away.transpose()
+    });
+    // Σ/(n (n − 1)), wider since so few have to tell the scatter.
+    if count > 1.0 { scatter * (few(count) / (count * (count - 1.0))) } else { scatter }
 }
 
 /// Returns the factor by which the scatter of so few is too small: the variance of Student's t with n − 1 degrees of freedom,
@@ -269,6 +276,23 @@ mod tests {
         // F with 1 and 4 degrees of freedom has the mean 2.
         let mean = pulls / f64::from(rounds);
         assert!((mean - 2.0).abs() < 0.35, "{mean}");
+    }
+
+    /// Student's t of five degrees of freedom has the variance 5/3, which is stated.
+    #[test]
+    fn exact_six_places_tell_the_error_of_their_mean() {
+        use rand::{RngExt, SeedableRng};
+        use rand_distr::StandardNormal;
+        let mut random = rand_pcg::Pcg64::seed_from_u64(11);
+        let mut place =
+            || DVector::from_fn(1, |_, _| 5.0 * random.sample::<f64, _>(StandardNormal));
+        let rounds = 4000;
+        let square = |places: Vec<DVector<f64>>| {
+            mean_of(&places)[0].powi(2) / covariance_of_mean(&places)[(0, 0)]
+        };
+        let sum: f64 = (0..rounds).map(|_| square((0..6).map(|_| place()).collect())).sum();
+        assert!((sum / f64::from(rounds) - 1.0).abs() < 0.1, "{sum}");
+        assert_eq!(covariance_of_mean(&[place()])[(0, 0)], 0.0);
     }
 
     /// Half as many numbers as data follow noise in a way that differs from place to place: lowest places scatter by more than the
