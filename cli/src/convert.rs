@@ -123,6 +123,9 @@ impl Convert {
             observation = observation.total_intensity();
         }
         if self.average_channels {
+            if !observation.channels.is_empty() && observation.frequency_hz.is_none() {
+                bail!("--average-channels needs the frequency of the mean: give --frequency");
+            }
             observation = observation.averaged_over_channels();
         }
         if let Some(seconds) = self.average {
@@ -135,16 +138,21 @@ impl Convert {
         if self.light_curve {
             return self.write_light_curve(&observation);
         }
-        if observation.is_polarized() && !output.keeps_polarization() {
-            eprintln!(
-                "warning: {} has Stokes I alone: the polarisation of {} is left out; .uvfits keeps it",
-                self.output.display(),
-                self.input.display()
+        output.warn_of_polarization(&observation, &self.input.display().to_string());
+        let rows = output.rows_of(&observation);
+        if rows == 0 {
+            bail!(
+                "{}: no Stokes I, the only one that {} holds",
+                self.input.display(),
+                self.output.display()
             );
         }
         output.write(&observation).map_err(told)?;
-        let rows = observation.rows.len();
-        eprintln!("{rows} rows, {flagged} flagged");
+        let without = match observation.rows.len() - rows {
+            0 => String::new(),
+            count => format!(", {count} without Stokes I left out"),
+        };
+        eprintln!("{rows} rows, {flagged} flagged{without}");
         Ok(output.answer().with("rows", rows).with("flagged", flagged))
     }
 
@@ -266,10 +274,15 @@ impl Convert {
         }
         let Some(array) = &self.array else { return Ok(()) };
         let array = arguments::array_of(array)?;
-        for station in observation.stations.iter_mut().filter(|s| s.position.is_none()) {
+        for station in &mut observation.stations {
             let same = |known: &&Station| is_same_station(&known.name, &station.name);
-            if let Some(known) = array.stations.iter().find(same) {
-                *station = Station { name: station.name.clone(), ..known.clone() };
+            let Some(known) = array.stations.iter().find(same) else { continue };
+            match (station.position, known.position) {
+                (None, _) => *station = Station { name: station.name.clone(), ..known.clone() },
+                (Some(told), Some(given)) if far_apart(told, given) => {
+                    unused("--array", format!("{} at {told:?} m", station.name));
+                }
+                _ => {}
             }
         }
         let lost = observation.stations.iter().filter(|station| station.position.is_none());
@@ -279,6 +292,11 @@ impl Convert {
         }
         Ok(())
     }
+}
+
+/// Returns whether two positions in metres are not of one station: farther apart than surveys of it.
+fn far_apart(told: [f64; 3], given: [f64; 3]) -> bool {
+    (0..3).any(|k| (told[k] - given[k]).abs() > 1000.0)
 }
 
 /// Returns whether two numbers are the same but for digits that were left out.

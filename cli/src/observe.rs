@@ -9,7 +9,7 @@ use crate::output;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use kerrlight_common::toml_file::shown;
-use kerrlight_vlbi::noise::{Corruptions, GainErrors, SCATTERED};
+use kerrlight_vlbi::noise::{Corruptions, GainErrors};
 use kerrlight_vlbi::operator::{Method, Pulse};
 use kerrlight_vlbi::schedule;
 use kerrlight_vlbi::simulate::{self, StokesMovie};
@@ -122,6 +122,7 @@ impl Observe {
         let transform = fill.with_context(|| self.shown())?;
         self.corruptions().apply(&mut observation, seed)?;
         observation.history = self.history(said, transform);
+        output.warn_of_polarization(&observation, &self.shown());
         output.write(&observation)?;
         let count = observation.rows.len();
         eprintln!("{count} visibilities; {}", observation.history.join("; "));
@@ -139,6 +140,8 @@ impl Observe {
         for input in &self.inputs {
             all.extend(movie_files::files(input)?);
         }
+        // A pattern that the shell has expanded comes in the order of letters: 1, 10, 2.
+        movie_files::sort_by_numbers(&mut all);
         Ok(all)
     }
 
@@ -217,10 +220,9 @@ impl Observe {
         lines.extend(self.observing.history(&self.array));
         lines.push(format!("pulse {:?}", self.pulse));
         lines.push(transform);
-        if self.scatter_sgra {
-            lines.push(SCATTERED.to_owned());
-        }
-        let Corruptions { gains, .. } = self.corruptions();
+        let corruptions = self.corruptions();
+        lines.extend(corruptions.history());
+        let gains = corruptions.gains;
         if gains != GainErrors::default() {
             lines.push(format!("{gains:?}"));
         }

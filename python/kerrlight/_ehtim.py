@@ -109,4 +109,5 @@ def write(observation: Any) -> Any:
         polrep="circ" if observation.circular else "stokes",
         source=observation.source,
         mjd=observation.mjd,
+        **{name: f"{name.upper()}: 0" not in observation.history for name in CALIBRATIONS},
     )

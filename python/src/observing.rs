@@ -8,7 +8,7 @@ use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::Error;
 use kerrlight_vlbi::array::{Array, BUILT_IN, built_in, parse};
 use kerrlight_vlbi::earth::{Frame, Ut1};
-use kerrlight_vlbi::noise::{Corruptions, GainErrors, SCATTERED};
+use kerrlight_vlbi::noise::{Corruptions, GainErrors};
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::operator::{ImageGrid, Method, Pulse};
 use kerrlight_vlbi::schedule::{Clock, Schedule, Setup, observe_affordable};
@@ -96,9 +96,7 @@ impl Plan {
         self.corruptions().apply(&mut observation, self.seed)?;
         let version = env!("CARGO_PKG_VERSION");
         observation.history = vec![format!("kerrlight {version} observe, from Python"), transform];
-        if self.scattering {
-            observation.history.push(SCATTERED.to_owned());
-        }
+        observation.history.extend(self.corruptions().history());
         observation.history.push(if self.thermal { "noise thermal" } else { "noise none" }.into());
         Ok(observation)
     }

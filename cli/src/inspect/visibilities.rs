@@ -95,17 +95,20 @@ fn product_counts(observation: &Observation) -> [(&'static str, usize); 4] {
     std::array::from_fn(|k| (names[k], count(k)))
 }
 
-/// Least and largest amplitude of Stokes I, Jy.
-fn amplitudes(observation: &Observation) -> [f64; 2] {
-    let all = || observation.stokes_i().map(|(_, i)| i.visibility.norm());
-    [all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max)]
+/// Least and largest amplitude of Stokes I, Jy; none where no row has it.
+fn amplitudes(observation: &Observation) -> Option<[f64; 2]> {
+    let all = observation.stokes_i().map(|(_, i)| [i.visibility.norm(); 2]);
+    all.reduce(|[least, most], [_, a]| [least.min(a), most.max(a)])
 }
 
 /// Describes the number of each product, and the size of Stokes I.
 fn products(observation: &Observation) -> String {
     let counts = product_counts(observation).map(|(name, count)| format!("{name} {count}"));
-    let [least, most] = amplitudes(observation);
-    format!("{}; |I| {least:.4e} to {most:.4e} Jy", counts.join(", "))
+    let of_i = match amplitudes(observation) {
+        Some([least, most]) => format!("|I| {least:.4e} to {most:.4e} Jy"),
+        None => "no Stokes I".to_owned(),
+    };
+    format!("{}; {of_i}", counts.join(", "))
 }
 
 fn station_table(observation: &Observation) -> String {

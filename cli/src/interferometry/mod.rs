@@ -90,8 +90,26 @@ impl ObservationFile {
     }
 
     /// Returns whether more than Stokes I is written.
-    pub fn keeps_polarization(&self) -> bool {
+    fn keeps_polarization(&self) -> bool {
         matches!(self.format, Written::Uvfits | Written::ObsText)
+    }
+
+    /// Counts the rows that are written.
+    pub fn rows_of(&self, observation: &Observation) -> usize {
+        match self.keeps_polarization() {
+            true => observation.rows.len(),
+            false => observation.stokes_i().count(),
+        }
+    }
+
+    /// Says that the polarisation of an input does not fit into the format.
+    pub fn warn_of_polarization(&self, observation: &Observation, input: &str) {
+        if observation.is_polarized() && !self.keeps_polarization() {
+            eprintln!(
+                "warning: {} has Stokes I alone: the polarisation of {input} is left out; .uvfits keeps it",
+                self.output.shown().display()
+            );
+        }
     }
 
     /// Refuses to take the place of a file that is read.

@@ -103,6 +103,11 @@ impl<'a> Pattern<'a> {
     }
 }
 
+/// Sorts files by the numbers in their names.
+pub fn sort_by_numbers(files: &mut [PathBuf]) {
+    files.sort_by_cached_key(|file| numbered(&file.to_string_lossy()));
+}
+
 /// A name for sorting, runs of digits as numbers: `frame_9` comes before `frame_10`.
 fn numbered(name: &str) -> Vec<(u128, String)> {
     let mut parts: Vec<(u128, String)> = vec![(0, String::new())];

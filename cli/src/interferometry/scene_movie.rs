@@ -27,6 +27,8 @@ pub fn read(path: &Path, times_h: &[f64], reach: Reach) -> anyhow::Result<Stokes
     if scene.sky.is_some() {
         bail!("{}: a sky has no flux in Jy: remove `sky`", name());
     }
+    // Visibilities need all Stokes parameters, whatever pictures of the scene hold.
+    scene.screen.channels = None;
     let folder = path.parent().unwrap_or(Path::new("."));
     let assets = assets::load(&scene, folder, &[], reach).with_context(name)?.decoded;
     // A scene with a flux in Jy has both.

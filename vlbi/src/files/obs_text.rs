@@ -82,6 +82,7 @@ fn read_heading(
                 observation.history.push(format!("{key} 0"));
             }
         }
+        "HISTORY:" => observation.history.push(words[1..].join(" ")),
         "time" => {
             check_columns(line, &words)?;
             observation.basis = match words.get(11) {
@@ -234,6 +235,11 @@ pub fn to_text(observation: &Observation) -> Result<String, Error> {
     });
     text.push('\n');
     observation.rows.iter().for_each(|row| write_row(&mut text, observation, row));
+    // Last: eht-imaging counts the lines of the heading, and passes over comments below it.
+    let is_told = |line: &&String| !CALIBRATIONS.iter().any(|flag| **line == format!("{flag} 0"));
+    observation.history.iter().filter(is_told).for_each(|line| {
+        let _ = writeln!(text, "# HISTORY: {}", line.replace(char::is_control, " "));
+    });
     Ok(text)
 }
 

@@ -47,6 +47,20 @@ impl Corruptions {
         }
         Ok(())
     }
+
+    /// Returns lines of the history about what the data are no longer: unscattered, or calibrated in the words of eht-imaging.
+    pub fn history(&self) -> Vec<String> {
+        let gains = &self.gains;
+        let has_amplitudes = gains.constant_amplitude != 0.0
+            || gains.scan_amplitude != 0.0
+            || !gains.stations.is_empty();
+        let lines = [
+            (self.scattering, SCATTERED),
+            (gains.random_phases, "PHASECAL: 0"),
+            (has_amplitudes, "AMPCAL: 0"),
+        ];
+        lines.into_iter().filter(|(holds, _)| *holds).map(|(_, line)| line.to_owned()).collect()
+    }
 }
 
 /// A generator for a step, independent of that of other steps.

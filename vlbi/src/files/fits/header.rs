@@ -9,6 +9,8 @@ use std::collections::HashMap;
 pub struct Header<'a> {
     /// The text behind `= `, first of each keyword.
     values: HashMap<&'a str, &'a str>,
+    /// Texts of the HISTORY cards.
+    history: Vec<&'a str>,
     /// Offset in the file.
     offset: usize,
 }
@@ -16,7 +18,7 @@ pub struct Header<'a> {
 impl<'a> Header<'a> {
     /// The header at `offset`, and where its data start.
     pub fn read(bytes: &'a [u8], offset: usize) -> Result<(Self, usize), FileError> {
-        let mut values = HashMap::new();
+        let (mut values, mut history) = (HashMap::new(), Vec::new());
         for (index, card) in bytes[offset..].chunks_exact(CARD).enumerate() {
             let at = offset + index * CARD;
             if !card[..8].is_ascii() {
@@ -32,16 +34,25 @@ impl<'a> Header<'a> {
                 let size = (index + 1) * CARD;
                 let end = offset + size.next_multiple_of(BLOCK);
                 return if end <= bytes.len() {
-                    Ok((Header { values, offset }, end))
+                    Ok((Header { values, history, offset }, end))
                 } else {
                     Err(FileError::byte(at, "the header's last block is cut off"))
                 };
             }
             if let Some(value) = text.and_then(|text| text[8..].strip_prefix("= ")) {
                 values.entry(keyword).or_insert(value);
+            } else if keyword == "HISTORY" {
+                history.extend(core::str::from_utf8(&card[8..]).ok());
             }
         }
         Err(FileError::byte(offset, "the header that begins here has no END"))
+    }
+
+    /// Lines of free text about how the file came about, without those by which AIPS tells the order of the rows.
+    pub fn history(&self) -> Vec<String> {
+        let lines = self.history.iter().map(|text| text.replace(char::is_control, " "));
+        let lines = lines.map(|line| line.trim().to_owned());
+        lines.filter(|line| !line.is_empty() && !line.starts_with("AIPS SORT ORDER")).collect()
     }
 
     fn wrong(&self, keyword: &str, message: impl core::fmt::Display) -> FileError {
@@ -197,12 +208,15 @@ mod tests {
             "COUNT   =                  17",
             "EMPTY   =",
             "SOURCE  = 'a\u{1b}[31m\nb'",
+            "HISTORY  AIPS SORT ORDER='TB'",
+            "HISTORY  kerrlight observe",
             "END",
         ]);
         let (header, start) = Header::read(&bytes, 0).unwrap();
         assert_eq!(start, BLOCK);
         assert!(header.is_true("SIMPLE"));
         assert_eq!(header.text("OBJECT").as_deref(), Some("M'87"));
+        assert_eq!(header.history(), ["kerrlight observe"]);
         assert_eq!(header.text("SOURCE").as_deref(), Some("a [31m b"));
         assert_eq!(header.number("VALUE"), Ok(Some(-125.0)));
         assert_eq!(header.integer("COUNT"), Ok(Some(17)));

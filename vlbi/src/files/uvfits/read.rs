@@ -78,7 +78,8 @@ pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
         rows,
         ..Observation::empty(layout.basis)
     };
-    observation.history = remarks(unknown, ahead_h, layout.weighted);
+    observation.history = header.history();
+    observation.history.extend(remarks(unknown, ahead_h, layout.weighted));
     observation.history.extend(uncalibrated);
     observation.history.extend(without_data(flags.len(), left_out));
     observation.history.extend(tables.remarks);
