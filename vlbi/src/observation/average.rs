@@ -45,7 +45,7 @@ impl Observation {
     /// their baselines, so that baselines that were measured in different parts of an interval close.
     ///
     /// Products are means weighted by 1/σ², so that σ of a mean is 1/√(Σ 1/σ²); times and (u, v)
-    /// are means weighted by integration time, which adds up. Products that were not measured
+    /// are means weighted by integration time, which adds up, of rows that have a product. Products that were not measured
     /// ([`Measured::is_unmeasured`](super::Measured::is_unmeasured)) do not count; where other errors are zero, or
     /// without weights, means are plain and σ is √(Σσ²)/n. Rows that repeat others count as in
     /// [`with_repeats_merged`](Self::with_repeats_merged).
@@ -55,7 +55,7 @@ impl Observation {
         let intervals = Intervals::of(&merged.rows, averaging);
         // In order: `chunk_by` below needs the baselines of an interval next to each other.
         let mut bins: BTreeMap<([i64; 2], [u16; 2], u16), Vec<Row>> = BTreeMap::new();
-        for row in merged.rows.iter().map(|row| merged.ordered(row)) {
+        for row in merged.rows.iter().filter(has_data).map(|row| merged.ordered(row)) {
             bins.entry((intervals.at(row.time_h), row.stations, row.channel))
                 .or_default()
                 .push(row);
@@ -88,7 +88,8 @@ impl Observation {
         };
         // Bits of positive doubles are ordered as they are, those of negative ones consistently.
         let mut bins: BTreeMap<(u64, [u16; 2]), Vec<Row>> = BTreeMap::new();
-        for mut row in self.with_repeats_merged().rows.iter().map(|row| self.ordered(row)) {
+        let merged = self.with_repeats_merged();
+        for mut row in merged.rows.iter().filter(has_data).map(|row| self.ordered(row)) {
             let scale = self.frequency_of(&row).map_or(1.0, |frequency| reference / frequency);
             row.uv = row.uv.map(|x| x * scale);
             row.channel = 0;
@@ -127,6 +128,11 @@ impl Observation {
             .collect();
         observation
     }
+}
+
+/// Returns whether a row has a product: one that is flagged altogether takes no part in times and (u, v) of a mean.
+fn has_data(row: &&Row) -> bool {
+    (0..4).any(|k| row.product(k).is_some())
 }
 
 /// The mean of rows of one baseline.

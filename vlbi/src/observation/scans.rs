@@ -57,12 +57,14 @@ impl Intervals {
     pub fn at(&self, time_h: f64) -> [i64; 2] {
         let Averaging { seconds, in_scans, .. } = self.averaging;
         let seconds = seconds.max(SHORTEST_S);
+        // Files of single precision tell a full minute as a little less.
+        let early = ROUNDING_S.min(0.5 * seconds);
+        let interval = |since_s: f64| ((since_s + early) / seconds).floor() as i64;
         if !in_scans {
-            return [0, (time_h * 3600.0 / seconds).floor() as i64];
+            return [0, interval(time_h * 3600.0)];
         }
         let scan = self.starts_h.partition_point(|start| *start <= time_h).max(1) - 1;
-        let since = (time_h - self.starts_h[scan]) * 3600.0 + ROUNDING_S;
-        [scan as i64, (since / seconds).floor() as i64]
+        [scan as i64, interval((time_h - self.starts_h[scan]) * 3600.0)]
     }
 }
 
