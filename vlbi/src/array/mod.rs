@@ -62,10 +62,15 @@ impl FeedRotation {
         (rotation != Self::default()).then_some(rotation)
     }
 
-    /// Its three numbers; zeros where it is not known.
+    /// Its three numbers; zeros where it is not known, hence a full turn of feeds that never turn.
     pub fn numbers(rotation: Option<Self>) -> [f64; 3] {
-        let FeedRotation { parallactic, elevation, offset_deg } = rotation.unwrap_or_default();
-        [parallactic, elevation, offset_deg]
+        match rotation {
+            None => [0.0; 3],
+            Some(still) if still == Self::default() => [0.0, 0.0, 360.0],
+            Some(Self { parallactic, elevation, offset_deg }) => {
+                [parallactic, elevation, offset_deg]
+            }
+        }
     }
 }
 

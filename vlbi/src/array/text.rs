@@ -53,7 +53,8 @@ pub(crate) fn station(cells: &[&str]) -> Result<Station, String> {
     }
     Ok(Station {
         name: cells[0].to_owned(),
-        position: Some([x, y, z]),
+        // The centre of the Earth is what a file has of a station whose position nobody told.
+        position: Some([x, y, z]).filter(|place| *place != [0.0; 3]),
         sefd,
         elevation_deg: None,
         feed_rotation: FeedRotation::told([parallactic, elevation, offset_deg]),

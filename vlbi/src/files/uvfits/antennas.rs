@@ -96,6 +96,8 @@ fn station(unit: &Unit<'_>, table: &Table<'_>, row: usize) -> Result<Option<Stat
         |column| table.number(row, column, 0).filter(|sefd| *sefd >= 0.0 && sefd.is_finite());
     let right = sefd("SEFD").unwrap_or(0.0);
     let mut station = Station::new(&name, position, right);
+    // The centre of the Earth is what tables have of a station whose position nobody told.
+    station.position = station.position.filter(|place| *place != [0.0; 3]);
     station.sefd[1] = sefd("SEFDL").unwrap_or(right);
     let code = table.number(row, "MNTSTA", 0).unwrap_or(0.0) as i32;
     let offset_deg = table.number(row, "POLAA", 0).filter(|angle| angle.is_finite()).unwrap_or(0.0);
