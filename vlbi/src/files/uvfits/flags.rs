@@ -32,7 +32,10 @@ pub struct Flag {
 impl Flag {
     /// Returns whether it is about some data of a group.
     pub fn is_about(&self, group: &Group) -> bool {
-        let is = |wanted: Option<i64>, found: Option<i64>| wanted.is_none() || wanted == found;
+        let is = |wanted: Option<i64>, found: Option<i64>| {
+            // Groups that do not tell a source are of the only one.
+            wanted.is_none() || found.is_none() || wanted == found
+        };
         let [first, second] = self.antennas;
         let has = |antenna: Option<i64>| antenna.is_none_or(|a| group.antennas.contains(&a));
         // A baseline of a station with itself is no pair of others that hold it.

@@ -11,6 +11,9 @@ use std::borrow::Cow;
 const PARAMETERS: [&str; 9] =
     ["UU---SIN", "VV---SIN", "WW---SIN", "BASELINE", "DATE", "DATE", "INTTIM", "TAU1", "TAU2"];
 
+/// Part of a baseline that single precision does not hold.
+const SAME_BASELINE: f64 = 1e-6;
+
 /// Facts that the format needs.
 struct Facts {
     position: SourcePosition,
@@ -77,7 +80,7 @@ pub fn write(observation: &Observation) -> Result<Vec<u8>, Error> {
     if !several && observation.rows.iter().all(is_single_in_wavelengths) {
         facts.uv_scale = facts.frequency_hz.recip();
     }
-    let groups = groups(&observation.rows);
+    let groups = groups(&observation.rows, &facts);
     let w = w_coordinate::w_seconds(&observation, groups.iter().map(|rows| &rows[0]));
     let mut bytes = primary_header(&observation, groups.len(), &facts);
     bytes.extend(group_bytes(&groups, &w, &facts));
@@ -163,10 +166,19 @@ fn primary_header(observation: &Observation, groups: usize, facts: &Facts) -> Ve
     cards.finish()
 }
 
-/// Rows that belong to one group: of the same time and baseline, each of a channel of its own.
-fn groups(rows: &[Row]) -> Vec<&[Row]> {
+/// Rows that belong to one group: of the same time and baseline, each of a channel of its own. A group has one baseline in
+/// seconds of light: means of channels that were flagged at different times have several.
+fn groups<'a>(rows: &'a [Row], facts: &Facts) -> Vec<&'a [Row]> {
+    let seconds = |row: &Row| {
+        let frequency_hz = facts.channels[usize::from(row.channel)].frequency_hz;
+        row.uv.map(|x| x / frequency_hz)
+    };
     let same = |a: &Row, b: &Row| {
-        a.time_h == b.time_h && a.stations == b.stations && a.channel < b.channel
+        let ([u, v], [other_u, other_v]) = (seconds(a), seconds(b));
+        a.time_h == b.time_h
+            && a.stations == b.stations
+            && a.channel < b.channel
+            && (u - other_u).hypot(v - other_v) <= SAME_BASELINE * u.hypot(v)
     };
     rows.chunk_by(same).collect()
 }
