@@ -223,11 +223,12 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         self.through(&dark, false, link).1
     }
 
-    /// Mean over frames of the sum of an image's pixels.
+    /// Mean over frames of the flux in Stokes I, the first image of every frame; of Q where data have no I, its size.
     pub fn flux(&self, x: &[T]) -> f64 {
+        let of_i = self.walk.model.planes.as_ref().map_or(self.pixels, |planes| planes.stride);
         let link = |_: usize, image: &[T], slopes: &mut [T]| {
             slopes.fill(T::zero());
-            image.iter().map(|pixel| pixel.double()).sum()
+            image[..of_i].iter().map(|pixel| pixel.double()).sum::<f64>().abs()
         };
         self.through(x, false, link).0 / self.frames.len() as f64
     }
