@@ -66,16 +66,35 @@ impl PolarizedRay<'_> {
         }
     }
 
+    /// Returns the brightest light of the disc at a radius for unit intensity in the gas frame, in whichever direction a ray with
+    /// Carter's constant η + a² − λ² crosses it there.
+    pub fn brightest_of_disc(&self, disc: &DiscModel, r: f64, eta: f64) -> f64 {
+        let a = self.hole.spin();
+        let (energy, drag) = (r * r + a * a - a * self.lambda, self.lambda - a);
+        // R and Θ at the equator: dr/dτ = ±√R, dθ/dτ = ±√η.
+        let radial = energy * energy - self.hole.delta(r) * (eta + drag * drag);
+        let [fall, turn] = [radial, eta].map(|square| square.max(0.0).sqrt());
+        let directions = [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]];
+        let light =
+            directions.map(|[out, up]| self.crossing(disc, r, [out * fall / (r * r), up * turn]).i);
+        light.into_iter().fold(0.0, f64::max)
+    }
+
     /// Light of the disc at a crossing for unit intensity in the gas frame: g^{3+α} j ℓ_p.
     pub fn of_disc(&self, disc: &DiscModel, crossing: &PlaneCrossing) -> Stokes {
+        self.crossing(disc, crossing.radius, crossing.rates)
+    }
+
+    /// The same for a crossing with these d(1/r)/dτ and d cos θ/dτ.
+    fn crossing(&self, disc: &DiscModel, r: f64, rates: [f64; 2]) -> Stokes {
         let Polarization { law, field, .. } = self.polarization;
-        let (hole, r) = (self.hole, crossing.radius);
+        let hole = self.hole;
         let seen = ZamoFrame::at(hole, r, 1.0, 0.0).and_then(|frame| {
             let gas = match disc.plunging_velocity(r) {
                 Some(velocity) => Gas::of_velocity(&frame, velocity),
                 None => Gas::keplerian(hole, &frame)?,
             };
-            let photon = frame.covariant(momentum(hole, [r, 0.0], crossing.rates, self.lambda));
+            let photon = frame.covariant(momentum(hole, [r, 0.0], rates, self.lambda));
             view(&frame, &self.screen, photon, gas, field.at(&frame))
         });
         seen.and_then(|view| law.of_layer(&view)).unwrap_or_default()

@@ -252,7 +252,8 @@ impl PreparedScene {
         else {
             return 0.0;
         };
-        let light = disc.brightest(&self.optics, [ray.lambda, ray.eta]);
+        let polarized = self.optics.polarized(x, y, ray.lambda);
+        let light = disc.brightest(&self.optics, polarized, [ray.lambda, ray.eta]);
         let shift = self.optics.spectral_index.zip(self.optics.blueshift(x, y));
         shift.map_or(light, |(index, shift)| light * shift.powf(3.0 + index))
     }

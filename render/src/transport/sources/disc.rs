@@ -68,14 +68,23 @@ impl Disc {
         self.model.opaque && self.model.covers(crossing.radius)
     }
 
-    /// Its brightest light along rays with these constants of motion, wherever they meet it.
-    pub fn brightest(&self, optics: &Optics, [lambda, eta]: [f64; 2]) -> f64 {
+    /// Its brightest light along rays with these constants of motion, wherever they meet it; that of electrons in the field where
+    /// light is polarised.
+    pub fn brightest(
+        &self,
+        optics: &Optics,
+        polarized: Option<PolarizedRay<'_>>,
+        [lambda, eta]: [f64; 2],
+    ) -> f64 {
         let [inner, outer] = self.model.edges();
         let light = |k: u32| {
             let r = inner + (outer - inner) * f64::from(k) / f64::from(RADII);
-            let boost = optics.spectral_index.map_or(1.0, |index| {
-                self.model.redshift(r, &Photon { lambda, eta, outward: true }).powf(3.0 + index)
-            });
+            let boost = match polarized {
+                Some(polarized) => polarized.brightest_of_disc(&self.model, r, eta),
+                None => optics.spectral_index.map_or(1.0, |index| {
+                    self.model.redshift(r, &Photon { lambda, eta, outward: true }).powf(3.0 + index)
+                }),
+            };
             boost * self.model.intensity(r)
         };
         (0..=RADII).map(light).fold(0.0, f64::max)
