@@ -122,7 +122,8 @@ impl BandResults {
             azimuth_deg: azimuth(scan.azimuth),
             period_min: median(&periods, None),
             periods: binned(&periods, BINS),
-            ln_bayes_factor: Some(scan.ln_bayes_factor),
+            // Against noise alone anything that varies is a flare.
+            ln_bayes_factor: scan.background.is_some().then_some(scan.ln_bayes_factor),
             background: scan.background.is_some().then_some(best.band.background),
             background_jy: scan.background.clone(),
             validation_chi2_per_datum: scan.validation,
