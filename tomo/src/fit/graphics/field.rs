@@ -1,7 +1,8 @@
 //! Representations that have kernels.
 
 use super::adam::Learning;
-use super::grid::{Features, Level, Levels, Voxels};
+use super::grid::{Level, Levels};
+use super::kernels::Field;
 use super::network::Network;
 use super::pixels::Points;
 use super::shape::{Front, Shape};
@@ -11,72 +12,35 @@ use crate::representation::{
     Activation, BuiltIn, FeatureGrid, FeatureGridSettings, GridSettings, NetworkSettings,
     Representation,
 };
-use kerrlight_geodesic::gpu::{Commands, Compute};
+use kerrlight_geodesic::gpu::Compute;
 
-/// A representation on the device.
-#[derive(Debug)]
-pub enum Field {
-    /// A network of the encoded point.
-    Network(Network),
-    /// Voxels.
-    Voxels(Voxels),
-    /// Features on grids and a network.
-    Features(Features),
-}
-
-impl Field {
-    /// Takes a representation; with `of_places` it finds dL/dplace, too.
-    ///
-    /// # Errors
-    /// If it has no kernels, or the device fails.
-    pub fn new(
-        device: &Compute,
-        representation: &dyn Representation<f32>,
-        points: &Points,
-        learning: &Learning,
-        most: Option<usize>,
-        of_places: bool,
-    ) -> Result<Self, Error> {
-        Ok(match representation.built_in() {
-            Some(BuiltIn::Network(network)) => {
-                let shape = shape(network.settings());
-                Self::Network(Network::new(device, &shape, points, learning, most, of_places)?)
-            }
-            Some(BuiltIn::Grid(grid)) => {
-                let levels = voxels(grid.settings());
-                Self::Voxels(Voxels::new(device, &levels, points, learning, of_places)?)
-            }
-            Some(BuiltIn::FeatureGrid(grid)) => {
-                let levels = levels(grid.settings());
-                let shape = behind(grid.settings(), &levels);
-                let network = Network::new(device, &shape, points, learning, most, of_places)?;
-                Self::Features(Features::new(
-                    device, &levels, network, points, learning, of_places,
-                )?)
-            }
-            None => {
-                return Err(DeviceError("representation.kind: no kernels".to_owned()).into());
-            }
-        })
-    }
-
-    /// Emission of so many points at most.
-    pub fn forward(&self, commands: &mut Commands, points: usize) {
-        match self {
-            Self::Network(network) => network.forward(commands, points),
-            Self::Voxels(voxels) => voxels.forward(commands),
-            Self::Features(features) => features.forward(commands, points),
+/// Puts the kernels of a representation there; with `of_places` they find dL/dplace, too.
+///
+/// # Errors
+/// If it has none, or the device fails.
+pub fn on_device(
+    device: &Compute,
+    representation: &dyn Representation<f32>,
+    points: &Points,
+    learning: &Learning,
+    most: Option<usize>,
+    of_places: bool,
+) -> Result<Field, Error> {
+    let network = |shape: &Shape| Network::new(device, shape, points, learning, most, of_places);
+    Ok(match representation.built_in() {
+        Some(BuiltIn::Network(of)) => network(&shape(of.settings()))?.field,
+        Some(BuiltIn::Grid(grid)) => {
+            voxels(grid.settings()).voxels(device, points, learning, of_places)?
         }
-    }
-
-    /// Adds the gradient of so many points at most.
-    pub fn backward(&self, commands: &mut Commands, points: usize) {
-        match self {
-            Self::Network(network) => network.backward(commands, points),
-            Self::Voxels(voxels) => voxels.backward(commands),
-            Self::Features(features) => features.backward(commands, points),
+        Some(BuiltIn::FeatureGrid(grid)) => {
+            let levels = levels(grid.settings());
+            let network = network(&behind(grid.settings(), &levels))?;
+            levels.features(device, network, points, learning, of_places)?
         }
-    }
+        None => {
+            return Err(DeviceError("representation.kind: no kernels".to_owned()).into());
+        }
+    })
 }
 
 /// Returns whether parameters are held at zero or above.

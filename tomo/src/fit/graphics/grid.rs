@@ -2,10 +2,10 @@
 
 use super::adam::Learning;
 use super::bytes::words;
-use super::kernels::{self, compiled};
-use super::network::{Network, Task, run};
+use super::kernels::{self, Block, Field, Task, compiled};
+use super::network::Network;
 use super::pixels::Points;
-use kerrlight_geodesic::gpu::{Buffer, Commands, Compute, GpuError, Kernel};
+use kerrlight_geodesic::gpu::{Buffer, Compute, GpuError, Kernel};
 
 /// Numbers on the nodes of a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,6 +74,72 @@ impl Levels {
         };
         self.all.iter().map(uniform).collect()
     }
+
+    /// The kernels, what they add slopes up in, and the grids as shaders see them.
+    fn prepared(
+        &self,
+        device: &Compute,
+    ) -> Result<(Vec<Kernel>, [Buffer; 2], Vec<Buffer>), GpuError> {
+        let kernels = compiled(device, &[ACTIVATIONS, SHADER].join("\n"), &ENTRIES)?;
+        let sums = [device.storage(4)?, device.storage(8 * self.parameters() as u64)?];
+        Ok((kernels, sums, self.uniforms(device)?))
+    }
+
+    /// Voxels with an activation that read these parameters and add to this gradient; with `of_places` they find dL/dplace,
+    /// too.
+    ///
+    /// # Errors
+    /// If the device has no room, or fails.
+    pub fn voxels(
+        &self,
+        device: &Compute,
+        points: &Points,
+        learning: &Learning,
+        of_places: bool,
+    ) -> Result<Field, GpuError> {
+        let (kernels, sums, uniforms) = &self.prepared(device)?;
+        let block = &device.uniform(&words(&[0, points.room as u32, 0, 0]))?;
+        let slopes = &device.storage(4 * points.room as u64)?;
+        // Kernels of voxels are not bound to rows.
+        let rows = slopes;
+        let binding =
+            Binding { device, kernels, block, points, rows, slopes, sums, learning, of_places };
+        let there = [0, 1, 2, 3, 4, 6, 7];
+        let forward = vec![binding.bind(0, &uniforms[0], &there, points.room)?];
+        let mut backward = vec![binding.bind(1, &uniforms[0], &[0, 1, 2, 7, 8, 9], points.room)?];
+        backward.extend(binding.scattered(self, uniforms, points.room)?);
+        Ok(Field { stride: points.room, blocks: vec![Block { forward, backward }] })
+    }
+
+    /// Features that read these parameters and add to this gradient, for a network that is given them; with `of_places`
+    /// they find dL/dplace, too.
+    ///
+    /// # Errors
+    /// If the device has no room, or fails.
+    pub fn features(
+        &self,
+        device: &Compute,
+        network: Network,
+        points: &Points,
+        learning: &Learning,
+        of_places: bool,
+    ) -> Result<Field, GpuError> {
+        let (kernels, sums, uniforms) = &self.prepared(device)?;
+        let Network { mut field, uniforms: blocks, rows, of_inputs } = network;
+        let (rows, slopes, stride) = (&rows, &of_inputs, field.stride);
+        for (tasks, block) in field.blocks.iter_mut().zip(&blocks) {
+            let binding =
+                Binding { device, kernels, block, points, rows, slopes, sums, learning, of_places };
+            let features = uniforms
+                .iter()
+                .map(|level| binding.bind(2, level, &[0, 1, 2, 3, 4, 5], stride))
+                .collect::<Result<Vec<Task>, GpuError>>()?;
+            tasks.forward.splice(..0, features);
+            tasks.forward.push(binding.bind(3, &uniforms[0], &[0, 1, 2, 3, 6, 7], stride)?);
+            tasks.backward.extend(binding.scattered(self, uniforms, stride)?);
+        }
+        Ok(field)
+    }
 }
 
 /// Buffers that kernels of a block of points are bound to.
@@ -84,7 +150,7 @@ struct Binding<'a> {
     points: &'a Points,
     rows: &'a Buffer,
     slopes: &'a Buffer,
-    sums: [&'a Buffer; 2],
+    sums: &'a [Buffer; 2],
     learning: &'a Learning,
     of_places: bool,
 }
@@ -109,8 +175,8 @@ impl Binding<'_> {
             bends,
             cotangents,
             self.slopes,
-            self.sums[0],
-            self.sums[1],
+            &self.sums[0],
+            &self.sums[1],
             &self.learning.gradient,
             of_places,
         ];
@@ -139,132 +205,5 @@ impl Binding<'_> {
         }
         tasks.push(self.bind(7, first, &[0, 1, 10, 11, 12], levels.parameters())?);
         Ok(tasks)
-    }
-}
-
-/// Voxels with an activation.
-#[derive(Debug)]
-pub struct Voxels {
-    forward: Vec<Task>,
-    backward: Vec<Task>,
-}
-
-impl Voxels {
-    /// Voxels that read these parameters and add to this gradient; with `of_places` they find dL/dplace, too.
-    ///
-    /// # Errors
-    /// If the device has no room, or fails.
-    pub fn new(
-        device: &Compute,
-        levels: &Levels,
-        points: &Points,
-        learning: &Learning,
-        of_places: bool,
-    ) -> Result<Self, GpuError> {
-        let source = [ACTIVATIONS, SHADER].join("\n");
-        let kernels = &compiled(device, &source, &ENTRIES)?[..];
-        let block = &device.uniform(&words(&[0, points.room as u32, 0, 0]))?;
-        let (slopes, peak) = (&device.storage(4 * points.room as u64)?, &device.storage(4)?);
-        let sums = [peak, &device.storage(8 * levels.parameters() as u64)?];
-        // Kernels of voxels are not bound to rows.
-        let rows = slopes;
-        let binding =
-            Binding { device, kernels, block, points, rows, slopes, sums, learning, of_places };
-        let uniforms = levels.uniforms(device)?;
-        let there = [0, 1, 2, 3, 4, 6, 7];
-        let forward = vec![binding.bind(0, &uniforms[0], &there, points.room)?];
-        let mut backward = vec![binding.bind(1, &uniforms[0], &[0, 1, 2, 7, 8, 9], points.room)?];
-        backward.extend(binding.scattered(levels, &uniforms, points.room)?);
-        Ok(Self { forward, backward })
-    }
-
-    /// Emission of all points, and its slopes.
-    pub fn forward(&self, commands: &mut Commands) {
-        run(commands, &self.forward);
-    }
-
-    /// Adds the gradient of all points.
-    pub fn backward(&self, commands: &mut Commands) {
-        run(commands, &self.backward);
-    }
-}
-
-/// Features on grids, and the network behind them.
-#[derive(Debug)]
-pub struct Features {
-    network: Network,
-    blocks: Vec<Layers>,
-}
-
-/// Kernels of a block: before the network, behind it, and back.
-#[derive(Debug)]
-struct Layers {
-    features: Vec<Task>,
-    gate: Vec<Task>,
-    backward: Vec<Task>,
-}
-
-impl Features {
-    /// Features that read these parameters and add to this gradient, for a network that is given them; with `of_places`
-    /// they find dL/dplace, too.
-    ///
-    /// # Errors
-    /// If the device has no room, or fails.
-    pub fn new(
-        device: &Compute,
-        levels: &Levels,
-        network: Network,
-        points: &Points,
-        learning: &Learning,
-        of_places: bool,
-    ) -> Result<Self, GpuError> {
-        let source = [ACTIVATIONS, SHADER].join("\n");
-        let kernels = &compiled(device, &source, &ENTRIES)?[..];
-        let sums = [&device.storage(4)?, &device.storage(8 * levels.parameters() as u64)?];
-        let uniforms = levels.uniforms(device)?;
-        let (rows, slopes) = (&network.memory.rows, &network.memory.slopes[network.of_inputs]);
-        let blocks = network.blocks.iter().map(|block| {
-            let block = &block.uniform;
-            let binding =
-                Binding { device, kernels, block, points, rows, slopes, sums, learning, of_places };
-            let features = uniforms
-                .iter()
-                .map(|level| binding.bind(2, level, &[0, 1, 2, 3, 4, 5], network.stride));
-            let gate = binding.bind(3, &uniforms[0], &[0, 1, 2, 3, 6, 7], network.stride)?;
-            Ok(Layers {
-                features: features.collect::<Result<_, _>>()?,
-                gate: vec![gate],
-                backward: binding.scattered(levels, &uniforms, network.stride)?,
-            })
-        });
-        let blocks = blocks.collect::<Result<_, GpuError>>()?;
-        Ok(Self { network, blocks })
-    }
-
-    /// Emission of so many points at most, and its slopes.
-    pub fn forward(&self, commands: &mut Commands, points: usize) {
-        self.used(points).for_each(|block| self.block(commands, block));
-    }
-
-    /// Adds the gradient of so many points at most.
-    pub fn backward(&self, commands: &mut Commands, points: usize) {
-        for block in self.used(points) {
-            if self.network.is_cut(points) {
-                self.block(commands, block);
-            }
-            self.network.blocks[block].backward(commands);
-            run(commands, &self.blocks[block].backward);
-        }
-    }
-
-    fn used(&self, points: usize) -> core::ops::Range<usize> {
-        0..points.div_ceil(self.network.stride)
-    }
-
-    fn block(&self, commands: &mut Commands, block: usize) {
-        let Layers { features, gate, .. } = &self.blocks[block];
-        run(commands, features);
-        self.network.blocks[block].forward(commands);
-        run(commands, gate);
     }
 }

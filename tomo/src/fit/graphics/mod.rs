@@ -38,7 +38,7 @@ use crate::Error;
 use crate::representation::Representation;
 use adam::Learning;
 use fall::FallTable;
-use field::Field;
+use kernels::Field;
 use kerrlight_geodesic::gpu::{Adapter, Compute, GpuError, Needs};
 use kerrlight_render::dynamics::Axis;
 use muon::Turning;
@@ -119,7 +119,8 @@ impl GraphicsFit {
         let turning = training.muon.map(|muon| Turning::new(&device, muon, &matrices, &learning));
         let turning = turning.transpose()?.flatten();
         let points = &pixels.points;
-        let field = Field::new(&device, representation, points, &learning, most, axis.is_some())?;
+        let of_places = axis.is_some();
+        let field = field::on_device(&device, representation, points, &learning, most, of_places)?;
         let mut lit = vec![false; model.pixels()];
         model.pixel().iter().for_each(|pixel| lit[*pixel as usize] = true);
         let dark = (0..lit.len()).filter(|pixel| !lit[*pixel]).collect();

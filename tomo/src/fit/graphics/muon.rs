@@ -2,8 +2,7 @@
 
 use super::adam::Learning;
 use super::bytes::words;
-use super::kernels::compiled;
-use super::network::{Task, run};
+use super::kernels::{Task, compiled, run};
 use crate::optimise::Muon;
 use crate::representation::WeightMatrix;
 use kerrlight_geodesic::gpu::{Buffer, Commands, Compute, GpuError};

@@ -2,10 +2,10 @@
 
 use super::adam::Learning;
 use super::bytes::words;
-use super::kernels::compiled;
+use super::kernels::{Block, Field, Task, compiled};
 use super::pixels::Points;
 use super::shape::{Front, Layer, Shape, Tiling};
-use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError, Kernel};
+use kerrlight_geodesic::gpu::{Bound, Buffer, Compute, GpuError, Kernel};
 use kerrlight_geodesic::wgsl;
 
 /// Points of spans: those of the shader.
@@ -29,40 +29,28 @@ const ENTRIES: [&str; 9] = [
     "encode_back",
 ];
 
-/// A network with its memory.
+/// A network, with what those kernels are bound to that give it its inputs.
 #[derive(Debug)]
 pub struct Network {
-    /// Points of a block.
-    pub stride: usize,
-    /// Blocks of points.
-    pub blocks: Vec<Block>,
-    /// Memory that the blocks share.
-    pub memory: Memory,
-    /// Index among the slopes of those of given inputs.
-    pub of_inputs: usize,
-}
-
-/// A kernel and how many workgroups it runs on.
-pub type Task = (Bound, [u32; 2]);
-
-/// The kernels of a block.
-#[derive(Debug)]
-pub struct Block {
-    /// Its points.
-    pub uniform: Buffer,
-    forward: Vec<Task>,
-    backward: Vec<Task>,
+    /// Its blocks.
+    pub field: Field,
+    /// The points of each block.
+    pub uniforms: Vec<Buffer>,
+    /// Activations, of all blocks by turns.
+    pub rows: Buffer,
+    /// Slopes of given inputs.
+    pub of_inputs: Buffer,
 }
 
 /// Buffers that all blocks share.
 #[derive(Debug)]
-pub struct Memory {
+struct Memory {
     encoding: Buffer,
     layers: Vec<Buffer>,
     /// Activations.
-    pub rows: Buffer,
+    rows: Buffer,
     /// Slopes of what a layer gives and takes, by turns.
-    pub slopes: [Buffer; 2],
+    slopes: [Buffer; 2],
     parts: Buffer,
     /// If slopes of places are wanted: what a layer takes of the encoded point behind units, and its slopes.
     behind_units: Option<(Buffer, Buffer)>,
@@ -104,60 +92,22 @@ impl Network {
         let kernels = compiled(device, &source, &ENTRIES)?;
         let memory = Memory::new(device, shape, stride, of_places)?;
         let count = shape.parameters();
-        let blocks = (0..points.room.div_ceil(stride).max(1)).map(|k| {
+        let (mut blocks, mut uniforms) = (Vec::new(), Vec::new());
+        for k in 0..points.room.div_ceil(stride).max(1) {
             let numbers = [k * stride, stride, shape.start, count].map(|x| x as u32);
-            let uniform = device.uniform(&words(&numbers))?;
-            let (memory, kernels, block) = (&memory, &kernels[..], &uniform);
-            let binding = Binding { device, kernels, block, memory, points, learning };
-            let (forward, backward) =
-                (binding.forward(shape, stride)?, binding.backward(shape, stride)?);
-            Ok(Block { uniform, forward, backward })
-        });
-        let blocks = blocks.collect::<Result<_, GpuError>>()?;
-        // Slopes change buffers at every layer.
-        Ok(Self { stride, blocks, memory, of_inputs: shape.hidden % 2 })
-    }
-
-    /// Emission of so many points at most, and its slopes.
-    pub fn forward(&self, commands: &mut Commands, points: usize) {
-        self.used(points).for_each(|block| block.forward(commands));
-    }
-
-    /// Adds the gradient of so many points at most, after [`forward`](Self::forward) and with cotangents.
-    pub fn backward(&self, commands: &mut Commands, points: usize) {
-        for block in self.used(points) {
-            if self.is_cut(points) {
-                block.forward(commands);
-            }
-            block.backward(commands);
+            let block = device.uniform(&words(&numbers))?;
+            let (kernels, memory) = (&kernels[..], &memory);
+            let binding = Binding { device, kernels, block: &block, memory, points, learning };
+            let forward = binding.forward(shape, stride)?;
+            let backward = binding.backward(shape, stride)?;
+            blocks.push(Block { forward, backward });
+            uniforms.push(block);
         }
+        let Memory { rows, slopes: [even, odd], .. } = memory;
+        // Slopes change buffers at every layer.
+        let of_inputs = if shape.hidden.is_multiple_of(2) { even } else { odd };
+        Ok(Self { field: Field { stride, blocks }, uniforms, rows, of_inputs })
     }
-
-    /// Returns whether activations of all blocks but the last are gone after so many points went forward.
-    pub fn is_cut(&self, points: usize) -> bool {
-        points > self.stride
-    }
-
-    fn used(&self, points: usize) -> impl Iterator<Item = &Block> {
-        self.blocks.iter().take(points.div_ceil(self.stride))
-    }
-}
-
-impl Block {
-    /// Emission of its points.
-    pub fn forward(&self, commands: &mut Commands) {
-        run(commands, &self.forward);
-    }
-
-    /// Adds the gradient of its points.
-    pub fn backward(&self, commands: &mut Commands) {
-        run(commands, &self.backward);
-    }
-}
-
-/// Runs kernels one after the other.
-pub fn run(commands: &mut Commands, tasks: &[Task]) {
-    tasks.iter().for_each(|(bound, groups)| commands.dispatch(bound, *groups));
 }
 
 impl Memory {
