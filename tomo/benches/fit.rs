@@ -9,9 +9,7 @@ mod paper;
 #[path = "support/mod.rs"]
 mod support;
 
-use kerrlight_tomo::fit::{
-    Batch, BatchSize, OccupancyPlan, OccupancySettings, Outcome, State, Trainer, Training,
-};
+use kerrlight_tomo::fit::{Batch, BatchSize, OccupancySettings, Outcome, State, Trainer, Training};
 use kerrlight_tomo::optimise::AdamState;
 use kerrlight_tomo::representation::{
     Gradient, Groups, InstructionSet, Network, NetworkSettings, Representation, Workspace,
@@ -22,10 +20,9 @@ use support::{large_sgemm, least, wanted};
 const FRAMES: usize = 128;
 
 fn training(batch: BatchSize) -> Training {
-    let settings = OccupancySettings { cells: 24, threshold: 0.01, memory: 0.8 };
     // A step in twenty looks at every cell.
-    let occupancy = Some(OccupancyPlan { settings, warm_up: 60, every: 20 });
-    Training { occupancy, ..paper::training(batch, 400) }
+    let mask = OccupancySettings { threshold: 0.01, warm_up: 60, ..OccupancySettings::default() };
+    Training { occupancy: Some(mask), ..paper::training(batch, 400) }
 }
 
 /// Seconds of the parts of a step on these pairs: points collected and pulled back, the network forward and back,

@@ -70,7 +70,7 @@ pub use learning::device::{DeviceError, DeviceRunner, StepDevice, Stretch, Taken
 pub use learning::state::{Diverged, Outcome, Progress, State};
 pub use learning::steps::Place;
 pub use learning::trainer::Trainer;
-pub use learning::training::{BatchSize, COMPARED, OccupancyPlan, Training};
+pub use learning::training::{BatchSize, COMPARED, Training};
 pub use loss::change_price::{ChangeBuffers, ChangePrice};
 pub use loss::curve_term::{FluxDatum, StokesCurveTerm};
 pub use loss::device_observable::Compared;

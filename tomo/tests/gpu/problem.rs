@@ -7,8 +7,8 @@ use kerrlight_render::dynamics::infall::{Falling, Family, Law};
 use kerrlight_render::dynamics::{AngularVelocity, Axis, Injection};
 use kerrlight_tomo::fit::{
     BatchSize, Data, ForwardModel, FrameTerm, ImageTerm, LightCurveTerm, Motion, Objective,
-    OccupancyPlan, OccupancySettings, Redshift, Region, Sampling, Scan, ScanTerm, SightlineRequest,
-    Sightlines, State, Training, Weighted,
+    OccupancySettings, Redshift, Region, Sampling, Scan, ScanTerm, SightlineRequest, Sightlines,
+    State, Training, Weighted,
 };
 use kerrlight_tomo::optimise::LinearDecay;
 use kerrlight_tomo::representation::{
@@ -185,7 +185,8 @@ fn scans(name: &str) -> Weighted<dyn FrameTerm<f32>> {
 
 pub fn training(batch: BatchSize, masked: bool) -> Training {
     let rate = LinearDecay { from: 3e-2, to: 1e-3, steps: 40 };
-    let settings = OccupancySettings { cells: 12, threshold: 0.6, memory: 0.5 };
+    let (cells, threshold, memory, warm_up, every) = (12, 0.6, 0.5, 10, 7);
+    let mask = OccupancySettings { cells, threshold, memory, warm_up, every };
     Training {
         seed: 11,
         muon: None,
@@ -193,7 +194,7 @@ pub fn training(batch: BatchSize, masked: bool) -> Training {
         axis_rate: None,
         ramp: 3,
         batch,
-        occupancy: masked.then_some(OccupancyPlan { settings, warm_up: 10, every: 7 }),
+        occupancy: masked.then_some(mask),
         change: None,
         region: REGION,
         keep_every: 8,

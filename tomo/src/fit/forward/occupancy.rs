@@ -6,17 +6,30 @@ use kerrlight_common::simd::Float;
 use kerrlight_render::points::Coordinates;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-/// Settings of the mask.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Mask of what shines.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
 pub struct OccupancySettings {
-    /// Cells along each axis of the cube that holds the region.
+    /// Cells along each axis.
+    #[schemars(range(min = 2, max = 256), extend("unit" = "cells along each axis"))]
     pub cells: usize,
-    /// A cell is empty if no emission above this part of the largest one was seen in it or in one of its
-    /// 26 neighbours.
+    /// Cells below this fraction of the peak are empty, 0 to 1, 1 excluded; neighbours of lit cells are kept.
     pub threshold: f64,
-    /// Share of the emission that a cell keeps from one refreshment to the next.
+    /// Fraction of the old brightness kept at each update, 0 to 1, 1 excluded.
     pub memory: f64,
+    /// Steps before the mask is used.
+    pub warm_up: u64,
+    /// Steps between updates, each at a random point of every cell.
+    pub every: u64,
+}
+
+impl Default for OccupancySettings {
+    fn default() -> Self {
+        Self { cells: 24, threshold: 0.003, memory: 0.8, warm_up: 0, every: 20 }
+    }
 }
 
 /// Number of times at which a field that changes is looked at, once it has been looked at at all of them.
@@ -199,8 +212,9 @@ mod tests {
         let mut parameters = vec![0.0f32; 1331];
         parameters[(8 * 11 + 5) * 11 + 2] = 1.0; // at (3, 0, −3)
         let region = Region { r_min: 0.0, r_max: 5.0, z_width: f64::INFINITY };
-        let mut mask =
-            Occupancy::new(OccupancySettings { cells: 10, threshold: 1e-4, memory: 0.9 }, region);
+        let (threshold, memory, rest) = (1e-4, 0.9, OccupancySettings::default());
+        let settings = OccupancySettings { cells: 10, threshold, memory, ..rest };
+        let mut mask = Occupancy::new(settings, region);
         assert!(mask.holds([-4.0, 4.0, 4.0]) && !mask.holds([5.1, 0.0, 0.0]));
         mask.refresh(&grid, &parameters, 7, &[], &mut Workspace::new());
         // Two cells along each axis shine, four are kept.

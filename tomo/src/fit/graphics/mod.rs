@@ -104,7 +104,7 @@ impl GraphicsFit {
     ) -> Result<Self, Error> {
         check(objective, representation, training)?;
         let model = &objective.model;
-        let cells = training.occupancy.map_or(0, |plan| plan.settings.cells);
+        let cells = training.occupancy.map_or(0, |mask| mask.cells);
         let pieces = Pieces::new(objective, training.batch);
         let events = !representation.is_carried();
         // What is not carried does not fall.

@@ -1,6 +1,6 @@
 //! State of a fit from step to step, and how it goes back when its loss diverges.
 
-use super::training::{OccupancyPlan, Training};
+use super::training::Training;
 use crate::fit::forward::occupancy::Occupancy;
 use crate::fit::loss::objective::Loss;
 use crate::optimise::AdamState;
@@ -79,14 +79,13 @@ impl<T: Float> State<T> {
         let count = representation.parameters();
         let mut parameters = vec![T::zero(); count];
         representation.initialise(training.seed, &mut parameters);
-        let mask = |plan: OccupancyPlan| Occupancy::new(plan.settings, training.region);
         let now = Progress {
             step: 0,
             parameters,
             adam: AdamState::new(count),
             axis,
             axis_adam: AdamState::new(3),
-            occupancy: training.occupancy.map(mask),
+            occupancy: training.occupancy.map(|mask| Occupancy::new(mask, training.region)),
             caution: 1.0,
             loss: f64::INFINITY,
         };

@@ -27,17 +27,6 @@ pub enum BatchSize {
     All,
 }
 
-/// Times at which a mask of what shines is used and renewed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OccupancyPlan {
-    /// The mask.
-    pub settings: OccupancySettings,
-    /// Steps without it.
-    pub warm_up: u64,
-    /// Steps from one refreshment to the next.
-    pub every: u64,
-}
-
 /// Training: optimiser, steps and batches.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Training {
@@ -54,7 +43,7 @@ pub struct Training {
     /// Data of a step.
     pub batch: BatchSize,
     /// A mask that skips dark cells.
-    pub occupancy: Option<OccupancyPlan>,
+    pub occupancy: Option<OccupancySettings>,
     /// Price of change while matter carries emission, where a representation allows it.
     pub change: Option<ChangePrice>,
     /// Region in which emission is looked for.

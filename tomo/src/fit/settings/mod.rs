@@ -39,7 +39,7 @@ pub use medium::{Scattering, Variability};
 pub use merge::merge;
 pub use quantity::{PriorSettings, Quantity};
 pub use quiescent::QuiescentSettings;
-pub use recovery::{AxisScan, AxisSearch, Linear, Occupancy, Optimiser, Start, Training};
+pub use recovery::{AxisScan, AxisSearch, Linear, Optimiser, Start, Training};
 pub use representation::{FeatureGrid, Grid, Kind, LinearGrid, Network, Own, Representation};
 pub use search::{GeometrySearch, SearchView};
 pub use simulation::{

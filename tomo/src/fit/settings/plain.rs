@@ -2,10 +2,10 @@
 
 use super::{
     AxisSearch, DataFiles, Effects, FitFile, Hole, Kind, Linear, Loss, LossKind, Motion, Movie,
-    Observer, Occupancy, Output, Quantity, Region, Representation, Screen, Simulation, Start,
-    Training, Truth, WidthOf,
+    Observer, Output, Quantity, Region, Representation, Screen, Simulation, Start, Training, Truth,
+    WidthOf,
 };
-use crate::fit::{BatchSize, Sampling};
+use crate::fit::{BatchSize, OccupancySettings, Sampling};
 use crate::representation::{Activation, Degree};
 use kerrlight_render::dynamics::Velocity;
 use std::path::PathBuf;
@@ -154,7 +154,7 @@ impl FitFile {
 impl Training {
     /// The usual steps from a start, with a mask of what shines where that shows what does.
     pub fn starting(start: Start) -> Self {
-        let occupancy = (start != Start::Drawn).then(Occupancy::default);
+        let occupancy = (start != Start::Drawn).then(OccupancySettings::default);
         Self { batch: BatchSize::All, start, occupancy, ..Self::default() }
     }
 }

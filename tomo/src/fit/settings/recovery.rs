@@ -2,7 +2,7 @@
 
 use super::gaussian::cubic;
 use super::{FieldKind, PriorOfVoxels};
-use crate::fit::BatchSize;
+use crate::fit::{BatchSize, OccupancySettings};
 use crate::representation::Degree;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -23,7 +23,7 @@ pub struct Training {
     pub start: Start,
     /// A mask that skips dark cells.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub occupancy: Option<Occupancy>,
+    pub occupancy: Option<OccupancySettings>,
     /// Steps between lines of the log.
     #[schemars(range(min = 1), extend("unit" = "steps"))]
     pub log_every: u64,
@@ -90,23 +90,6 @@ pub enum Start {
         /// Iterations in place of `linear.iterations`.
         iterations: Option<usize>,
     },
-}
-
-/// Mask of what shines.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Occupancy {
-    /// Cells along each axis.
-    #[schemars(range(min = 2, max = 256), extend("unit" = "cells along each axis"))]
-    pub cells: usize,
-    /// Cells below this fraction of the peak are empty, 0 to 1, 1 excluded; neighbours of lit cells are kept.
-    pub threshold: f64,
-    /// Fraction of the old brightness kept at each update, 0 to 1, 1 excluded.
-    pub memory: f64,
-    /// Steps before the mask is used.
-    pub warm_up: u64,
-    /// Steps between updates, each at a random point of every cell.
-    pub every: u64,
 }
 
 /// Axis of the motion, or how to look for it.
@@ -176,12 +159,6 @@ impl Default for Training {
             log_every: 25,
             checkpoint_seconds: 60.0,
         }
-    }
-}
-
-impl Default for Occupancy {
-    fn default() -> Self {
-        Self { cells: 24, threshold: 0.003, memory: 0.8, warm_up: 0, every: 20 }
     }
 }
 

@@ -6,12 +6,10 @@ use super::{Result, axis, linear, motion, polarized};
 use crate::fit::linear::{Change, Voxels};
 use crate::fit::settings;
 use crate::fit::settings::{
-    AxisSearch, FieldKind, FitError, FitFile, Kind, LossKind, Occupancy, Optimiser, Quantity,
-    Start, Within, refuse,
+    AxisSearch, FieldKind, FitError, FitFile, Kind, LossKind, Optimiser, Quantity, Start, Within,
+    refuse,
 };
-use crate::fit::{
-    BatchSize, ChangePrice, OccupancyPlan, OccupancySettings, Region, Training, WithStaticImage,
-};
+use crate::fit::{BatchSize, ChangePrice, OccupancySettings, Region, Training, WithStaticImage};
 use crate::optimise::{LinearDecay, Muon};
 use crate::representation::{
     Activation, Carrier, Changing, Degree, FeatureGrid, FeatureGridSettings, Grid, GridSettings,
@@ -181,7 +179,7 @@ pub fn training(
         refuse!("training.batch of 0 is not allowed: 1 or more");
     }
     let muon = (chosen.optimiser == Optimiser::Muon).then(Muon::default);
-    let occupancy = chosen.occupancy.as_ref().map(occupancy).transpose()?;
+    let occupancy = chosen.occupancy.map(occupancy).transpose()?;
     if occupancy.is_some() && file.representation.kind == Kind::Mlp4d {
         refuse!(
             "training.occupancy does not work with mlp4d, which has no co-rotating coordinates"
@@ -230,19 +228,14 @@ fn rate(file: &FitFile) -> Result<LinearDecay> {
     rate.checked().within("training")
 }
 
-fn occupancy(chosen: &Occupancy) -> Result<OccupancyPlan> {
-    let Occupancy { cells, threshold, memory, warm_up, every } = *chosen;
-    for (name, value) in [("threshold", threshold), ("memory", memory)] {
+fn occupancy(chosen: OccupancySettings) -> Result<OccupancySettings> {
+    for (name, value) in [("threshold", chosen.threshold), ("memory", chosen.memory)] {
         if !(0.0..1.0).contains(&value) {
             let key = format!("training.occupancy.{name}");
             return Err(FitError::range(key, value, "0 to 1, 1 excluded").into());
         }
     }
-    Ok(OccupancyPlan {
-        settings: OccupancySettings { cells, threshold, memory },
-        warm_up,
-        every: every.max(1),
-    })
+    Ok(chosen)
 }
 
 /// Refuses what can be told of settings without tracing rays.

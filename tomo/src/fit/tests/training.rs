@@ -13,8 +13,10 @@ pub(super) fn settings() -> Training {
         axis_rate: Some(rate),
         ramp: 3,
         batch: BatchSize::Pixels(30),
-        occupancy: Some(OccupancyPlan {
-            settings: OccupancySettings { cells: 6, threshold: 0.3, memory: 0.5 },
+        occupancy: Some(OccupancySettings {
+            cells: 6,
+            threshold: 0.3,
+            memory: 0.5,
             warm_up: 10,
             every: 7,
         }),
@@ -94,8 +96,8 @@ fn exact_orthogonal_steps_lower_the_loss_of_whole_frames() {
 #[test]
 fn exact_the_loss_falls_and_the_mask_saves_work() {
     let mut training = Training { batch: BatchSize::Frames(4), ..settings() };
-    let narrow = OccupancySettings { cells: 12, threshold: 0.95, memory: 0.5 };
-    training.occupancy = Some(OccupancyPlan { settings: narrow, warm_up: 10, every: 7 });
+    let narrow = |mask: OccupancySettings| OccupancySettings { cells: 12, threshold: 0.95, ..mask };
+    training.occupancy = training.occupancy.map(narrow);
     let mut state = start(&training);
     let outcomes = run(&training, &mut state, 40);
     let loss = |k: usize| match &outcomes[k] {

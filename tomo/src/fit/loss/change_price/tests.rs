@@ -63,7 +63,8 @@ fn exact_price_is_that_of_the_linear_problem() {
     assert!((known - 0.3 * 14.0).abs() < 1e-6);
     let [mean, error] = price(&parameters, true, None);
     assert!((mean - known).abs() < 4.0 * error + 0.02 * known, "{mean} {error} {known}");
-    let settings = OccupancySettings { cells: 10, threshold: 1e-4, memory: 0.9 };
+    let (threshold, memory, rest) = (1e-4, 0.9, OccupancySettings::default());
+    let settings = OccupancySettings { cells: 10, threshold, memory, ..rest };
     let region = Region { r_min: 0.0, r_max: R, z_width: f64::INFINITY };
     let mut mask = Occupancy::new(settings, region);
     mask.refresh(&field(), &parameters, 3, &KNOTS.times(), &mut Workspace::new());
