@@ -9,22 +9,27 @@ use super::{Band, CurveRows};
 use crate::Error;
 use crate::fit::linear::Roughness;
 use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Light that no flare explains, of the same size in each Stokes parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Light that no flare explains, of the same size in each Stokes parameter. With s = |t − t′|/τ what varies has a
+/// correlation of exp(−s), a damped random walk, or (1 + √5 s + 5 s²/3) exp(−√5 s).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Background {
-    /// Standard deviation of what is constant, Jy.
+    /// Standard deviation of the constant, Jy.
     #[serde(rename = "constant_jy")]
+    #[schemars(range(min = 0.0, max = 1000.0), extend("unit" = "Jy"))]
     pub constant: f64,
     /// Standard deviation of what varies, Jy.
     #[serde(rename = "variation_jy")]
+    #[schemars(range(min = 0.0, max = 1000.0), extend("unit" = "Jy"))]
     pub variation: f64,
-    /// Correlation time τ of what varies, minutes.
+    /// Its correlation time, minutes.
     #[serde(rename = "correlation_min")]
+    #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "minutes"))]
     pub minutes: f64,
-    /// ν of the Matérn covariance of what varies: exp(−s) with s = |t − t′|/τ, a damped random walk, or
-    /// (1 + √5 s + 5 s²/3) exp(−√5 s).
+    /// ν of its Matérn covariance.
     #[serde(rename = "matern")]
     pub roughness: Roughness,
 }

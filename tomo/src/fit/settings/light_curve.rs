@@ -1,7 +1,7 @@
 //! Light curves in Stokes parameters: simulated, or read from a file.
 
 use super::Noise;
-use crate::fit::linear::Roughness;
+use crate::fit::band::Background;
 use kerrlight_render::polarization::StokesParameter;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -52,29 +52,12 @@ pub struct SimulatedCurve {
     /// Noise that is added.
     pub noise: Noise,
     /// A background that is drawn and added to Q and U.
-    pub background: Option<SimulatedBackground>,
+    pub background: Option<Background>,
     /// Scales the truth to this mean of I; as bright as its amplitudes without it.
     pub mean_flux: Option<MeanFlux>,
     /// Samples later than this after the first are not fitted, minutes; their χ² judges the fit.
     #[schemars(range(min = 0.0, max = 1e9), extend("unit" = "minutes"))]
     pub validate_after_min: Option<f64>,
-}
-
-/// A background that is drawn, in Q and in U independent of each other.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SimulatedBackground {
-    /// Standard deviation of the constant, Jy.
-    #[schemars(range(min = 0.0, max = 1000.0), extend("unit" = "Jy"))]
-    pub constant_jy: f64,
-    /// Standard deviation of what varies, Jy.
-    #[schemars(range(min = 0.0, max = 1000.0), extend("unit" = "Jy"))]
-    pub variation_jy: f64,
-    /// Its correlation time, minutes.
-    #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "minutes"))]
-    pub correlation_min: f64,
-    /// ν of its Matérn covariance.
-    pub matern: Roughness,
 }
 
 /// A mean of I.

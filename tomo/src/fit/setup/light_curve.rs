@@ -5,8 +5,7 @@ use super::observable::seen;
 use super::{FitData, Instrument, Result, Truth, hours_per_m, motion};
 use crate::fit::band::Background;
 use crate::fit::settings::{
-    DataFiles, FitError, FitFile, MeasuredCurve, Noise, PerStokes, SimulatedBackground,
-    SimulatedCurve, Within, refuse,
+    DataFiles, FitError, FitFile, MeasuredCurve, Noise, PerStokes, SimulatedCurve, Within, refuse,
 };
 use crate::fit::{FluxDatum, Observable};
 use kerrlight_render::polarization::StokesParameter;
@@ -158,7 +157,7 @@ pub(super) fn simulate(
     let mut fluxes = truth.movie_through(&mut instrument.summed(&motion, &parameters)?);
     // What does not move has fluxes of its own, which `mean_flux` does not scale.
     truth.rings.add_to_fluxes(&mut fluxes, &parameters);
-    if let Some(background) = &settings.background {
+    if let Some(background) = settings.background {
         add_background(&mut fluxes, &parameters, &hours, background, file.seed)?;
     }
     let data = measure(&fluxes, &parameters, settings, file.seed)?;
@@ -173,16 +172,9 @@ fn add_background(
     fluxes: &mut [f64],
     parameters: &[StokesParameter],
     hours: &[f64],
-    settings: &SimulatedBackground,
+    background: Background,
     seed: u64,
 ) -> Result<()> {
-    let SimulatedBackground { constant_jy, variation_jy, correlation_min, matern } = *settings;
-    let background = Background {
-        constant: constant_jy,
-        variation: variation_jy,
-        minutes: correlation_min,
-        roughness: matern,
-    };
     let minutes: Vec<f64> = hours.iter().map(|hour| 60.0 * hour).collect();
     // Streams of their own: background and noise of one seed are independent.
     let mut random = Pcg64Mcg::seed_from_u64(seed ^ 0xbac6_0d17);
