@@ -98,44 +98,26 @@ pub enum LossKind {
 }
 
 impl LossKind {
-    /// All kinds.
-    pub const ALL: [LossKind; 8] = [
-        LossKind::Image,
-        LossKind::Visibilities,
-        LossKind::Amplitudes,
-        LossKind::ClosurePhases,
-        LossKind::LogClosureAmplitudes,
-        LossKind::PolarizedVisibilities,
-        LossKind::PolarimetricRatios,
-        LossKind::LightCurve,
+    /// All kinds in their order, each with its name in `loss.data` and in a sentence.
+    pub const NAMES: [(LossKind, &str, &str); 8] = [
+        (LossKind::Image, "image", "images"),
+        (LossKind::Visibilities, "visibilities", "visibilities"),
+        (LossKind::Amplitudes, "amplitudes", "amplitudes"),
+        (LossKind::ClosurePhases, "closure-phases", "closure phases"),
+        (LossKind::LogClosureAmplitudes, "log-closure-amplitudes", "log closure amplitudes"),
+        (LossKind::PolarizedVisibilities, "polarized-visibilities", "polarized visibilities"),
+        (LossKind::PolarimetricRatios, "polarimetric-ratios", "polarimetric ratios"),
+        (LossKind::LightCurve, "light-curve", "the light curve"),
     ];
 
     /// Returns its name in `loss.data`.
     pub fn name(self) -> &'static str {
-        match self {
-            LossKind::Image => "image",
-            LossKind::Visibilities => "visibilities",
-            LossKind::Amplitudes => "amplitudes",
-            LossKind::ClosurePhases => "closure-phases",
-            LossKind::LogClosureAmplitudes => "log-closure-amplitudes",
-            LossKind::PolarizedVisibilities => "polarized-visibilities",
-            LossKind::PolarimetricRatios => "polarimetric-ratios",
-            LossKind::LightCurve => "light-curve",
-        }
+        Self::NAMES[self as usize].1
     }
 
     /// Returns its name in a sentence.
     pub fn label(self) -> &'static str {
-        match self {
-            LossKind::Image => "images",
-            LossKind::Visibilities => "visibilities",
-            LossKind::Amplitudes => "amplitudes",
-            LossKind::ClosurePhases => "closure phases",
-            LossKind::LogClosureAmplitudes => "log closure amplitudes",
-            LossKind::PolarizedVisibilities => "polarized visibilities",
-            LossKind::PolarimetricRatios => "polarimetric ratios",
-            LossKind::LightCurve => "the light curve",
-        }
+        Self::NAMES[self as usize].2
     }
 
     /// Returns whether χ² of it is convex in the emission, so that a minimum can be told from other stationary
@@ -169,8 +151,9 @@ mod tests {
     /// Names that messages list are those that settings are read as.
     #[test]
     fn exact_names_are_those_of_the_settings() {
-        for kind in LossKind::ALL {
-            assert_eq!(toml::Value::try_from(kind).unwrap().as_str(), Some(kind.name()));
+        for (kind, name, _) in LossKind::NAMES {
+            assert_eq!(toml::Value::try_from(kind).unwrap().as_str(), Some(name));
+            assert_eq!(kind.name(), name);
         }
     }
 }

@@ -25,7 +25,7 @@ impl FitData {
         if losses.is_empty() {
             refuse!(
                 "loss is empty: there is nothing to fit; add a table [[loss]] with `data = …` ({}) and `weight = 1.0`",
-                LossKind::ALL.map(LossKind::name).join(", ")
+                LossKind::NAMES.map(|(_, name, _)| name).join(", ")
             );
         }
         for (k, loss) in losses.iter().enumerate() {
