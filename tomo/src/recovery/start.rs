@@ -5,8 +5,8 @@ use super::progress::{At, Event, Progress};
 use super::search::weighed;
 use super::{Fit, Stopped};
 use crate::Error;
-use crate::fit::linear::{Ending, LinearProgress, LinearSolution};
-use crate::fit::scan::{AxisLoss, AxisProblem, AxisSettings, refine_axis, scan_axis};
+use crate::fit::linear::{Ending, LinearProblem, LinearProgress, LinearSolution};
+use crate::fit::scan::{AxisLoss, AxisSettings, refine_axis, scan_axis};
 use crate::fit::settings::{AxisScan as AxisScanSettings, AxisSearch, FitFile, Kind, Start};
 use crate::fit::setup::{self, CoarseView, FitData, GridSpec, SolvedLeakage, WarmStart};
 use crate::fit::{Batch, Field, ForwardModel, Motion, State, Trainer};
@@ -33,12 +33,12 @@ fn scan(
         let mut progress = told.lock().unwrap_or_else(PoisonError::into_inner);
         progress.goes_on(At::Axis(solved, expected))
     };
-    let whole = |problem: &AxisProblem<'_, f32>| scan_axis(problem, &settings, &watch);
+    let whole = |problem: &LinearProblem<'_, f32>| scan_axis(problem, &settings, &watch);
     let scan = view.search(motion, frames, whole)?.ok_or_else(stopped)?;
     let refined = refine.map(|nodes| -> Result<AxisLoss, Error> {
         let view = CoarseView::new(file, measured, file.screen.pixels)?;
         let near =
-            |problem: &AxisProblem<'_, f32>| refine_axis(problem, scan.best.axis, nodes, &watch);
+            |problem: &LinearProblem<'_, f32>| refine_axis(problem, scan.best.axis, nodes, &watch);
         view.search(motion, frames, near)?.ok_or_else(stopped)
     });
     Ok(FoundAxis { refined: refined.transpose()?, scan })

@@ -8,33 +8,12 @@
 mod map;
 mod refine;
 
-use super::ForwardModel;
-use super::linear::{Change, LinearError, LinearProblem, Prior, Voxels, Weighted};
+use super::linear::{LinearError, LinearProblem, Voxels};
 use crate::Error;
-use crate::representation::Degree;
 use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::Axis;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-
-/// The data of a scan, and what is looked for in them.
-#[derive(Clone, Copy)]
-pub struct AxisProblem<'a, T: Float> {
-    /// Nodes of the rays; few pixels are enough.
-    pub model: &'a ForwardModel<T>,
-    /// The frames of the movie that count; few are enough.
-    pub frames: &'a [usize],
-    /// The data.
-    pub terms: &'a [Weighted<'a, T>],
-    /// Half the width of the grid, M.
-    pub half_width: f64,
-    /// The largest emission that is allowed.
-    pub upper: f64,
-    /// Mean flux of a frame in Jy, for data none of which knows it.
-    pub flux: Option<f64>,
-    /// Penalties; none is the usual.
-    pub priors: &'a [Prior],
-}
 
 /// A grid, and how long its problem is solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,7 +107,7 @@ impl AxisSettings {
 
 /// A scan under way.
 struct Scanner<'a, T: Float> {
-    problem: &'a AxisProblem<'a, T>,
+    problem: &'a LinearProblem<'a, T>,
     watch: &'a ScanWatch<'a>,
     solved: AtomicUsize,
     expected: usize,
@@ -136,7 +115,7 @@ struct Scanner<'a, T: Float> {
 }
 
 impl<'a, T: Float + Default> Scanner<'a, T> {
-    fn new(problem: &'a AxisProblem<'a, T>, watch: &'a ScanWatch<'a>, expected: usize) -> Self {
+    fn new(problem: &'a LinearProblem<'a, T>, watch: &'a ScanWatch<'a>, expected: usize) -> Self {
         let (solved, cancelled) = (AtomicUsize::new(0), AtomicBool::new(false));
         Self { problem, watch, solved, expected, cancelled }
     }
@@ -159,22 +138,9 @@ impl<'a, T: Float + Default> Scanner<'a, T> {
         if self.problem.model.is_shifted() {
             own.insert(self.problem.model.clone()).weigh(axis);
         }
-        let AxisProblem { model, frames, terms, half_width, upper, flux, priors } = *self.problem;
-        let model = own.as_ref().unwrap_or(model);
-        let voxels = Voxels::cube(effort.nodes, half_width, Degree::Linear);
-        let change = Change::NONE;
-        let problem = LinearProblem {
-            model,
-            axis,
-            frames,
-            terms,
-            voxels,
-            upper,
-            flux,
-            priors,
-            gaussian: None,
-            change,
-        };
+        let model = own.as_ref().unwrap_or(self.problem.model);
+        let voxels = Voxels { nodes: [effort.nodes; 3], ..self.problem.voxels };
+        let problem = LinearProblem { model, axis, voxels, ..*self.problem };
         let loss = problem.least(None, effort.iterations)?.value;
         let solved = self.solved.fetch_add(1, Ordering::Relaxed) + 1;
         // Pattern searches may take more than was expected of them.
@@ -205,12 +171,13 @@ impl<'a, T: Float + Default> Scanner<'a, T> {
     }
 }
 
-/// The axis of least loss on the whole sphere; none if the watch wanted no more.
+/// The axis of least loss on the whole sphere; none if the watch wanted no more. The problem is that of any axis, with
+/// trilinear voxels of any number.
 ///
 /// # Errors
 /// If a number is out of its range, data do not fit the rays, a χ² is not finite, or all axes have the same loss.
 pub fn scan_axis(
-    problem: &AxisProblem<'_, f32>,
+    problem: &LinearProblem<'_, f32>,
     settings: &AxisSettings,
     watch: &ScanWatch<'_>,
 ) -> Result<Option<AxisScan>, Error> {
@@ -218,7 +185,7 @@ pub fn scan_axis(
 }
 
 fn search<T: Float + Default>(
-    problem: &AxisProblem<'_, T>,
+    problem: &LinearProblem<'_, T>,
     settings: &AxisSettings,
     watch: &ScanWatch<'_>,
 ) -> Result<Option<AxisScan>, Error> {
@@ -272,7 +239,7 @@ const ITERATIONS: usize = 40;
 /// # Errors
 /// If a number is out of its range, or data do not fit the rays.
 pub fn refine_axis(
-    problem: &AxisProblem<'_, f32>,
+    problem: &LinearProblem<'_, f32>,
     from: Axis,
     nodes: usize,
     watch: &ScanWatch<'_>,

@@ -1,6 +1,8 @@
-use super::super::linear::tests::{FRAMES, forward_model, movie_about};
-use super::super::{FrameTerm, ImageTerm};
+use super::super::linear::Weighted;
+use super::super::linear::tests::{forward_model, movie_about, of_images};
+use super::super::{ForwardModel, FrameTerm, ImageTerm};
 use super::*;
+use crate::representation::Degree;
 
 /// No direction is farther from the lattice than its points are from each other: √(4π/500); the best
 /// covering by hexagons has 0.0984.
@@ -19,9 +21,9 @@ fn exact_lattice_covers_the_sphere() {
 fn problem<'a>(
     model: &'a ForwardModel<f64>,
     terms: &'a [Weighted<'a, f64>],
-) -> AxisProblem<'a, f64> {
-    let (half_width, upper) = (5.0, 2.0);
-    AxisProblem { model, frames: &FRAMES, terms, half_width, upper, flux: None, priors: &[] }
+) -> LinearProblem<'a, f64> {
+    let voxels = Voxels::cube(9, 5.0, Degree::Linear);
+    LinearProblem { upper: 2.0, ..of_images(model, terms, voxels) }
 }
 
 const SMALL: AxisSettings = AxisSettings {

@@ -1,10 +1,11 @@
 //! Coarse views of searches: fewer pixels and nodes, or other ones.
 
 use super::linear_problem::terms;
-use super::{FitData, Instrument, Result, linear, priors, sky, spacing};
-use crate::fit::scan::AxisProblem;
+use super::{FitData, Instrument, Result, axis, linear, priors, sky, spacing};
+use crate::fit::linear::{Change, LinearProblem, Voxels};
 use crate::fit::settings::{FitFile, LossKind, Region, Screen, WidthOf};
 use crate::fit::{Motion, Objective, Sampling};
+use crate::representation::Degree;
 use kerrlight_common::frames::Frames;
 use kerrlight_vlbi::operator::Pulse;
 
@@ -98,7 +99,7 @@ impl CoarseView {
         &self,
         motion: &Motion,
         frames: usize,
-        search: impl FnOnce(&AxisProblem<'_, f32>) -> Result<R>,
+        search: impl FnOnce(&LinearProblem<'_, f32>) -> Result<R>,
     ) -> Result<R> {
         let file = &self.file;
         let settings = linear(file)?;
@@ -107,14 +108,17 @@ impl CoarseView {
         let objective = Objective { model, data: self.measured.terms(&file.loss, count)? };
         let all = objective.observed();
         let chosen: Vec<usize> = all.iter().copied().step_by((all.len() / frames).max(1)).collect();
-        search(&AxisProblem {
+        search(&LinearProblem {
             model: &objective.model,
+            axis: axis(file)?.0,
             frames: &chosen,
             terms: &terms(&objective.data),
-            half_width: file.region.r_max,
+            voxels: Voxels::cube(file.voxel_nodes(), file.region.r_max, Degree::Linear),
             upper: settings.upper,
             flux: settings.flux_jy,
             priors: &priors(settings),
+            gaussian: None,
+            change: Change::NONE,
         })
     }
 }
