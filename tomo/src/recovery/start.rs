@@ -8,7 +8,7 @@ use crate::Error;
 use crate::fit::linear::{Ending, LinearProblem, LinearProgress, LinearSolution};
 use crate::fit::scan::{AxisLoss, AxisSettings, refine_axis, scan_axis};
 use crate::fit::settings::{AxisScan as AxisScanSettings, AxisSearch, FitFile, Kind, Start};
-use crate::fit::setup::{self, CoarseView, FitData, GridSpec, SolvedLeakage, WarmStart};
+use crate::fit::setup::{self, CoarseView, FitData, SolvedLeakage};
 use crate::fit::{Batch, Field, ForwardModel, Motion, State, Trainer};
 use crate::representation::{Registry, Workspace};
 use core::ops::ControlFlow;
@@ -64,17 +64,13 @@ impl Fit<'_, '_> {
         let measured = self.measured;
         let trainer = &mut self.trainer;
         if file.representation.kind == Kind::LinearGrid {
-            let nodes = file.representation.linear_grid.nodes;
             let file = weighed(file, &mut trainer.objective, axis, times, progress)?;
-            let grid = GridSpec { nodes, stride: 1, seed: None };
-            let solution = solve_linear(&file, measured, axis, times, grid, trainer, progress)?;
+            let solution = solve_linear(&file, measured, axis, times, trainer, progress)?;
             state.now.parameters = solution.parameters();
-        } else if let Start::Linear { nodes, stride, steps, .. } = file.training.start {
-            let grid = GridSpec { nodes, stride, seed: None };
-            let solution = solve_linear(file, measured, axis, times, grid, trainer, progress)?;
-            let knots = setup::change(file, times)?.knots;
-            let given = WarmStart { solution: &solution, nodes, knots };
-            let imprinted = setup::warm_start(file, trainer.representation, &given, steps, state)?;
+        } else if let Start::Linear { .. } = file.training.start {
+            let solution = solve_linear(file, measured, axis, times, trainer, progress)?;
+            let representation = trainer.representation;
+            let imprinted = setup::warm_start(file, representation, &solution, times, state)?;
             progress.found(Event::WarmStarted(&imprinted))?;
         }
         Ok(())
@@ -87,11 +83,9 @@ fn solve_linear(
     measured: &FitData,
     axis: Axis,
     times: [f64; 2],
-    grid: GridSpec,
     trainer: &mut Trainer<'_, f32>,
     progress: &mut dyn Progress,
 ) -> Result<LinearSolution<f32>, Error> {
-    let change = setup::change(file, times)?;
     let objective = &mut trainer.objective;
     let mut solution = None;
     // Two closures tell, and `progress` can be borrowed by one: the lock lends it to either.
@@ -105,14 +99,14 @@ fn solve_linear(
                 false => ControlFlow::Break(()),
             }
         };
-        let found = setup::solve_linear(file, objective, axis, change, grid, &mut watch)
+        let found = setup::solve_linear(file, objective, axis, times, None, &mut watch)
             .map_err(|error| error.while_in("linear"))?;
         if found.ending == Ending::Cancelled {
             return Err(Stopped::Lost("the linear grid was being solved").into());
         }
         // The images are for the leakage: without it none are computed.
         let images = match measured.leakage {
-            Some(_) => images_of(&found, file, axis, times, grid, &objective.model)?,
+            Some(_) => images_of(&found, file, axis, times, &objective.model)?,
             None => Vec::new(),
         };
         solution = Some(found);
@@ -139,12 +133,10 @@ fn images_of(
     file: &FitFile,
     axis: Axis,
     times: [f64; 2],
-    grid: GridSpec,
     model: &ForwardModel<f32>,
 ) -> Result<Vec<f32>, Error> {
-    let mut file = file.clone();
-    file.representation.kind = Kind::LinearGrid;
-    file.representation.linear_grid.nodes = grid.nodes;
+    let (mut file, nodes) = (file.clone(), file.voxel_nodes());
+    (file.representation.kind, file.representation.linear_grid.nodes) = (Kind::LinearGrid, nodes);
     let representation = &*setup::representation(&file, &Registry::default(), times)?;
     let parameters = &solution.parameters();
     let field = Field { representation, parameters, axis, occupancy: None };

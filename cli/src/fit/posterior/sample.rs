@@ -115,19 +115,15 @@ fn begin(
     told: &dyn Fn(&str),
 ) -> anyhow::Result<bool> {
     let is_linear = file.representation.kind == Kind::LinearGrid;
-    let change = setup::change(file, times)?;
-    let (nodes, stride, steps) = match file.training.start {
-        _ if is_linear => (file.representation.linear_grid.nodes, 1, 0),
-        Start::Linear { nodes, stride, steps, .. } => (nodes, stride, steps),
-        _ => return Ok(true),
-    };
+    if !is_linear && file.training.start == Start::Drawn {
+        return Ok(true);
+    }
     let mut watch = |now: &LinearProgress| {
         told(&format!("linear grid, round {}, loss {:.4e}", now.round, now.value));
         if keeper.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let grid = setup::GridSpec { nodes, stride, seed: Some(prior_seed(file)) };
-    let (objective, axis) = (&mut trainer.objective, state.now.axis);
-    let solution = setup::solve_linear(file, objective, axis, change, grid, &mut watch);
+    let (objective, axis, seed) = (&mut trainer.objective, state.now.axis, Some(prior_seed(file)));
+    let solution = setup::solve_linear(file, objective, axis, times, seed, &mut watch);
     let solution = solution.map_err(failed::failed).context("linear")?;
     // A solver that is told to stop returns what it has, which is no draw.
     if keeper.stopped() {
@@ -136,8 +132,7 @@ fn begin(
     if is_linear {
         state.now.parameters = solution.parameters();
     } else {
-        let given = setup::WarmStart { solution: &solution, nodes, knots: change.knots };
-        setup::warm_start(file, trainer.representation, &given, steps, state)?;
+        setup::warm_start(file, trainer.representation, &solution, times, state)?;
     }
     Ok(true)
 }

@@ -78,8 +78,8 @@ pub fn hold_out(
                 true => ControlFlow::Continue(()),
                 false => ControlFlow::Break(()),
             };
-            let (change, nodes) = (change(&file, times)?, file.voxel_nodes());
-            let of = Of { file: &file, objective, axis, change, nodes, seed: None };
+            let change = change(&file, times)?;
+            let of = Of { file: &file, objective, axis, change, seed: None };
             let Some(loss) = loss(&of, &parts, &mut told)? else { return Ok(None) };
             journal.keep(key, &[loss]);
             held.losses.push(loss);

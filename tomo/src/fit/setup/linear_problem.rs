@@ -1,5 +1,6 @@
 //! The linear problem of a fit: the grid that fits its data best about a known axis.
 
+use super::change::change;
 use super::{Result, linear, priors};
 use crate::fit::linear::{
     Change, Coarse, GaussianField, LinearProblem, LinearSettings, LinearSolution, LogNormalField,
@@ -30,19 +31,10 @@ pub(super) fn terms(data: &Data<f32>) -> Vec<Weighted<'_, f32>> {
     data.terms().map(|(term, weight)| Weighted { weight, term }).collect()
 }
 
-/// Voxels and frames of a linear problem.
-#[derive(Clone, Copy, Debug)]
-pub struct GridSpec {
-    /// Nodes along each axis.
-    pub nodes: usize,
-    /// Every so many frames are fitted.
-    pub stride: usize,
-    /// Seed of a field that the prior of the voxels gives in place of its mean, if any: with data that have noise once more,
-    /// the solution is a draw of the posterior (randomise, then optimise: Bardsley et al. 2014).
-    pub seed: Option<u64>,
-}
-
-/// The grid that fits its frames best.
+/// The grid that fits its frames best: that of the fit, or of its start. `times` are those of the first and the last
+/// emission, M since the reference time. With a `seed` the prior of the voxels, if any, gives a field in place of its mean:
+/// beside data that have noise once more, the solution is a draw of the posterior (randomise, then optimise: Bardsley et al.
+/// 2014).
 ///
 /// # Errors
 /// If a setting is missing or out of range, or the problem has no solution.
@@ -50,13 +42,18 @@ pub fn solve_linear(
     file: &FitFile,
     objective: &mut Objective<f32>,
     axis: Axis,
-    change: Change,
-    GridSpec { nodes, stride, seed }: GridSpec,
+    times: [f64; 2],
+    seed: Option<u64>,
     watch: &mut Watch<'_>,
 ) -> Result<LinearSolution<f32>> {
     objective.model.weigh(axis);
+    let stride = match file.training.start {
+        Start::Linear { stride, .. } if file.representation.kind != Kind::LinearGrid => stride,
+        _ => 1,
+    };
     let frames: Vec<usize> = objective.observed().into_iter().step_by(stride.max(1)).collect();
-    solve_frames(&Of { file, objective, axis, change, nodes, seed }, &frames, watch)
+    let change = change(file, times)?;
+    solve_frames(&Of { file, objective, axis, change, seed }, &frames, watch)
 }
 
 /// Parts of the linear problem of a fit; its model is weighed for the axis.
@@ -65,8 +62,6 @@ pub(super) struct Of<'a> {
     pub objective: &'a Objective<f32>,
     pub axis: Axis,
     pub change: Change,
-    /// Nodes along each axis.
-    pub nodes: usize,
     /// Seed of the field that the prior's density is about; about its mean, without one.
     pub seed: Option<u64>,
 }
@@ -103,10 +98,10 @@ impl Of<'_> {
         frames: &[usize],
         solve: impl FnOnce(&LinearProblem<'_, f32>) -> Result<R>,
     ) -> Result<R> {
-        let Of { file, objective, axis, change, nodes, .. } = *self;
+        let Of { file, objective, axis, change, .. } = *self;
         let settings = linear(file)?;
         let priors = priors(settings);
-        let voxels = Voxels::cube(nodes, file.region.r_max, settings.degree);
+        let voxels = Voxels::cube(file.voxel_nodes(), file.region.r_max, settings.degree);
         let gaussian = self.gaussian(&voxels)?;
         solve(&LinearProblem {
             model: &objective.model,
@@ -163,7 +158,7 @@ pub(super) fn solve_frames(
     frames: &[usize],
     watch: &mut Watch<'_>,
 ) -> Result<LinearSolution<f32>> {
-    let Of { change, nodes, .. } = *of;
+    let (change, nodes) = (of.change, of.file.voxel_nodes());
     let settings = linear(of.file)?;
     let usual = LinearSettings::default();
     let coarse = usual.coarse.filter(|_| nodes >= FINE).map(|coarse| Coarse {

@@ -54,7 +54,7 @@ pub use imported::Reduction;
 pub use instrument::Instrument;
 pub use leakage::LeakageUnknown;
 pub use learning::{caution, check, representation, training};
-pub use linear_problem::{GridSpec, solve_linear};
+pub use linear_problem::solve_linear;
 pub use memory_budget::check_memory_budget;
 pub use preview_image::{PreviewImage, PreviewView};
 pub use quadrature::Imaged;
@@ -62,7 +62,7 @@ pub use random_field::deviation_of_prior;
 pub use solved_leakage::SolvedLeakage;
 pub use truth::Truth;
 pub use visibilities::{VisibilitySettings, frames_of, prepared};
-pub use warm_start::{WarmStart, WarmStarted, warm_start};
+pub use warm_start::{WarmStarted, warm_start};
 
 use super::linear::Prior;
 use super::settings::{

@@ -1,13 +1,14 @@
 //! A start of a representation from the solution of a linear problem.
 
+use super::change::change;
 use super::{Result, linear};
 use crate::fit::linear::{LinearSolution, Voxels};
-use crate::fit::settings::{FitFile, Kind, refuse};
+use crate::fit::settings::{FitFile, Kind, Start, refuse};
 use crate::fit::{Region, State};
 use crate::optimise::{AdamState, Muon};
 use crate::representation::{
-    Activation, Changing, Coordinates, Gradient, Groups, Knots, Representation, Spline,
-    WeightMatrix, Workspace,
+    Activation, Changing, Coordinates, Gradient, Groups, Knots, Representation, WeightMatrix,
+    Workspace,
 };
 use core::ops::Range;
 use rand::{RngExt, SeedableRng};
@@ -35,40 +36,32 @@ pub struct WarmStarted {
     pub relative_error: f64,
 }
 
-/// Start of a representation.
-#[derive(Clone, Copy, Debug)]
-pub struct WarmStart<'a> {
-    /// The solution of a linear problem.
-    pub solution: &'a LinearSolution<f32>,
-    /// Its nodes along each axis.
-    pub nodes: usize,
-    /// Times at which it has values.
-    pub knots: Knots,
-}
-
 /// Fits a representation to the solution of a linear problem, at random points of the region and, where emission changes, at
 /// random times, with what does not move beside it: rounds of `steps` steps, until it is within a twentieth of the solution
-/// or four rounds are over.
+/// or four rounds are over. `times` are those of the first and the last emission, M since the reference time.
 ///
 /// # Errors
 /// If there is no table `linear`, or the emission does not have a value for each node and knot.
 pub fn warm_start(
     file: &FitFile,
     representation: &dyn Representation<f32>,
-    given: &WarmStart<'_>,
-    steps: u64,
+    solution: &LinearSolution<f32>,
+    times: [f64; 2],
     state: &mut State<f32>,
 ) -> Result<WarmStarted> {
-    let quiescent = &given.solution.quiescent;
+    let quiescent = &solution.quiescent;
     let own = state.now.parameters.len() - quiescent.len();
     state.now.parameters[own..].copy_from_slice(quiescent);
     let (r, region) = (file.region.r_max, file.region.limits());
-    let voxels = Voxels::cube(given.nodes, r, linear(file)?.degree);
-    let solution = Solution::of(given, voxels.field()?)?;
+    let solution = Solution::of(file, solution, change(file, times)?.knots)?;
     if file.representation.kind == Kind::Grid {
         read_off(file, &solution, &mut state.now.parameters[..own]);
         return Ok(WarmStarted { steps: 0, relative_error: 0.0 });
     }
+    let steps = match file.training.start {
+        Start::Linear { steps, .. } => steps,
+        Start::Drawn => 0,
+    };
     let matrices = representation.matrices();
     let mut random = Pcg64::seed_from_u64(file.seed ^ 0x1157_a27e);
     let mut memory = AdamState::new(state.now.parameters.len());
@@ -115,13 +108,13 @@ struct Solution<'a> {
 }
 
 impl<'a> Solution<'a> {
-    fn of(given: &WarmStart<'a>, spline: Spline) -> Result<Self> {
-        let WarmStart { solution, nodes, knots } = *given;
-        let (has, wanted) = (solution.emission.len(), nodes.pow(3) * knots.count);
+    fn of(file: &FitFile, solution: &'a LinearSolution<f32>, knots: Knots) -> Result<Self> {
+        let voxels = Voxels::cube(file.voxel_nodes(), file.region.r_max, linear(file)?.degree);
+        let (has, wanted) = (solution.emission.len(), voxels.count() * knots.count);
         if has != wanted {
             refuse!("the solution of the linear problem has {has} values; {wanted} are wanted");
         }
-        let field = Changing::new(Box::new(spline), knots, None)?;
+        let field = Changing::new(Box::new(voxels.field()?), knots, None)?;
         Ok(Self { field, knots, emission: &solution.emission })
     }
 
