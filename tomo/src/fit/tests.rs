@@ -12,6 +12,7 @@ mod stokes;
 mod training;
 mod transport;
 
+pub(super) use crate::optimise::dot;
 use crate::representation::{
     Activation, Coordinates, Gradient, Grid, GridSettings, Representation, Workspace,
 };
@@ -27,10 +28,6 @@ use kerrlight_vlbi::operator::{Dtft, ImageGrid, Pulse, Transform};
 use num_complex::Complex;
 
 const SIDE: usize = 9;
-
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
 
 /// x + h d.
 pub(super) fn moved(x: &[f64], along: &[f64], h: f64) -> Vec<f64> {
@@ -289,20 +286,6 @@ fn exact_falling_matter_is_pulled_back_to_where_it_was() {
     batch.gather_field(&model, field);
     let first = batch.columns.node[0] as usize;
     assert_eq!(batch.columns.position[0][0], lines.position[0][first]);
-}
-
-#[test]
-fn exact_gradient_of_a_grid_is_that_of_its_values() {
-    let grid = grid();
-    let mut case =
-        Case { objective: objective(true, true, true), representation: &grid, pixels: false };
-    let (axis, parameters) = (Axis::new([0.3, -0.5, 0.8]).unwrap(), start(&grid));
-    let mut slopes = vec![0.0; parameters.len()];
-    case.loss(&parameters, axis, Gradients { parameters: &mut slopes, axis: None });
-    let way: Vec<f64> = (0..slopes.len()).map(|k| (k as f64 * 0.7).cos()).collect();
-    let difference = slope(1e-5, |h| case.value(&moved(&parameters, &way, h), axis));
-    let product = dot(&slopes, &way);
-    assert!((difference - product).abs() < 1e-7 * product.abs(), "{difference} {product}");
 }
 
 /// All pixels one by one are all frames as a whole, gradients included.

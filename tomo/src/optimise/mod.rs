@@ -11,5 +11,6 @@ mod schedule;
 
 pub use adam::AdamState;
 pub use lbfgs::{Lbfgs, Objective};
+pub(crate) use lbfgs::{add, difference, dot};
 pub use muon::Muon;
 pub use schedule::LinearDecay;

@@ -3,7 +3,8 @@
 //! L-BFGS steps of the numbers that are free to move, projected onto the box (Bertsekas 1982).
 
 use super::quasi_newton::Pairs;
-use super::scaled::{Scaled, add, dot};
+use super::scaled::Scaled;
+use crate::optimise::{add, difference, dot};
 use core::ops::ControlFlow;
 use std::collections::VecDeque;
 
@@ -191,8 +192,4 @@ impl<'a, 'b> Descent<'a, 'b> {
         let parts = self.parts();
         (dot(&parts.free, &parts.free) + dot(&parts.leaving, &parts.leaving)).sqrt()
     }
-}
-
-fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a - b).collect()
 }

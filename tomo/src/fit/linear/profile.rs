@@ -13,8 +13,8 @@ use super::data::Data;
 use super::objective::Objective;
 use super::operator::Operator;
 use super::problem::LinearProblem;
-use super::scaled::{add, dot};
 use crate::Error;
+use crate::optimise::{add, dot};
 use kerrlight_common::simd::Float;
 use rayon::prelude::*;
 

@@ -4,7 +4,7 @@
 //! Which numbers are free changes from step to step; products are therefore taken over those of the moment.
 //! [`Lbfgs`](crate::optimise::Lbfgs) has no bounds.
 
-use super::scaled::add;
+use crate::optimise::add;
 use std::collections::VecDeque;
 
 /// Pairs that are kept.

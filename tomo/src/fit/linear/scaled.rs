@@ -57,15 +57,6 @@ impl<'a> Scaled<'a> {
     }
 }
 
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// y += a x.
-pub(super) fn add(y: &mut [f64], a: f64, x: &[f64]) {
-    y.iter_mut().zip(x).for_each(|(y, x)| *y += a * x);
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

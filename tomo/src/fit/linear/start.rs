@@ -6,8 +6,8 @@ use super::error::LinearError;
 use super::initial_fields::{Around, InitialField, Trials};
 use super::objective::Objective;
 use super::run::Run;
-use super::scaled::dot;
 use crate::Error;
+use crate::optimise::dot;
 use kerrlight_common::simd::Float;
 
 /// Newton steps to the best scale: one is enough where χ² is quadratic in it, as that of amplitudes is.
