@@ -53,27 +53,15 @@ pub struct Evidence<'a> {
 pub type Compared<'a> = (Vec<&'a str>, Vec<Statistics>);
 
 impl Evidence<'_> {
-    /// Judges images of all frames.
+    /// Judges images of all frames, with a kind of data, if any, that is not in the losses.
     ///
     /// # Errors
     /// If images cannot be read.
     pub fn judged(
         &self,
-        compared: Compared<'_>,
-        movie: &Frames<f32>,
-    ) -> Result<DataVerdict, Error> {
-        self.judged_beside(compared, movie, Vec::new())
-    }
-
-    /// The same with kinds of data that are not in the losses.
-    ///
-    /// # Errors
-    /// If images cannot be read.
-    pub fn judged_beside(
-        &self,
         (names, statistics): Compared<'_>,
         movie: &Frames<f32>,
-        others: Vec<(String, Tested)>,
+        other: Option<(String, Tested)>,
     ) -> Result<DataVerdict, Error> {
         let model = self.model_visibilities(movie)?;
         let mut terms = Vec::new();
@@ -96,18 +84,16 @@ impl Evidence<'_> {
             }
             terms.push((name.to_owned(), tested));
         }
-        terms.extend(others);
-        let tested: Vec<Tested> = terms.iter().map(|(_, tested)| tested.clone()).collect();
+        terms.extend(other);
         let flux = self.zero_spacing(movie)?;
         let knows_flux =
             |loss: &Loss| loss.data.is_visibilities() || loss.data == LossKind::Amplitudes;
         // Gains that are free may be what is missing.
         let flux_counts = self.measured.gains.is_none() && self.losses.iter().any(knows_flux);
-        let judged = flux.filter(|_| flux_counts);
         let observation = self.measured.visibilities.as_ref().map(|(observation, _)| observation);
         let stations = observation.map(|o| o.stations.iter().map(|s| s.name.clone()).collect());
         Ok(DataVerdict {
-            verdict: judge(&tested, judged),
+            verdict: judge(terms.iter().map(|(_, term)| term), flux.filter(|_| flux_counts)),
             terms,
             flux,
             flux_counts,
@@ -155,7 +141,7 @@ impl DataVerdict {
             let Expected { chi2, spread, .. } = &mut tested.expected;
             (*chi2, *spread) = (*mean, spread.max(beyond * deviation));
         }
-        let tested: Vec<Tested> = self.terms.iter().map(|(_, tested)| tested.clone()).collect();
-        self.verdict = judge(&tested, self.flux.filter(|_| self.flux_counts));
+        let flux = self.flux.filter(|_| self.flux_counts);
+        self.verdict = judge(self.terms.iter().map(|(_, tested)| tested), flux);
     }
 }

@@ -199,7 +199,7 @@ impl<'t> Fit<'_, 't> {
         let data: usize = statistics.iter().map(|of| of.all.count).sum();
         let taken = self.solved(&state.now.parameters) as f64 / data.max(1) as f64;
         statistics.iter_mut().for_each(|of| of.taken = taken);
-        self.evidence().judged((objective.names(), statistics), movie)
+        self.evidence().judged((objective.names(), statistics), movie, None)
     }
 
     /// Parameters of a linear grid between their bounds: as many data, at most, are used up. None of others, which are

@@ -97,7 +97,7 @@ fn predicted(through: &Through<'_>, movie: &Frames<f32>) -> anyhow::Result<Vec<C
     };
     // Total intensity is the first of the images of a frame.
     let movie = movie.mapped(pixels, |image| image[..pixels].to_vec())?;
-    Ok(evidence.judged(compared, &movie)?.terms.iter().filter_map(of).collect())
+    Ok(evidence.judged(compared, &movie, None)?.terms.iter().filter_map(of).collect())
 }
 
 /// The seed of the field that a prior of voxels gives a draw.

@@ -1,7 +1,7 @@
 //! Error of the sums along rays, beside the errors of the data.
 
 use super::Estimate;
-use kerrlight_tomo::fit::setup::Imaged;
+use kerrlight_tomo::fit::setup::finer_images;
 use kerrlight_tomo::fit::{Sampling, State, Trainer};
 
 /// Frames that are looked at.
@@ -24,9 +24,9 @@ impl Estimate<'_> {
         let observed = trainer.objective.observed();
         let every = observed.len().div_ceil(FRAMES).max(1);
         let frames: Vec<usize> = observed.into_iter().skip(every / 2).step_by(every).collect();
-        let imaged = Imaged { file: self.file, motion: self.motion };
         let field = state.now.field(trainer.representation);
-        let Some(finer) = imaged.finer(field, &frames)? else { return Ok(None) };
+        let finer = finer_images(self.file, self.motion, field, &frames)?;
+        let Some(finer) = finer else { return Ok(None) };
         let plain = trainer.movie(&state.now, &frames, true);
         Ok(Some(trainer.objective.apart(&frames, [&plain, &finer])))
     }

@@ -96,8 +96,7 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
     let movie = still(&survey.found().solution.image, measured);
     let evidence = Evidence { file: None, losses: &file.loss, seed: file.seed, measured };
     let (polarized, tested) = told(prepared, polarized, folder)?.unzip();
-    let tested = tested.into_iter().collect();
-    let mut judged = evidence.judged_beside(compared(file, measured, &survey)?, &movie, tested)?;
+    let mut judged = evidence.judged(compared(file, measured, &survey)?, &movie, tested)?;
     judged.expect(&numbers::chi2_of_draws(&survey), survey.draws.len());
     let gains = Gains::beside(&evidence, &movie, &others(&survey, measured), folder)?;
     let beside = beside(file, measured, &survey);

@@ -57,7 +57,7 @@ pub use learning::{caution, check, representation, training};
 pub use linear_problem::solve_linear;
 pub use memory_budget::check_memory_budget;
 pub use preview_image::{PreviewImage, PreviewView};
-pub use quadrature::Imaged;
+pub use quadrature::finer_images;
 pub use random_field::deviation_of_prior;
 pub use solved_leakage::SolvedLeakage;
 pub use truth::Truth;

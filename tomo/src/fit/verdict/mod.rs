@@ -216,11 +216,14 @@ impl Verdict {
 }
 
 /// The verdict of a fit to some kinds of data, of which `flux` is seen by those that know amplitudes.
-pub fn judge(terms: &[Tested], flux: Option<ZeroSpacing>) -> Verdict {
-    let noisy = terms.iter().any(|tested| tested.errors != Errors::Weight);
+pub fn judge<'a>(
+    terms: impl Iterator<Item = &'a Tested> + Clone,
+    flux: Option<ZeroSpacing>,
+) -> Verdict {
+    let noisy = terms.clone().any(|tested| tested.errors != Errors::Weight);
     let outcome = if noisy { Outcome::Explained } else { Outcome::Reproduced };
     let mut verdict = Verdict { outcome, reasons: Vec::new() };
-    for (term, tested) in terms.iter().enumerate() {
+    for (term, tested) in terms.enumerate() {
         let chi2 = tested.statistics.chi2().unwrap_or(f64::NAN);
         match tested.errors {
             _ if !chi2.is_finite() => {

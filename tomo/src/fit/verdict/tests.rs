@@ -22,7 +22,7 @@ fn baselines(frames: usize, of: impl Fn(usize, usize, f64) -> f64) -> Statistics
 }
 
 fn verdict(statistics: Statistics, errors: Errors) -> Verdict {
-    judge(&[Tested::gaussian(statistics, errors)], None)
+    judge([Tested::gaussian(statistics, errors)].iter(), None)
 }
 
 #[test]
@@ -173,7 +173,7 @@ fn exact_a_fit_and_its_draws_are_judged_alike() {
         let found = tested.predicted().unwrap();
         assert!(found.all < 1e-6, "{found:?}");
         assert_eq!(found.beyond < 1e-3, outcome == Outcome::Unexplained, "{found:?}");
-        assert_eq!(judge(&[tested], None).outcome, outcome);
+        assert_eq!(judge([tested].iter(), None).outcome, outcome);
     }
 }
 
@@ -192,8 +192,8 @@ fn exact_noise_free_data_are_judged_by_what_is_left_over() {
 fn exact_flux_at_zero_spacing_has_to_be_there() {
     let right = Tested::gaussian(baselines(60, |_, _, noise| noise), Errors::Stated);
     let of = |model_jy| ZeroSpacing { measured_jy: 2.3, error_jy: 0.02, model_jy, count: 30 };
-    assert_eq!(judge(std::slice::from_ref(&right), Some(of(2.15))).outcome, Outcome::Explained);
-    let missing = judge(&[right], Some(of(1.6)));
+    assert_eq!(judge([&right].into_iter(), Some(of(2.15))).outcome, Outcome::Explained);
+    let missing = judge([&right].into_iter(), Some(of(1.6)));
     assert_eq!(missing.reasons, [Reason { term: None, fault: Fault::Flux }]);
     assert_eq!(missing.outcome, Outcome::Unexplained);
 }

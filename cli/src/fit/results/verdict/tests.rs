@@ -19,7 +19,8 @@ fn of_truth(changes: &[&str], scale: f32) -> DataVerdict {
     let movie = measured.movie.as_ref().unwrap().mapped(400, scaled).unwrap();
     let evidence =
         Evidence { file: Some(&file), losses: &file.loss, seed: file.seed, measured: &measured };
-    evidence.judged((objective.names(), objective.statistics(&movie).unwrap()), &movie).unwrap()
+    let compared = (objective.names(), objective.statistics(&movie).unwrap());
+    evidence.judged(compared, &movie, None).unwrap()
 }
 
 fn assert_explained(kind: &str, array: &str, flux: f64) {
