@@ -1,7 +1,7 @@
 //! All that data of visibilities say, as the device has it.
 
-use crate::fit::loss::device_observable::Compared;
 use crate::fit::loss::objective::Objective;
+use crate::fit::loss::terms::Compared;
 use core::ops::Range;
 use kerrlight_vlbi::data_terms::{ClosureScan, Comparison};
 use kerrlight_vlbi::operator::ImageGrid;

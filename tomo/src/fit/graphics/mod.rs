@@ -20,10 +20,8 @@ mod grid;
 mod kernels;
 mod muon;
 mod network;
-mod nodes;
 mod pending;
 mod pixels;
-mod refusals;
 mod residuals;
 mod rooms;
 mod shape;
@@ -35,7 +33,7 @@ use super::learning::state::Progress;
 use super::learning::training::Training;
 use super::loss::objective::{Loss, Objective};
 use crate::Error;
-use crate::representation::Representation;
+use crate::representation::{BuiltIn, Representation};
 use adam::Learning;
 use fall::FallTable;
 use kernels::Field;
@@ -43,15 +41,44 @@ use kerrlight_geodesic::gpu::{Adapter, Compute, GpuError, Needs};
 use kerrlight_render::dynamics::Axis;
 use muon::Turning;
 use pending::Pending;
-use pixels::Pixels;
-pub use refusals::check;
+use pixels::{Pixels, nodes};
 use rooms::Pieces;
 use visibilities::Visibilities;
+
+/// Parameters of a network, at most: kernels have a workgroup for 64 of them, and WebGPU has 65,535 in a row.
+const MOST_PARAMETERS: usize = 64 * 65_535;
 
 impl From<GpuError> for Error {
     fn from(error: GpuError) -> Self {
         Self::Device(DeviceError(error.to_string()))
     }
+}
+
+/// Refuses what is not done on a device, with the key that asks for it.
+///
+/// # Errors
+/// Names the first such key.
+pub fn check(
+    objective: &Objective<f32>,
+    representation: &dyn Representation<f32>,
+    training: &Training,
+) -> Result<(), Error> {
+    let model = &objective.model;
+    let is_network = matches!(representation.built_in(), Some(BuiltIn::Network(_)));
+    let is_large = is_network && representation.parameters() > MOST_PARAMETERS;
+    for (asked, key, what) in [
+        (training.change.is_some(), "change", "emission that changes while matter carries it is"),
+        (model.planes.is_some(), "polarization", "Stokes parameters are"),
+        (representation.built_in().is_none(), "representation.kind", "this representation is"),
+        (is_large, "representation.network", "networks of more than 4,194,240 parameters are"),
+    ] {
+        if asked {
+            let why =
+                format!("{key}: {what} not computed on graphics devices, the processor does it");
+            return Err(DeviceError(why).into());
+        }
+    }
+    Ok(())
 }
 
 /// Opens a device that has what fits need.
@@ -181,7 +208,7 @@ impl GraphicsFit {
         let model = &stretch.objective.model;
         // An axis that is learnt changes the weights of nodes; nothing else of them changes.
         if self.loaded_for != Some(stretch.axis) {
-            pixels.load(device, nodes::nodes(model, !*events))?;
+            pixels.load(device, nodes(model, !*events))?;
             if let Some(axis) = &pixels.axis {
                 axis.load(device, &model.slopes_of_weights(stretch.axis))?;
             }

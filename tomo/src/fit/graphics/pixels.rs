@@ -2,8 +2,9 @@
 
 use super::axis::AxisSlope;
 use super::bytes::{floats, read, words};
-use super::fall::FallTable;
+use super::fall::{FallTable, of_node};
 use super::kernels::{ROW, compiled, grid};
+use crate::fit::forward::forward_model::ForwardModel;
 use kerrlight_geodesic::gpu::{Bound, Buffer, Commands, Compute, GpuError};
 use kerrlight_geodesic::wgsl;
 
@@ -32,8 +33,26 @@ pub struct Node {
     /// Weight of emission in its pixel.
     pub weight: f32,
     /// Angle that it is turned by in a unit of time, that of its delay, the delay and nothing; where matter falls, what
-    /// [`of_node`](super::fall::of_node) says of it about the delay.
+    /// [`of_node`] says of it about the delay.
     pub motion: [f32; 4],
+}
+
+/// All nodes of a forward model; whether a field is `carried` by matter, that may fall.
+pub fn nodes(model: &ForwardModel<f32>, is_carried: bool) -> impl Iterator<Item = Node> {
+    let origins = model.fall.as_ref().filter(|_| is_carried).map(|fall| fall.parts().1);
+    let motion = move |k: usize| {
+        let delay = model.delay.get(k).copied().unwrap_or(0.0);
+        let Some(origins) = origins else {
+            return [model.rate[k], model.phase.get(k).copied().unwrap_or(0.0), delay, 0.0];
+        };
+        let [high, low, azimuth] = of_node(&origins[k]);
+        [high, low, delay, azimuth]
+    };
+    (0..model.points()).map(move |k| Node {
+        place: [0, 1, 2].map(|c| model.position[c][k]),
+        weight: model.weight[k],
+        motion: motion(k),
+    })
 }
 
 /// A ray in a frame.

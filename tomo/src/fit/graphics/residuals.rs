@@ -5,8 +5,7 @@ use super::pending::{Pending, Share, Squares};
 use super::pixels::{Gathering, Pair};
 use super::rooms::{Ends, pieces};
 use crate::fit::learning::device::Stretch;
-use crate::fit::loss::objective::Loss;
-use crate::fit::loss::selection::Drawn;
+use crate::fit::loss::objective::{Drawn, Loss};
 use crate::fit::loss::terms::ImageTerm;
 use kerrlight_geodesic::gpu::{Commands, GpuError};
 

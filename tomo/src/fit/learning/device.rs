@@ -7,8 +7,7 @@
 use super::state::Progress;
 use crate::Error;
 use crate::fit::forward::occupancy::Occupancy;
-use crate::fit::loss::objective::{Loss, Objective};
-use crate::fit::loss::selection::Drawn;
+use crate::fit::loss::objective::{Drawn, Loss, Objective};
 use kerrlight_render::dynamics::Axis;
 
 /// Failure of a device to take the steps of a fit: it failed, or it does not do what settings ask for.

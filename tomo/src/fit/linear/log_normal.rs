@@ -4,11 +4,11 @@
 //! |z|², so that what data do not tell costs no iterations. The problem is not convex: a descent from e = exp(m) ends at a
 //! stationary point.
 
-use super::convex::Convex;
 use super::gaussian::{GaussianField, Matern};
 use super::objective::Objective;
 use super::operator::Operator;
 use super::ray_weights::Voxels;
+use super::scaled::Convex;
 use super::{Ending, LinearProblem, LinearProgress, LinearSettings, LinearSolution};
 use super::{Stationarity, Watch};
 use crate::Error;

@@ -1,11 +1,11 @@
 //! Objective of the linear problem: data and penalties as a function of the values at the nodes that count.
 
 use super::change::Change;
-use super::convex::Convex;
 use super::data::Data;
 use super::error::LinearError;
 use super::gaussian::GaussianField;
 use super::operator::Operator;
+use super::scaled::Convex;
 use crate::Error;
 use crate::fit::loss::regulariser::{Prior, Regulariser, Shape};
 use crate::fit::quiescent::Quiescent;

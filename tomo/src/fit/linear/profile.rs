@@ -8,11 +8,11 @@
 //! second derivatives P of penalties, over the nodes that shine. Second derivatives of the images are left out
 //! (Gauss & Newton).
 
-use super::convex::Convex;
 use super::data::Data;
 use super::objective::Objective;
 use super::operator::Operator;
 use super::problem::LinearProblem;
+use super::scaled::Convex;
 use crate::Error;
 use crate::optimise::{add, dot};
 use kerrlight_common::simd::Float;

@@ -151,4 +151,28 @@ impl<'a, T: Float + Default> Operator<'a, T> {
         };
         self.rows.iter().map(of).sum()
     }
+
+    /// Rows of data to which all rays add: a number for every node.
+    fn fluxes_of(&self, frame: usize) -> Rows<T> {
+        let columns = self.active.count();
+        // Rays pass the same nodes: a row for each ray would hold a column many times.
+        let mut sums = vec![T::zero(); self.pixels * columns];
+        let wanted = Some(self.active.cells.as_slice());
+        self.walk.frame(frame, wanted, &mut Buffers::default(), |pixel, places| {
+            let row = &mut sums[pixel as usize * columns..][..columns];
+            self.entries(places, |column, entry| row[column as usize] += entry);
+        });
+        let mut rows = Rows::default();
+        // No column counts where all nodes are dark; chunks of length 0 panic.
+        for (pixel, row) in sums.chunks_exact(columns.max(1)).enumerate() {
+            let lit = row.iter().enumerate().filter(|(_, entry)| **entry != T::zero());
+            for (column, entry) in lit {
+                rows.columns.push(column as u32);
+                rows.entries.push(*entry);
+            }
+            rows.pixel.push(pixel as u32);
+            rows.starts.push(rows.columns.len() as u32);
+        }
+        rows
+    }
 }

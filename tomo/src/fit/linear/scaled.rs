@@ -1,7 +1,13 @@
-//! A convex function in coordinates in which its second derivatives are about as large along each axis,
-//! y = √D x; the box stays one.
+//! Functions that a descent minimises: convex ones, in coordinates in which second derivatives are about as large along each
+//! axis, y = √D x; the box stays one.
 
-use super::convex::Convex;
+/// A convex function of numbers in a box.
+pub(super) trait Convex {
+    /// Its value; overwrites the gradient.
+    fn value_and_gradient(&mut self, x: &[f64], gradient: &mut Vec<f64>) -> f64;
+    /// Positive numbers that are to the second derivatives as well as is known.
+    fn diagonal(&self) -> Vec<f64>;
+}
 
 pub(super) struct Scaled<'a> {
     inner: &'a mut dyn Convex,

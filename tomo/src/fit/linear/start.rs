@@ -1,11 +1,11 @@
 //! Starts of a problem that is not convex: lit fields, scaled to the data; the best after some iterations.
 
 use super::Ending;
-use super::convex::Convex;
 use super::error::LinearError;
 use super::initial_fields::{Around, InitialField, Trials};
 use super::objective::Objective;
 use super::run::Run;
+use super::scaled::Convex;
 use crate::Error;
 use crate::optimise::dot;
 use kerrlight_common::simd::Float;

@@ -2,10 +2,8 @@
 
 pub(in crate::fit) mod change_price;
 pub(in crate::fit) mod curve_term;
-pub(in crate::fit) mod device_observable;
 pub(in crate::fit) mod movie_loss;
 pub(in crate::fit) mod objective;
 pub(in crate::fit) mod regulariser;
 pub(in crate::fit) mod scan_term;
-pub(in crate::fit) mod selection;
 pub(in crate::fit) mod terms;

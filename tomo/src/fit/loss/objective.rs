@@ -1,6 +1,5 @@
 //! The loss of a field of emission, and its gradient with respect to parameters and axis.
 
-use super::selection::Drawn;
 use super::terms::{FrameTerm, ImageTerm};
 use crate::fit::forward::batch::Batch;
 use crate::fit::forward::forward_model::{Field, ForwardModel};
@@ -9,6 +8,15 @@ use core::ops::Range;
 use kerrlight_common::simd::Float;
 use kerrlight_render::dynamics::{Cotangents, Turned, pull_back_vjp};
 use kerrlight_render::points::{Coordinates, CoordinatesMut};
+
+/// Data of a step.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Drawn {
+    /// (ray, frame) pairs of images.
+    Pixels(Vec<(u32, u32)>),
+    /// Whole frames, of all data.
+    Frames(Vec<usize>),
+}
 
 /// Data with their share in the loss: weight · χ²/(number of data).
 pub struct Weighted<D: ?Sized> {

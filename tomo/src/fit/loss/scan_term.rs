@@ -1,7 +1,6 @@
 //! Visibilities of frames by an array of telescopes.
 
-use super::device_observable::Compared;
-use super::terms::FrameTerm;
+use super::terms::{Compared, FrameTerm};
 use kerrlight_common::simd::Float;
 use kerrlight_vlbi::data_terms::{DataTerm, Residual};
 use kerrlight_vlbi::operator::{Operator, Transform};

@@ -1,12 +1,30 @@
 //! Data of a movie, frame by frame: χ² of an image, and its gradient with respect to pixels.
 
-use super::device_observable::Compared;
 use crate::Error;
 use kerrlight_common::frames::Frames;
 use kerrlight_common::simd::Float;
-use kerrlight_vlbi::data_terms::Residual;
+use kerrlight_vlbi::data_terms::{Comparison, Residual};
+use kerrlight_vlbi::operator::ImageGrid;
 use std::borrow::Cow;
 use std::sync::OnceLock;
+
+/// Data of a frame, for callers who compute χ² on another device.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Compared {
+    /// Nothing.
+    Nothing,
+    /// The sum of all pixels: a flux (Jy) and 1/σ².
+    Flux(f32, f32),
+    /// Visibilities of the image.
+    Scan {
+        /// Grid of pixels.
+        sky: ImageGrid,
+        /// (u, v) in wavelengths, and the Fourier transform of a pixel there.
+        seen: Vec<([f64; 2], f64)>,
+        /// Comparison with the data.
+        with: Comparison,
+    },
+}
 
 /// χ² of the frames of a movie.
 ///

@@ -4,7 +4,6 @@
 //! default.
 
 mod band;
-mod change;
 mod data;
 mod error;
 mod gaussian;
@@ -16,17 +15,14 @@ mod medium;
 mod merge;
 mod plain;
 mod quantity;
-mod quiescent;
 mod recovery;
 mod representation;
-mod search;
 mod simulation;
 mod unknown_geometry;
 mod unknowns;
 mod view;
 
 pub use band::{BackgroundSettings, BandSettings, Steps};
-pub use change::ChangeSettings;
 pub use data::{DataFiles, Loss, LossKind};
 pub use error::FitError;
 pub use error::{Within, refuse};
@@ -38,14 +34,14 @@ pub use light_curve::{MeanFlux, MeasuredCurve, PerStokes, SimulatedCurve};
 pub use medium::{Scattering, Variability};
 pub use merge::merge;
 pub use quantity::{PriorSettings, Quantity};
-pub use quiescent::QuiescentSettings;
-pub use recovery::{AxisScan, AxisSearch, Linear, Optimiser, Start, Training};
+pub use recovery::{
+    AxisScan, AxisSearch, ChangeSettings, Linear, Optimiser, QuiescentSettings, Start, Training,
+};
 pub use representation::{FeatureGrid, Grid, Kind, LinearGrid, Network, Own, Representation};
-pub use search::{GeometrySearch, SearchView};
 pub use simulation::{
     GlyphShape, Movie, Noise, Observation, Ring, Shines, Simulation, Spot, Truth, Tube,
 };
-pub use unknown_geometry::UnknownGeometry;
+pub use unknown_geometry::{GeometrySearch, SearchView, UnknownGeometry};
 pub use view::{Absorption, Effects, Hole, Motion, Observer, PixelShape, Region, Screen, WidthOf};
 
 use crate::Error;

@@ -3,7 +3,7 @@
 use super::gaussian::cubic;
 use super::{FieldKind, PriorOfVoxels};
 use crate::fit::{BatchSize, OccupancySettings};
-use crate::representation::Degree;
+use crate::representation::{Allowed, Degree};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -69,6 +69,40 @@ impl Linear {
     pub fn prior_of(&self, kind: FieldKind) -> Option<&PriorOfVoxels> {
         self.prior.as_ref().filter(|prior| prior.kind == kind)
     }
+}
+
+/// An image on the screen that is the same in every frame, recovered beside the emission; constant fluxes of a light
+/// curve.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct QuiescentSettings {
+    /// Largest brightness, M of emission 1 along a line of sight; of a light curve, the largest |flux|, Jy.
+    #[schemars(range(min = 1e-15, max = 1e15), extend("unit" = "M of emission; Jy, of a light curve"))]
+    pub upper: f64,
+    /// Factor on ∫ |∇b|² dA over the screen, b in M and A in M²; needed, but not for light curves.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a factor"))]
+    pub smoothness: Option<f64>,
+    /// Factor on ∫ b dA; needed, but not for light curves.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a factor"))]
+    pub sparsity: Option<f64>,
+}
+
+/// Change of emission while matter carries it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ChangeSettings {
+    /// Changes that are allowed.
+    pub allowed: Allowed,
+    /// Factor on ∫∫ |∂e/∂t| dV dt along the flow, M³ of emission.
+    #[schemars(range(min = 0.0, max = 1e12), extend("unit" = "a factor"))]
+    pub weight: f64,
+    /// Longest time between the knots at which the emission is free, M.
+    #[schemars(range(min = 1e-6, max = 1e9), extend("unit" = "M"))]
+    pub spacing: f64,
+    /// An emission s: births found in a round cost s/(s + e) of `weight` in the next. Needs births and
+    /// `linear.rounds` of 2 or more.
+    #[schemars(range(min = 1e-12, max = 1e12), extend("unit" = "an emission"))]
+    pub sharpen: Option<f64>,
 }
 
 /// Start of the parameters.

@@ -2,7 +2,6 @@
 
 use super::gains;
 use super::leakage;
-use super::medium;
 use super::observed::add_systematic;
 use super::polarized::is_polarized;
 use super::truth::SPOT;
@@ -13,6 +12,7 @@ use crate::fit::settings::{
     refuse,
 };
 use kerrlight_common::frames::Frames;
+use kerrlight_vlbi::noise::{ScatteringKernel, unscatter};
 use kerrlight_vlbi::observation::Observation;
 
 /// Advice where there are no data.
@@ -129,8 +129,29 @@ impl Reduction {
             false => prepared(observation, &self.rows).within(name)?,
         };
         add_systematic("data.visibilities.systematic", self.systematic, &mut observation, losses)?;
-        medium::correct(&mut observation, losses, self.scattering, self.variability, name)?;
+        self.correct(&mut observation, losses, name)?;
         Ok(observation)
+    }
+
+    /// Undoes scattering, then adds to errors what the source varies.
+    fn correct(&self, observation: &mut Observation, losses: &[Loss], name: &str) -> Result<()> {
+        if self.scattering == Some(Scattering::SgrA) {
+            unscatter(observation, &ScatteringKernel::sgr_a()).within(name)?;
+        }
+        // That of the source itself, which scattering has not dimmed.
+        let Some(variability) = self.variability else { return Ok(()) };
+        if is_polarized(losses) {
+            refuse!(
+                "data.visibilities.variability is that of total intensity: it is not for polarized-visibilities or \
+                 polarimetric-ratios"
+            );
+        }
+        // Rows of total intensity have one product, the first.
+        for row in &mut observation.rows {
+            let sigma = variability.sigma(row.uv[0].hypot(row.uv[1]));
+            row.noise_sigma[0] = row.noise_sigma[0].hypot(sigma);
+        }
+        Ok(())
     }
 }
 

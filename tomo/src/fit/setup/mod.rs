@@ -18,7 +18,6 @@ mod learning;
 mod light_curve;
 mod linear_problem;
 mod losses;
-mod medium;
 mod memory_budget;
 mod observable;
 mod observed;

@@ -7,20 +7,25 @@
 
 mod matern;
 mod modes;
-mod nearest;
 #[cfg(test)]
 mod tests;
 
 pub use matern::{Matern, Roughness};
 
+use super::descent::{Descent, Stop};
 use super::ray_weights::Voxels;
+use super::scaled::{Convex, Scaled};
 use crate::Error;
 use crate::fit::loss::regulariser::Shape;
+use core::ops::ControlFlow;
 use modes::Modes;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
+
+/// Most iterations to the nearest field that is nowhere negative, and the part of the first gradient that may be left.
+const ENOUGH: Stop = Stop { iterations: 4000, tolerance: 1e-9, settled: 0.0 };
 
 /// A Gaussian field on the nodes of a grid.
 ///
@@ -94,6 +99,18 @@ impl GaussianField {
     /// A field that it gives, the same for the same seed.
     pub fn drawn(&self, seed: u64) -> Vec<f64> {
         self.of_white(&self.white(seed))
+    }
+
+    /// A field that it gives, moved to the nearest one between 0 and `upper`: the least |L (x − draw)|² (Bardsley & Fox
+    /// 2012; Everink, Dong & Andersen 2023). The same for the same seed.
+    pub fn drawn_between(&self, upper: f64, seed: u64) -> Vec<f64> {
+        let draw = self.drawn(seed);
+        let start: Vec<f64> = draw.iter().map(|x| x.clamp(0.0, upper)).collect();
+        let about = self.clone().about(draw);
+        let mut problem = &about;
+        let mut each = |_: f64| ControlFlow::Continue(());
+        let descent = Descent::new(Scaled::new(&mut problem, upper), &start, &mut each);
+        descent.run(ENOUGH).x
     }
 
     /// Independent normal numbers of variance 1, one for each wave, the same for the same seed.
@@ -189,5 +206,17 @@ impl GaussianField {
             }
         });
         out
+    }
+}
+
+impl Convex for &GaussianField {
+    fn value_and_gradient(&mut self, x: &[f64], gradient: &mut Vec<f64>) -> f64 {
+        gradient.clear();
+        gradient.resize(x.len(), 0.0);
+        GaussianField::value_and_gradient(self, x, 1.0, gradient)
+    }
+
+    fn diagonal(&self) -> Vec<f64> {
+        GaussianField::diagonal(self, 1.0)
     }
 }

@@ -1,7 +1,7 @@
 //! Static images beside voxels: columns of the same problem.
 
-use super::super::convex::Convex;
 use super::super::objective::{Objective, Penalised};
+use super::super::scaled::Convex;
 use super::initial_fields::{Observable as Array, array, spot};
 use super::*;
 use crate::fit::{Observable, Quiescent, WithStaticImage};
