@@ -13,7 +13,7 @@ use core::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use kerrlight_tomo::fit::settings::{
     GainPhases, InstrumentSettings, LossKind, Variability, refuse,
 };
-use kerrlight_tomo::fit::setup::{FitData, Reduction, VisibilitySettings};
+use kerrlight_tomo::fit::setup::{FitData, Reduction};
 use kerrlight_vlbi::observation::{Basis, Observation};
 
 /// Measured visibilities as the data of a static image, whose frames have hours of UTC for times. `name` is what they are
@@ -66,7 +66,8 @@ pub fn polarized(
 fn reduction(file: &StaticImageFile, variability: Option<Variability>) -> Reduction {
     let data = &file.data.visibilities;
     Reduction {
-        rows: VisibilitySettings { average_s: data.average_s, uv_min: data.uv_min },
+        average_s: data.average_s,
+        uv_min: data.uv_min,
         systematic: data.systematic,
         scattering: data.scattering,
         variability,

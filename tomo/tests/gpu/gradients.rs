@@ -121,11 +121,13 @@ fn agree(name: &str, both: &mut Both<'_>) {
 }
 
 #[test]
-fn code_networks_have_the_gradients_of_the_processor() {
+fn code_all_fields_have_the_gradients_of_the_processor() {
     let (small, late) = (problem::small(), problem::late());
     let (bhnerf, mlp4d) = (problem::bhnerf(), problem::mlp4d());
+    let [sigmoid, linear] = [Activation::Sigmoid, Activation::Linear].map(problem::voxels);
+    let features = problem::features();
     let frames = || Drawn::Frames(vec![2, 0, 3]);
-    let cases: [(&str, &dyn Representation<f32>, _, _); 14] = [
+    let cases: [(&str, &dyn Representation<f32>, _, _); 20] = [
         ("bhnerf, pixels", &bhnerf, (Kind::Images, pixels(20)), (false, None)),
         ("small, pixels", &small, (Kind::Images, pixels(90)), (false, None)),
         ("late, pixels", &late, (Kind::Images, pixels(90)), (false, None)),
@@ -140,22 +142,6 @@ fn code_networks_have_the_gradients_of_the_processor() {
         ("small, falling, masked", &small, (Kind::Falling, pixels(90)), (true, None)),
         ("small, plunging", &small, (Kind::Plunging, frames()), (false, None)),
         ("mlp4d, falling", &mlp4d, (Kind::Falling, frames()), (false, None)),
-    ];
-    for (name, representation, (kind, draw), (masked, most)) in cases {
-        for learns_axis in [false, true] {
-            let both = Both::new(representation, kind, draw.clone(), masked, most, learns_axis);
-            let Some(mut both) = both else { return };
-            agree(name, &mut both);
-        }
-    }
-}
-
-#[test]
-fn code_grids_have_the_gradients_of_the_processor() {
-    let [sigmoid, linear] = [Activation::Sigmoid, Activation::Linear].map(problem::voxels);
-    let features = problem::features();
-    let frames = || Drawn::Frames(vec![2, 0, 3]);
-    let cases: [(&str, &dyn Representation<f32>, _, _); 6] = [
         ("grid, pixels", &sigmoid, (Kind::Images, pixels(90)), (false, None)),
         ("linear grid, frames", &linear, (Kind::Images, frames()), (false, None)),
         ("feature grid, pixels", &features, (Kind::Images, pixels(90)), (false, None)),

@@ -6,7 +6,7 @@ use super::template::{complete, digits, plain_words};
 use super::visibilities::{gains, has_closures, read, short_baselines};
 use anyhow::Context;
 use kerrlight_common::units::MICROARCSECOND;
-use kerrlight_tomo::fit::setup::{self, VisibilitySettings};
+use kerrlight_tomo::fit::setup;
 use kerrlight_vlbi::observation::Observation;
 
 /// The plain settings of a static image of these data, for annotation.
@@ -95,8 +95,7 @@ fn strength(folds: usize) -> String {
 
 /// Parts of the frames that the template's fit keeps.
 fn folds(observation: &Observation, average_s: f64, long_only: bool) -> usize {
-    let settings = VisibilitySettings { average_s, uv_min: long_only.then_some(1e8) };
-    let frames = setup::prepared(observation.clone(), &settings)
+    let frames = setup::prepared(observation.clone(), average_s, long_only.then_some(1e8))
         .map_or(0, |mut kept| setup::frames_of(&mut kept).0.len());
     FOLDS.min(frames / 2)
 }

@@ -4,7 +4,7 @@ use super::sources::{called, known};
 use super::template::{complete, digits, plain_words};
 use anyhow::bail;
 use kerrlight_common::units::gravitational_angle;
-use kerrlight_tomo::fit::setup::{self, VisibilitySettings};
+use kerrlight_tomo::fit::setup;
 use kerrlight_vlbi::data_terms::ClosureTerm;
 use kerrlight_vlbi::gains::prior_table;
 use kerrlight_vlbi::observation::Observation;
@@ -70,8 +70,8 @@ pub fn of_visibilities(
 /// Returns whether closure phases are left of the rows that the template's fit keeps.
 pub fn has_closures(observation: &Observation, average_s: f64, long_only: bool) -> bool {
     // Averages and the shortest baseline of the template decide what still closes.
-    let settings = VisibilitySettings { average_s, uv_min: long_only.then_some(1e8) };
-    let Ok(mut kept) = setup::prepared(observation.clone(), &settings) else { return false };
+    let kept = setup::prepared(observation.clone(), average_s, long_only.then_some(1e8));
+    let Ok(mut kept) = kept else { return false };
     setup::frames_of(&mut kept);
     ClosureTerm::<f64>::new(&kept, ClosureKind::Phase, 3.0).is_ok()
 }

@@ -5,7 +5,7 @@ use super::leakage;
 use super::observed::add_systematic;
 use super::polarized::is_polarized;
 use super::truth::SPOT;
-use super::visibilities::{VisibilitySettings, all_products, frames_of, prepared};
+use super::visibilities::{averaged, frames_of};
 use super::{FitData, Result, hours_per_m, sky};
 use crate::fit::settings::{
     DataFiles, FitFile, InstrumentSettings, Loss, PixelShape, Scattering, Variability, Within,
@@ -74,8 +74,7 @@ impl FitData {
         else {
             refuse!("{name} holds visibilities, and there is no [data.visibilities]")
         };
-        let rows = VisibilitySettings { average_s, uv_min };
-        let reduction = Reduction { rows, systematic, scattering, variability };
+        let reduction = Reduction { average_s, uv_min, systematic, scattering, variability };
         let observation = reduction.of(observation, &file.loss, name)?;
         let per_m = hours_per_m(file)?;
         let mut all = Self::of_frames(observation, &file.loss, file.instrument.as_ref())?;
@@ -106,8 +105,10 @@ impl FitData {
 /// Reduction of measured visibilities before a model is compared with them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reduction {
-    /// Averages, and baselines that are left out.
-    pub rows: VisibilitySettings,
+    /// Rows of an interval of this many seconds are averaged; 0 keeps all.
+    pub average_s: f64,
+    /// Baselines shorter than this many wavelengths are left out.
+    pub uv_min: Option<f64>,
     /// Part of each amplitude that is added to its error in quadrature, 0 or above.
     pub systematic: f64,
     /// Scattering that is undone.
@@ -124,10 +125,11 @@ impl Reduction {
     /// If a visibility has no error, none is left, the frequency of scattered light is not known, or polarised light would
     /// get the errors of a source that varies.
     pub fn of(&self, observation: Observation, losses: &[Loss], name: &str) -> Result<Observation> {
-        let mut observation = match is_polarized(losses) {
-            true => all_products(observation, &self.rows).within(name)?,
-            false => prepared(observation, &self.rows).within(name)?,
-        };
+        let mut observation = averaged(observation, self.average_s, self.uv_min).within(name)?;
+        if !is_polarized(losses) {
+            observation = observation.total_intensity();
+        }
+        observation.sort();
         add_systematic("data.visibilities.systematic", self.systematic, &mut observation, losses)?;
         self.correct(&mut observation, losses, name)?;
         Ok(observation)

@@ -60,7 +60,7 @@ pub use quadrature::finer_images;
 pub use random_field::deviation_of_prior;
 pub use solved_leakage::SolvedLeakage;
 pub use truth::Truth;
-pub use visibilities::{VisibilitySettings, frames_of, prepared};
+pub use visibilities::{frames_of, prepared};
 pub use warm_start::{WarmStarted, warm_start};
 
 use super::linear::Prior;

@@ -5,43 +5,34 @@ use crate::fit::settings::refuse;
 use kerrlight_vlbi::observation::{Averaging, Flags, Observation, Row};
 use std::collections::HashSet;
 
-/// Settings of the rows of a file.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct VisibilitySettings {
-    /// Rows of an interval of this many seconds are averaged; 0 keeps all.
-    pub average_s: f64,
-    /// Baselines shorter than this many wavelengths are left out.
-    pub uv_min: Option<f64>,
-}
-
 /// Stokes I of an observation, averaged, in order of time.
 ///
 /// # Errors
 /// If a visibility has no error, or none is left.
-pub fn prepared(observation: Observation, settings: &VisibilitySettings) -> Result<Observation> {
-    let mut observation = averaged(observation, settings)?.total_intensity();
+pub fn prepared(
+    observation: Observation,
+    average_s: f64,
+    uv_min: Option<f64>,
+) -> Result<Observation> {
+    let mut observation = averaged(observation, average_s, uv_min)?.total_intensity();
     observation.sort();
     Ok(observation)
 }
 
-/// The same with all products, those of rows without parallel hands too.
+/// All products of an observation without baselines shorter than `uv_min` (wavelengths), averaged over this many seconds; 0
+/// keeps all rows.
 ///
 /// # Errors
-/// As [`prepared`].
-pub(super) fn all_products(
+/// If a visibility has no error, or none is left.
+pub(super) fn averaged(
     observation: Observation,
-    settings: &VisibilitySettings,
+    average_s: f64,
+    uv_min: Option<f64>,
 ) -> Result<Observation> {
-    let mut observation = averaged(observation, settings)?;
-    observation.sort();
-    Ok(observation)
-}
-
-fn averaged(observation: Observation, settings: &VisibilitySettings) -> Result<Observation> {
     check_errors(&observation)?;
-    let observation = long_enough(observation, settings.uv_min)?;
-    Ok(match settings.average_s > 0.0 {
-        true => observation.averaged(Averaging::over(settings.average_s)),
+    let observation = long_enough(observation, uv_min)?;
+    Ok(match average_s > 0.0 {
+        true => observation.averaged(Averaging::over(average_s)),
         false => observation.with_repeats_merged().into_owned(),
     })
 }
@@ -123,8 +114,7 @@ mod tests {
     #[test]
     fn exact_short_integrations_are_frames_of_their_own() {
         let seconds = [0.0, 0.3, 0.6, 0.9, 20.0];
-        let settings = VisibilitySettings { average_s: 0.0, uv_min: None };
-        let mut observation = prepared(triangles(&seconds), &settings).unwrap();
+        let mut observation = prepared(triangles(&seconds), 0.0, None).unwrap();
         let (hours, of_rows) = frames_of(&mut observation);
         assert_eq!((hours.len(), of_rows.len()), (5, 15));
         assert_eq!(ClosureSet::of(&observation, ClosureKind::Phase, 0.0).len(), 5);
@@ -136,8 +126,7 @@ mod tests {
         let mut twice = triangles(&[0.0, 10.0]);
         twice.rows.extend(triangles(&[0.0, 10.0]).rows);
         for average_s in [0.0, 5.0] {
-            let settings = VisibilitySettings { average_s, uv_min: None };
-            let mut observation = prepared(twice.clone(), &settings).unwrap();
+            let mut observation = prepared(twice.clone(), average_s, None).unwrap();
             let (hours, _) = frames_of(&mut observation);
             assert_eq!((hours.len(), observation.rows.len()), (2, 6));
             assert!(observation.rows.iter().all(|row| (row.noise_sigma[0] - 0.1).abs() < 1e-15));
