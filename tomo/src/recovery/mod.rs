@@ -22,7 +22,7 @@ pub use evidence::{Compared, DataVerdict, Evidence};
 pub use fields::{carried, compare, recovered, recovered_at, true_volume};
 pub use found::{Choice, Found, FoundAxis, Searched, Stage};
 pub use problem::Problem;
-pub use progress::{At, Event, Now, Progress, Resumed, Silent};
+pub use progress::{At, Event, Progress, Resumed, Silent};
 pub use search::{ResolvedFit, settled};
 pub use words::{range_of, short};
 
@@ -134,7 +134,7 @@ pub fn fit_with<R, E: From<Error>>(
     let true_volume = truth.map(|truth| true_volume(file, truth, 0.0)).transpose()?;
     let searched = searched.flatten();
     let mut fit = Fit { file, instrument, motion, measured, true_volume, searched, trainer };
-    progress.begins(fit.now(&state));
+    progress.begins(&fit);
     match progress.resumed(&state)? {
         Some((earlier, leakage)) => {
             state = earlier;
@@ -154,19 +154,7 @@ pub fn fit_with<R, E: From<Error>>(
     finish(&mut fit, &state)
 }
 
-impl<'t> Fit<'_, 't> {
-    /// The fit as it is.
-    fn now<'b>(&'b mut self, state: &'b State<f32>) -> Now<'b, 't> {
-        Now {
-            settings: self.file,
-            instrument: self.instrument,
-            measured: self.measured,
-            true_volume: self.true_volume.as_ref(),
-            trainer: &mut self.trainer,
-            state,
-        }
-    }
-
+impl Fit<'_, '_> {
     /// All frames as the data see them: images, images of Stokes parameters, or fluxes.
     ///
     /// # Errors

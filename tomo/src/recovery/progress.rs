@@ -1,13 +1,13 @@
 //! Progress of a fit, and what it keeps.
 
+use super::Fit;
 use super::found::{Choice, Found, FoundAxis, Stage};
 use crate::Error;
 use crate::fit::journal::{Forgetful, Journal};
 use crate::fit::linear::{LinearProgress, LinearSolution};
 use crate::fit::settings::FitFile;
-use crate::fit::setup::{FitData, Instrument, SolvedLeakage, WarmStarted};
+use crate::fit::setup::{SolvedLeakage, WarmStarted};
 use crate::fit::{DeviceRunner, Outcome, State, Trainer};
-use kerrlight_render::volume::Volume;
 use kerrlight_vlbi::polarimetry::LeakageTable;
 
 /// Position of a fit in its work.
@@ -53,22 +53,6 @@ pub enum Event<'a> {
     Leakage(Option<u64>, &'a SolvedLeakage),
     /// Steps after which the model explains the data and others would follow their noise: the last ones.
     FollowsNoise(u64),
-}
-
-/// A fit before its first step, or after one.
-pub struct Now<'a, 't> {
-    /// Settings, with what was found of the geometry.
-    pub settings: &'a FitFile,
-    /// Rays.
-    pub instrument: &'a Instrument,
-    /// Data.
-    pub measured: &'a FitData,
-    /// The truth at the reference time, where data are simulated.
-    pub true_volume: Option<&'a Volume>,
-    /// The fit with its memory.
-    pub trainer: &'a mut Trainer<'t, f32>,
-    /// Present state.
-    pub state: &'a State<f32>,
 }
 
 /// The state of an interrupted fit, with the leakage of stations that it had found.
@@ -123,7 +107,7 @@ pub trait Progress: Send {
     }
 
     /// Told what is fitted, before anything is.
-    fn begins(&mut self, _: Now<'_, '_>) {}
+    fn begins(&mut self, _: &Fit<'_, '_>) {}
 
     /// Returns what an interrupted fit has left; `start` is the state of a new one.
     ///
@@ -153,7 +137,7 @@ pub trait Progress: Send {
     ///
     /// # Errors
     /// If it cannot be written.
-    fn stepped(&mut self, _: Now<'_, '_>, _: Outcome) -> Result<(), Error> {
+    fn stepped(&mut self, _: &mut Fit<'_, '_>, _: &State<f32>, _: Outcome) -> Result<(), Error> {
         Ok(())
     }
 }

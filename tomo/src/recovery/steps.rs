@@ -35,7 +35,7 @@ impl Fit<'_, '_> {
             };
             let step = state.now.step;
             let stop = !progress.goes_on(At::Step(step));
-            progress.stepped(self.now(state), outcome)?;
+            progress.stepped(self, state, outcome)?;
             let late = saved.elapsed().as_secs_f64() > self.file.training.checkpoint_seconds;
             if stop || late || step == steps {
                 progress.save(state)?;

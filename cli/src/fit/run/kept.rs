@@ -18,7 +18,7 @@ use kerrlight_tomo::fit::settings::{FitFile, Kind};
 use kerrlight_tomo::fit::setup::{self, RaySampling};
 use kerrlight_tomo::fit::{DeviceRunner, Outcome, State, Trainer, checkpoint, journal};
 use kerrlight_tomo::recovery::results::{BandResults, GeometryResults, HeldOutResults};
-use kerrlight_tomo::recovery::{At, Choice, Event, Found, Now, Problem, Progress, Resumed, Stage};
+use kerrlight_tomo::recovery::{At, Choice, Event, Fit, Found, Problem, Progress, Resumed, Stage};
 use std::time::Instant;
 
 /// A fit in its folder.
@@ -148,8 +148,8 @@ impl<'a> Kept<'a> {
         }
     }
 
-    fn describe(now: &Now<'_, '_>) -> String {
-        let objective = &now.trainer.objective;
+    fn describe(fit: &Fit<'_, '_>) -> String {
+        let objective = &fit.trainer.objective;
         let (model, names) = (&objective.model, objective.names().join(", "));
         let dark = match objective.observed().len() {
             seen if seen < model.frames() => format!(" ({seen} of them with data)"),
@@ -157,12 +157,12 @@ impl<'a> Kept<'a> {
         };
         format!(
             "{}: {names}; {} frames{dark} of {} rays, {} nodes; {} with {} parameters",
-            plain::line(&now.settings.title),
+            plain::line(&fit.file.title),
             model.frames(),
             model.rays(),
-            now.instrument.lines.points(),
-            now.settings.representation.kind.label(),
-            now.trainer.representation.parameters(),
+            fit.instrument.lines.points(),
+            fit.file.representation.kind.label(),
+            fit.trainer.representation.parameters(),
         )
     }
 
@@ -308,17 +308,17 @@ impl Progress for Kept<'_> {
         device.map(delegate).transpose().map_err(kept)
     }
 
-    fn begins(&mut self, now: Now<'_, '_>) {
+    fn begins(&mut self, fit: &Fit<'_, '_>) {
         self.end();
-        eprintln!("{}", Self::describe(&now));
-        for used in closures::sentences(now.measured, &now.settings.loss) {
+        eprintln!("{}", Self::describe(fit));
+        for used in closures::sentences(fit.measured, &fit.file.loss) {
             eprintln!("{used}");
         }
         if let Some(rays) = self.problem.rays {
             eprintln!("note: the data ask for {}", asked_for(rays));
         }
-        let caution = setup::caution(now.settings).map(str::to_owned);
-        for note in caution.into_iter().chain(now.settings.unknowns()) {
+        let caution = setup::caution(fit.file).map(str::to_owned);
+        for note in caution.into_iter().chain(fit.file.unknowns()) {
             eprintln!("note: {note}");
         }
     }
@@ -352,11 +352,16 @@ impl Progress for Kept<'_> {
         Ok(())
     }
 
-    fn stepped(&mut self, now: Now<'_, '_>, outcome: Outcome) -> Result<(), Error> {
+    fn stepped(
+        &mut self,
+        fit: &mut Fit<'_, '_>,
+        state: &State<f32>,
+        outcome: Outcome,
+    ) -> Result<(), Error> {
         let Some((_, Some((_, bar)))) = &self.work else { return Ok(()) };
         let bar = bar.clone();
-        bar.set_message(format!("loss {:.4e}", now.state.now.loss));
-        self.step(now, outcome, &bar).map_err(kept)
+        bar.set_message(format!("loss {:.4e}", state.now.loss));
+        self.step(fit, state, outcome, &bar).map_err(kept)
     }
 }
 

@@ -4,8 +4,8 @@ use super::kept::Kept;
 use crate::progress;
 use indicatif::ProgressBar;
 use kerrlight_tomo::fit::settings::AxisSearch;
-use kerrlight_tomo::fit::{Loss, Outcome};
-use kerrlight_tomo::recovery::{Now, compare};
+use kerrlight_tomo::fit::{Loss, Outcome, State};
+use kerrlight_tomo::recovery::{Fit, compare};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -13,16 +13,17 @@ impl Kept<'_> {
     /// Logs what a step has done, and tells of what is unusual.
     pub(super) fn step(
         &self,
-        now: Now<'_, '_>,
+        fit: &mut Fit<'_, '_>,
+        state: &State<f32>,
         outcome: Outcome,
         bar: &ProgressBar,
     ) -> anyhow::Result<()> {
-        let (step, training) = (now.state.now.step, &now.settings.training);
+        let (step, training) = (state.now.step, &fit.file.training);
         let line = match outcome {
             Outcome::Done(loss)
                 if step.is_multiple_of(training.log_every) || step == training.steps =>
             {
-                self.line(now, &loss)
+                self.line(fit, state, &loss)
             }
             Outcome::Done(_) => return Ok(()),
             Outcome::SteppedBack { loss, to, caution } => {
@@ -34,9 +35,8 @@ impl Kept<'_> {
         self.folder.log(&line)
     }
 
-    fn line(&self, of: Now<'_, '_>, loss: &Loss) -> Value {
-        let Now { settings, measured, true_volume, trainer, state, .. } = of;
-        let chi2 = trainer.objective.names().into_iter().zip(&loss.terms);
+    fn line(&self, fit: &mut Fit<'_, '_>, state: &State<f32>, loss: &Loss) -> Value {
+        let chi2 = fit.trainer.objective.names().into_iter().zip(&loss.terms);
         let chi2: BTreeMap<&str, &f64> = chi2.collect();
         let now = &state.now;
         let mut line = json!({
@@ -49,17 +49,17 @@ impl Kept<'_> {
         if let Some(change) = loss.change {
             line["penalties"] = json!({"change": change});
         }
-        if !matches!(settings.axis, AxisSearch::Known {}) {
+        if !matches!(fit.file.axis, AxisSearch::Known {}) {
             line["axis"] = json!(now.axis.vector());
         }
         if let Some(mask) = &now.occupancy {
             line["occupied"] = json!(mask.fraction());
         }
-        if let Some(truth) = &measured.truth {
+        if let Some(truth) = &fit.measured.truth {
             line["axis_dot_truth"] = json!(now.axis.dot(truth.axis()));
         }
-        if let Some(truth) = true_volume
-            && let Some(found) = compare(settings, trainer, state, truth)
+        if let Some(truth) = &fit.true_volume
+            && let Some(found) = compare(fit.file, &mut fit.trainer, state, truth)
         {
             line["psnr_db"] = json!(found.psnr_db);
             line["nrmse"] = json!(found.nrmse);
