@@ -2,7 +2,6 @@
 
 use super::device::{Adapter, Device, Needs};
 use super::error::GpuError;
-use super::kernel::readable;
 use super::times::{KernelTime, Stopwatch};
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -93,6 +92,12 @@ impl Commands {
         self.encoder.clear_buffer(&buffer.inner, 0, None);
     }
 
+    /// Copies a buffer to one of the same size.
+    fn copy(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer) {
+        self.pass = None;
+        self.encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
+    }
+
     fn submit(mut self, device: &Device) -> Option<Stopwatch> {
         // The end of a pass is written when it is dropped.
         self.pass = None;
@@ -140,7 +145,7 @@ impl Compute {
     /// # Errors
     /// If there is not so much.
     pub fn storage(&self, bytes: u64) -> Result<Buffer, GpuError> {
-        self.made(bytes, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC)
+        self.made(bytes, &[], wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC)
     }
 
     /// A uniform with these bytes.
@@ -148,24 +153,36 @@ impl Compute {
     /// # Errors
     /// If the device fails.
     pub fn uniform(&self, bytes: &[u8]) -> Result<Buffer, GpuError> {
-        let made = self.made(bytes.len() as u64, wgpu::BufferUsages::UNIFORM)?;
-        self.write(&made, bytes)?;
-        Ok(made)
+        self.made(bytes.len() as u64, bytes, wgpu::BufferUsages::UNIFORM)
     }
 
-    fn made(&self, bytes: u64, usage: wgpu::BufferUsages) -> Result<Buffer, GpuError> {
+    /// Memory with these bytes, which shaders read.
+    pub(super) fn input(&self, bytes: &[u8]) -> Result<Buffer, GpuError> {
+        self.made(bytes.len() as u64, bytes, wgpu::BufferUsages::STORAGE)
+    }
+
+    fn made(
+        &self,
+        bytes: u64,
+        content: &[u8],
+        usage: wgpu::BufferUsages,
+    ) -> Result<Buffer, GpuError> {
         // No binding may be empty.
         let size = bytes.max(32).next_multiple_of(16);
         if size > self.device.largest {
             return Err(GpuError::OutOfMemory { bytes });
         }
         let inner = self.device.attempt(size, || {
-            self.device.inner.create_buffer(&wgpu::BufferDescriptor {
+            let made = self.device.inner.create_buffer(&wgpu::BufferDescriptor {
                 label: None,
                 size,
                 usage: usage | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
-            })
+            });
+            if !content.is_empty() {
+                self.device.queue.write_buffer(&made, 0, content);
+            }
+            made
         })?;
         Ok(Buffer { inner })
     }
@@ -205,9 +222,11 @@ impl Compute {
         unsafe { self.compiled(source, entries, wgpu::ShaderRuntimeChecks::unchecked()) }
     }
 
+    /// Compiles with some checks.
+    ///
     /// # Safety
     /// Without the checks that are not made, the shader does no harm.
-    unsafe fn compiled(
+    pub(super) unsafe fn compiled(
         &self,
         source: &str,
         entries: &[&str],
@@ -310,17 +329,27 @@ impl Compute {
         buffers: &[&Buffer],
         made: impl Fn(&[u8]) -> T,
     ) -> Result<Vec<T>, GpuError> {
+        self.run_and_read(|_| {}, buffers, made)
+    }
+
+    /// Hands commands to the device, untimed, and reads the bytes of buffers once all are done.
+    pub(super) fn run_and_read<T>(
+        &self,
+        record: impl FnOnce(&mut Commands),
+        buffers: &[&Buffer],
+        made: impl Fn(&[u8]) -> T,
+    ) -> Result<Vec<T>, GpuError> {
         let bytes = buffers.iter().map(|buffer| buffer.inner.size()).sum();
         let copies = self.device.attempt(bytes, || {
-            let descriptor = wgpu::CommandEncoderDescriptor::default();
-            let mut encoder = self.device.inner.create_command_encoder(&descriptor);
+            let mut commands = Commands::new(&self.device, false);
+            record(&mut commands);
             let copied = buffers.iter().map(|Buffer { inner }| {
                 let to = self.reader(inner.size());
-                encoder.copy_buffer_to_buffer(inner, 0, &to, 0, inner.size());
+                commands.copy(inner, &to);
                 to
             });
             let copies: Vec<_> = copied.collect();
-            self.device.queue.submit([encoder.finish()]);
+            commands.submit(&self.device);
             copies
         })?;
         let read = self.device.read(&copies, made)?;
@@ -333,7 +362,7 @@ impl Compute {
     fn reader(&self, size: u64) -> wgpu::Buffer {
         let mut readers = self.readers.lock().unwrap_or_else(PoisonError::into_inner);
         let found = readers.iter().position(|reader| reader.size() == size);
-        found.map_or_else(|| readable(&self.device, size), |k| readers.swap_remove(k))
+        found.map_or_else(|| self.device.readable(size), |k| readers.swap_remove(k))
     }
 
     /// Gives the device up: everything after that is [`GpuError::Lost`]. What a card that is unplugged does, for tests.

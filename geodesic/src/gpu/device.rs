@@ -246,6 +246,16 @@ impl Device {
         buffers.iter().map(read).collect()
     }
 
+    /// Makes a buffer that is copied to, and read.
+    pub fn readable(&self, size: u64) -> wgpu::Buffer {
+        self.inner.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size,
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        })
+    }
+
     fn poll(&self, until: wgpu::PollType) -> Result<(), GpuError> {
         let polled = caught(|| self.inner.poll(until)).map_err(GpuError::Lost)?;
         polled.map(|_| ()).map_err(|error| GpuError::Failed(error.to_string()))

@@ -1,9 +1,9 @@
 //! Whole rays of a picture, followed step by step on a graphics device.
 
 use super::bytes::{float, single};
-use super::device::Device;
+use super::compute::{Compute, Kernel};
 use super::error::GpuError;
-use super::kernel::{Binding, Program, whole_rays};
+use super::kernel::{self, whole_rays};
 use crate::integrate::assembly::TaylorStep;
 use crate::rays::block::{DeviceEnd, DevicePaths};
 use crate::screen::view::View;
@@ -12,31 +12,27 @@ use crate::wgsl::{self, STEP_BYTES};
 
 /// The kernel `kerr_path`.
 #[derive(Debug)]
-pub(super) struct PathKernel {
-    program: Program,
-}
+pub(super) struct PathKernel(Vec<Kernel>);
 
 /// Steps that a ray gets room for beyond those that another kernel has counted: compilers round each in its own way.
 const SPARE: usize = 2;
 
 impl PathKernel {
-    pub fn new(device: &Device) -> Result<Self, GpuError> {
-        let kinds = bindings(&[], [&[]; 2], 0);
-        let program = Program::new(device, &wgsl::paths(), &["kerr_path"], &kinds)?;
-        Ok(PathKernel { program })
+    pub fn new(device: &Compute) -> Result<Self, GpuError> {
+        Ok(PathKernel(kernel::compiled(device, &wgsl::paths(), &["kerr_path"])?))
     }
 
     /// Follows the rays at the points (`x[k]`, `y[k]`), whose `ends` are known with quadratures, all the way.
     pub fn follow(
         &self,
-        device: &Device,
+        device: &Compute,
         (hole, view): (&Kerr, &View),
         (x, y): (&[f64], &[f64]),
         ends: &[DeviceEnd],
         paths: &mut DevicePaths,
     ) -> Result<(), GpuError> {
         paths.clear();
-        let most = (device.largest / STEP_BYTES as u64) as usize;
+        let most = (device.largest_buffer() / STEP_BYTES as u64) as usize;
         let mut first = 0;
         while first < ends.len() {
             let mut steps = 0;
@@ -54,7 +50,7 @@ impl PathKernel {
 
     fn follow_some(
         &self,
-        device: &Device,
+        device: &Compute,
         (hole, view): (&Kerr, &View),
         points: &[u8],
         ends: &[DeviceEnd],
@@ -66,9 +62,8 @@ impl PathKernel {
             rooms.extend([all, room(end)].into_iter().flat_map(|word| (word as u32).to_le_bytes()));
             all += room(end);
         }
-        let uniform = task.bytes();
-        let bindings = bindings(&uniform, [points, &rooms], (all * STEP_BYTES) as u64);
-        let outputs = self.program.run(device, &[0], task.rays, &bindings)?;
+        let (inputs, room) = ([points, &rooms], [(all * STEP_BYTES) as u64]);
+        let outputs = kernel::run(device, &self.0, task.rays, &task.bytes(), &inputs, &room)?;
         let mut rest = &outputs[0][..];
         for end in ends {
             let (own, others) = rest.split_at(room(end) * STEP_BYTES);
@@ -105,9 +100,4 @@ fn step(bytes: &[u8]) -> TaylorStep {
         *coefficient = single(bytes, 6 + k);
     }
     step
-}
-
-fn bindings<'a>(uniform: &'a [u8], inputs: [&'a [u8]; 2], steps: u64) -> [Binding<'a>; 4] {
-    let [points, rooms] = inputs.map(Binding::Input);
-    [Binding::Uniform(uniform), points, rooms, Binding::Output(steps)]
 }

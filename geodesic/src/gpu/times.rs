@@ -2,7 +2,6 @@
 
 use super::device::Device;
 use super::error::GpuError;
-use super::kernel::readable;
 use std::sync::Arc;
 
 /// Time that a kernel took.
@@ -82,7 +81,7 @@ impl Stopwatch {
     /// Returns the times of the kernels, once they are done.
     pub fn read(self, device: &Device) -> Result<Vec<KernelTime>, GpuError> {
         let to = device.attempt(self.resolved.size(), || {
-            let to = readable(device, self.resolved.size());
+            let to = device.readable(self.resolved.size());
             let descriptor = wgpu::CommandEncoderDescriptor::default();
             let mut encoder = device.inner.create_command_encoder(&descriptor);
             encoder.copy_buffer_to_buffer(&self.resolved, 0, &to, 0, to.size());

@@ -1,9 +1,10 @@
 //! Rays of a picture, traced on a graphics device.
 
 use super::bytes::{float, word};
-use super::device::{Adapter, Device, Needs};
+use super::compute::{Compute, Kernel};
+use super::device::{Adapter, Needs};
 use super::error::GpuError;
-use super::kernel::{Binding, Program, ROW, whole_rays};
+use super::kernel::{self, ROW, whole_rays};
 use super::paths::PathKernel;
 use super::sums::test_sums;
 use crate::error::Error;
@@ -37,9 +38,11 @@ use std::sync::{Mutex, PoisonError};
 /// ```
 #[derive(Debug)]
 pub struct GpuTracer {
-    device: Device,
-    program: Program,
-    places: Program,
+    device: Compute,
+    /// `kerr_trace` and `kerr_sample`.
+    rays: Vec<Kernel>,
+    /// `kerr_place`.
+    places: Vec<Kernel>,
     paths: PathKernel,
     failure: Mutex<Option<GpuError>>,
 }
@@ -50,24 +53,17 @@ impl GpuTracer {
     /// # Errors
     /// If the device refuses, is too small, or if its driver does not keep sums of two floats as they are.
     pub fn open(adapter: &Adapter) -> Result<Self, GpuError> {
-        let device = Device::open(adapter, Needs::default())?;
+        let device = Compute::open(adapter, Needs::default())?;
         test_sums(&device)?;
-        let kinds = bindings(&[], &[], [0; 3]);
-        let program =
-            Program::new(&device, &wgsl::program(), &["kerr_trace", "kerr_sample"], &kinds)?;
-        let places = Program::new(
-            &device,
-            &wgsl::places(),
-            &["kerr_place"],
-            &node_bindings(&[], [&[]; 3], 0),
-        )?;
+        let rays = kernel::compiled(&device, &wgsl::program(), &["kerr_trace", "kerr_sample"])?;
+        let places = kernel::compiled(&device, &wgsl::places(), &["kerr_place"])?;
         let paths = PathKernel::new(&device)?;
-        Ok(GpuTracer { device, program, places, paths, failure: Mutex::default() })
+        Ok(GpuTracer { device, rays, places, paths, failure: Mutex::default() })
     }
 
     /// The name of the device.
     pub fn name(&self) -> &str {
-        &self.device.name
+        self.device.name()
     }
 
     /// Traces the rays that arrive at the points (`x[k]`, `y[k]`) of `view`: (α, β) in M of an observer, tangents of
@@ -120,7 +116,7 @@ impl GpuTracer {
         nodes: &mut NodeColumns,
     ) -> Result<(), GpuError> {
         assert!(x.len() == y.len() && spans.len() == x.len(), "as many y and spans as x");
-        let most = (self.device.largest / NODE_BYTES as u64) as usize;
+        let most = (self.device.largest_buffer() / NODE_BYTES as u64) as usize;
         let pieces: Vec<Piece> = spans.iter().enumerate().flat_map(pieces).collect();
         let mut rest = &pieces[..];
         while let Some((_, Range { start, .. })) = rest.first() {
@@ -168,10 +164,9 @@ impl GpuTracer {
         let spans: Vec<u8> = words.flat_map(|word| (word as u32).to_le_bytes()).collect();
         let times = nodes.mino_times()[all.clone()].iter().map(|time| *time as f32);
         let times: Vec<u8> = times.flat_map(f32::to_le_bytes).collect();
-        let size = (all.len() * NODE_BYTES) as u64;
-        let uniform = task.bytes();
-        let bindings = node_bindings(&uniform, [&points, &spans, &times], size);
-        let outputs = self.places.run(&self.device, &[0], task.rays, &bindings)?;
+        let (inputs, room) = ([&points[..], &spans, &times], [(all.len() * NODE_BYTES) as u64]);
+        let (device, kernels) = (&self.device, &self.places);
+        let outputs = kernel::run(device, kernels, task.rays, &task.bytes(), &inputs, &room)?;
         let start = task.delay_start();
         for (k, bytes) in all.zip(outputs[0].chunks_exact(NODE_BYTES)) {
             let step = (nodes.mino_times()[k], nodes.weights()[k]);
@@ -191,7 +186,7 @@ impl GpuTracer {
         let DeviceRequest { crossings, samples, .. } = request;
         let widest = (crossings * CROSSING_BYTES).max(samples * SAMPLE_BYTES).max(END_BYTES);
         let rows = u64::from(ROW) * 4096;
-        (self.device.largest / widest as u64).clamp(1, rows) as usize
+        (self.device.largest_buffer() / widest as u64).clamp(1, rows) as usize
     }
 
     fn trace_some(
@@ -201,16 +196,15 @@ impl GpuTracer {
         rays: &mut DeviceRays,
     ) -> Result<(), GpuError> {
         let points = wgsl::point_bytes(x, y);
-        let uniform = task.bytes();
         let count = x.len();
         let sizes = [
             count * END_BYTES,
             count * task.crossings as usize * CROSSING_BYTES,
             count * task.samples as usize * SAMPLE_BYTES,
         ];
-        let bindings = bindings(&uniform, &points, sizes.map(|size| size as u64));
-        let entries: &[usize] = if task.samples > 0 { &[0, 1] } else { &[0] };
-        let outputs = self.program.run(&self.device, entries, task.rays, &bindings)?;
+        let kernels = &self.rays[..1 + usize::from(task.samples > 0)];
+        let (device, room) = (&self.device, sizes.map(|size| size as u64));
+        let outputs = kernel::run(device, kernels, task.rays, &task.bytes(), &[&points], &room)?;
         let start = task.delay_start();
         let sized = |k: usize| &outputs[k][..sizes[k]];
         rays.extend(
@@ -268,16 +262,6 @@ impl RayDevice for GpuTracer {
         let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
         failure.as_ref().map(ToString::to_string)
     }
-}
-
-fn bindings<'a>(uniform: &'a [u8], points: &'a [u8], sizes: [u64; 3]) -> [Binding<'a>; 5] {
-    let [ends, crossings, samples] = sizes.map(Binding::Output);
-    [Binding::Uniform(uniform), Binding::Input(points), ends, crossings, samples]
-}
-
-fn node_bindings<'a>(uniform: &'a [u8], inputs: [&'a [u8]; 3], nodes: u64) -> [Binding<'a>; 5] {
-    let [points, spans, times] = inputs.map(Binding::Input);
-    [Binding::Uniform(uniform), points, spans, times, Binding::Output(nodes)]
 }
 
 fn end(bytes: &[u8]) -> DeviceEnd {
