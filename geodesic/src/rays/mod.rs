@@ -13,8 +13,6 @@ pub(crate) mod integrator;
 mod length;
 pub mod node_gradients;
 pub mod nodes;
-#[cfg(feature = "rayon")]
-mod parallel;
 pub(crate) mod path_length;
 pub(crate) mod request;
 mod sampling;
