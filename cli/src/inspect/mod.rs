@@ -10,7 +10,7 @@ use crate::output;
 use anyhow::{Context, bail};
 use clap::Args;
 use kerrlight_render::image::exr::{self, Attributes, ChannelSurvey, Survey};
-use kerrlight_render::picture::all_channels;
+use kerrlight_render::picture::CHANNELS;
 use kerrlight_vlbi::files;
 use serde_json::{Value, json};
 use std::io::{BufReader, Read};
@@ -124,7 +124,7 @@ fn channel_table(survey: &Survey) -> String {
 
 /// The unit of a channel, where kerrlight wrote it.
 fn unit<'a>(name: &str, attributes: &'a Attributes) -> &'a str {
-    let kind = all_channels().find(|kind| kind.name == name);
+    let kind = CHANNELS.iter().find(|kind| kind.name == name);
     match kind.map(|kind| kind.unit) {
         Some(unit) if !attributes.is_empty() => attributes.get(unit).map_or(unit, String::as_str),
         _ => "",

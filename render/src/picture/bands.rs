@@ -141,8 +141,7 @@ impl Raster {
         let Pixels { pixels, layers } = Pixels::joined(&parts, width, rows);
         let mut channels = Vec::with_capacity(self.channels.len());
         for kind in &self.channels {
-            let unit = if kind.scales { self.unit } else { 1.0 };
-            let values = kind.values(&pixels, &layers, unit);
+            let values = kind.values(&pixels, &layers, self.unit);
             if !values.iter().all(|value| value.is_finite()) {
                 return Err(RenderError::NotFinite { channel: kind.name }.into());
             }

@@ -2,14 +2,8 @@
 
 use super::RenderError;
 use super::channels::{CHANNELS, ChannelKind};
-use super::requested::REQUESTED;
 use crate::Error;
 use crate::transport::PreparedScene;
-
-/// Every channel, those on request last.
-pub fn all_channels() -> impl Iterator<Item = &'static ChannelKind> {
-    CHANNELS.iter().chain(&REQUESTED)
-}
 
 /// The channels of a picture of `prepared`: all that it has, or those requested.
 pub(super) fn chosen(
@@ -18,9 +12,9 @@ pub(super) fn chosen(
     asked: Option<&[String]>,
 ) -> Result<Vec<&'static ChannelKind>, Error> {
     let there = |kind: &&ChannelKind| (kind.present)(prepared, refined);
-    let all: Vec<&ChannelKind> = all_channels().filter(there).collect();
+    let all: Vec<&ChannelKind> = CHANNELS.iter().filter(there).collect();
     let Some(asked) = asked else {
-        return Ok(all.into_iter().filter(|kind| !kind.on_request).collect());
+        return Ok(all.into_iter().filter(|kind| !kind.is_on_request()).collect());
     };
     if let Some(name) = asked.iter().find(|name| !all.iter().any(|kind| kind.is_meant(name))) {
         let there: Vec<&str> = all.iter().map(|kind| kind.name).collect();
@@ -29,7 +23,7 @@ pub(super) fn chosen(
     // In the list's order, each once.
     let is_meant = |kind: &&ChannelKind| asked.iter().any(|name| kind.is_meant(name));
     let chosen: Vec<&ChannelKind> = all.into_iter().filter(is_meant).collect();
-    match chosen.iter().find(|kind| kind.on_request && refined) {
+    match chosen.iter().find(|kind| kind.is_on_request() && refined) {
         Some(kind) => Err(RenderError::Refined { channel: kind.name }.into()),
         None => Ok(chosen),
     }

@@ -128,7 +128,7 @@ impl Raster {
             return;
         }
         for (kind, values) in self.channels.iter().zip(channels) {
-            if kind.scales {
+            if kind.scales() {
                 values.iter_mut().for_each(|value| *value = (f64::from(*value) * factor) as f32);
             }
         }

@@ -14,16 +14,13 @@ mod layers;
 mod pixels;
 mod placement;
 mod raw;
-mod requested;
 mod rings;
 mod tally;
 mod workspace;
 
 pub use channels::{CHANNELS, ChannelKind};
-pub use choice::all_channels;
 pub use journal::{AnyJournal, Found, Journal};
 pub use raw::Frame;
-pub use requested::REQUESTED;
 pub use rings::{RingStrata, Stratum};
 pub use tally::{Summary, own_unit};
 
