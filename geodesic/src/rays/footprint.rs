@@ -118,13 +118,6 @@ impl Sky {
         let in_frame = |v: &[f64; 3]| [dot(right, *v), dot(up, *v)];
         Ellipse::of_map([in_frame(&self.by_first), in_frame(&self.by_second)])
     }
-
-    /// The longer axis of [`ellipse`](Self::ellipse) as a unit vector in space.
-    pub fn major_axis(&self) -> [f64; 3] {
-        let [right, up] = self.frame();
-        let (sin, cos) = self.ellipse().orientation.sin_cos();
-        core::array::from_fn(|k| cos * right[k] + sin * up[k])
-    }
 }
 
 /// Point where a ray meets the equatorial plane, and how that changes with the screen.
@@ -144,18 +137,7 @@ impl Disc {
     /// The patch of the plane that a circle on the screen covers, with (dr, r dφ) as Cartesian
     /// coordinates: what a texture painted in r cos φ, r sin φ needs.
     pub fn ellipse(&self) -> Ellipse {
-        self.ellipse_with([1.0, self.radius])
-    }
-
-    /// The same in proper lengths in the equatorial plane at constant time: g_rr = r²/Δ and
-    /// g_φφ = r² + a² + 2a²/r. Infinite at the horizon.
-    pub fn proper_ellipse(&self, hole: &Kerr) -> Ellipse {
-        let (r, a) = (self.radius, hole.spin());
-        self.ellipse_with([r / hole.delta(r).sqrt(), (r * r + a * a * (1.0 + 2.0 / r)).sqrt()])
-    }
-
-    fn ellipse_with(&self, [radial, around]: [f64; 2]) -> Ellipse {
-        let column = |k: usize| [radial * self.radius_by[k], around * self.azimuth_by[k]];
+        let column = |k: usize| [self.radius_by[k], self.radius * self.azimuth_by[k]];
         Ellipse::of_map([column(0), column(1)])
     }
 }

@@ -136,10 +136,6 @@ fn exact_flat_limit_of_a_camera() {
         // The lens stretches along the direction to the axis less than across it.
         let expected = 1.0 / (1.0 + x * x + y * y).sqrt();
         assert!((sky.ellipse().semi_major / expected - 1.0).abs() < 1e-5);
-        let towards = sky.major_axis();
-        let n = sky.direction;
-        let along: f64 = n.iter().zip(towards).map(|(n, t)| n * t).sum();
-        assert!(along.abs() < 1e-12);
     }
 }
 
@@ -168,18 +164,16 @@ fn exact_ellipses_of_maps() {
     assert_eq!((nothing.semi_major, nothing.semi_minor), (0.0, 0.0));
 }
 
-/// Close to face-on and far out the plane is seen undistorted; proper lengths agree there.
+/// Close to face-on and far out the plane is seen undistorted.
 #[test]
 fn exact_far_disc() {
     let hole = Kerr::new(0.6).unwrap();
     let observer = at_infinity(0.0);
     let beams = footprint::of_screen(&hole, &observer, &[3e5], &[4e5], 1e-12, 1).unwrap();
-    let disc = beams.of(0)[0];
-    for ellipse in [disc.ellipse(), disc.proper_ellipse(&hole)] {
-        assert!((ellipse.semi_major - 1.0).abs() < 1e-5, "{ellipse:?}");
-        assert!((ellipse.semi_minor - 1.0).abs() < 1e-5);
-        assert!((ellipse.magnification - 1.0).abs() < 1e-5);
-    }
+    let ellipse = beams.of(0)[0].ellipse();
+    assert!((ellipse.semi_major - 1.0).abs() < 1e-5, "{ellipse:?}");
+    assert!((ellipse.semi_minor - 1.0).abs() < 1e-5);
+    assert!((ellipse.magnification - 1.0).abs() < 1e-5);
 }
 
 #[test]
