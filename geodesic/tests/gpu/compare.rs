@@ -4,35 +4,30 @@ use crate::classes::Picture;
 use kerrlight_geodesic::gpu::GpuTracer;
 use kerrlight_geodesic::vector::distance;
 use kerrlight_geodesic::{DeviceRays, DeviceRequest, Outcome, Path, PathPoint, Quantities, Tracer};
+use std::collections::BTreeMap;
 
 /// Crossings that are compared, and samples.
 const CROSSINGS: usize = 4;
-pub const SAMPLES: usize = 20;
+const SAMPLES: usize = 20;
+
+/// Name of the counts of steps, which are kept among the errors.
+pub const STEPS: &str = "steps";
 
 /// The errors of a class.
 #[derive(Default)]
 pub struct Errors {
     pub rays: usize,
-    /// Rays that floats do not vouch for.
+    /// Rays that the device does not vouch for.
     pub flagged: usize,
-    /// Rays of the other fate, or with another number of crossings, that are not flagged.
+    /// Rays of the other fate, or with other events, that are not flagged.
     pub wrong: usize,
-    /// Crossings: radii (relative), azimuths (radians), delays (M, in units of what the impact parameter is).
-    pub radius: Vec<f64>,
-    pub azimuth: Vec<f64>,
-    pub delay: Vec<f64>,
-    /// Directions of escape, radians.
-    pub exit: Vec<f64>,
-    /// Samples: radii (relative) and polar angles.
-    pub sample: Vec<f64>,
-    /// Steps.
-    pub steps: Vec<f64>,
+    /// Errors by quantity.
+    pub of: BTreeMap<&'static str, Vec<f64>>,
 }
 
 impl Errors {
-    pub fn columns(&mut self) -> [(&'static str, &mut Vec<f64>); 5] {
-        let Errors { radius, azimuth, delay, exit, sample, .. } = self;
-        [("r", radius), ("φ", azimuth), ("delay", delay), ("exit", exit), ("samples", sample)]
+    pub fn push(&mut self, what: &'static str, error: f64) {
+        self.of.entry(what).or_default().push(error);
     }
 }
 
@@ -75,10 +70,11 @@ pub fn compare(tracer: &GpuTracer, picture: &Picture, errors: &mut Errors) {
     }
 }
 
-/// Compares ray `k`; whether its fate and its number of crossings are right.
+/// Compares ray `k`; whether its fate and its number of crossings are right. Radii and samples are compared by their
+/// ratio, delays in units of what the impact parameter is.
 fn agree(rays: &DeviceRays, k: usize, path: &Path, errors: &mut Errors) -> bool {
     let end = &rays.ends()[k];
-    errors.steps.push(f64::from(end.steps));
+    errors.push(STEPS, f64::from(end.steps));
     if end.outcome != path.outcome() || end.crossings as usize != path.equatorial_crossings().len()
     {
         return false;
@@ -86,13 +82,13 @@ fn agree(rays: &DeviceRays, k: usize, path: &Path, errors: &mut Errors) -> bool 
     let scale = (end.eta + end.lambda * end.lambda).max(1.0).sqrt();
     for (found, time) in rays.crossings_of(k).iter().zip(path.equatorial_crossings()) {
         let point = path.at(time);
-        errors.radius.push((found.radius * point.inverse_radius - 1.0).abs());
-        errors.azimuth.push((found.azimuth - point.azimuth).abs());
-        errors.delay.push((found.delay - point.delay).abs() / scale.max(point.radius()));
+        errors.push("r", (found.radius * point.inverse_radius - 1.0).abs());
+        errors.push("φ", (found.azimuth - point.azimuth).abs());
+        errors.push("delay", (found.delay - point.delay).abs() / scale.max(point.radius()));
     }
     if end.outcome == Outcome::Escaped {
         let last = path.at(path.mino_total());
-        errors.exit.push(distance(end.exit, last.direction));
+        errors.push("exit", distance(end.exit, last.direction));
     }
     samples(rays, k, path, errors);
     true
@@ -116,6 +112,6 @@ fn samples(rays: &DeviceRays, k: usize, path: &Path, errors: &mut Errors) {
             continue;
         }
         let radial = (sample.radius * point.inverse_radius - 1.0).abs();
-        errors.sample.push(radial.max((sample.theta - point.theta()).abs()));
+        errors.push("samples", radial.max((sample.theta - point.theta()).abs()));
     }
 }

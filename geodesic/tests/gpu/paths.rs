@@ -1,6 +1,7 @@
 //! Paths that a device has followed, against those of the tracer in doubles.
 
-use crate::classes::{Class, Picture};
+use crate::classes::Picture;
+use crate::compare::Errors;
 use kerrlight_geodesic::gpu::GpuTracer;
 use kerrlight_geodesic::vector::distance;
 use kerrlight_geodesic::{DevicePaths, Outcome, Path, PathPoint, Quantities, Tracer};
@@ -8,49 +9,9 @@ use kerrlight_geodesic::{DevicePaths, Outcome, Path, PathPoint, Quantities, Trac
 /// Places on each ray that are compared, its ends left out.
 const PLACES: usize = 40;
 
-/// The errors of a class.
-#[derive(Default)]
-pub struct Errors {
-    pub rays: usize,
-    /// Rays that the device does not vouch for.
-    pub unknown: usize,
-    /// Rays of another fate or with other events than those of the tracer.
-    pub wrong: usize,
-    /// Radii, relative.
-    radius: Vec<f64>,
-    /// Polar angles, radians.
-    theta: Vec<f64>,
-    /// Azimuths, radians, times 1 − r₊/r: they diverge at the horizon.
-    azimuth: Vec<f64>,
-    /// Delays in units of the larger of radius and impact parameter, times 1 − r₊/r.
-    delay: Vec<f64>,
-    /// d(1/r)/dτ, and dn/dτ by the impact parameter.
-    rates: Vec<f64>,
-    /// Mino times of crossings, turning points and the ends of the parts in a shell, by that of the ray.
-    events: Vec<f64>,
-}
-
-impl Errors {
-    pub fn columns(&mut self) -> [(&'static str, &mut Vec<f64>); 6] {
-        let Errors { radius, theta, azimuth, delay, rates, events, .. } = self;
-        [
-            ("r", radius),
-            ("θ", theta),
-            ("φ", azimuth),
-            ("delay", delay),
-            ("rates", rates),
-            ("events", events),
-        ]
-    }
-}
-
-pub fn compare(tracer: &GpuTracer, class: &Class) -> Errors {
-    let mut errors = Errors::default();
-    class.pictures.iter().for_each(|picture| add(tracer, picture, &mut errors));
-    errors
-}
-
-fn add(tracer: &GpuTracer, Picture { hole, view, x, y }: &Picture, errors: &mut Errors) {
+/// Adds a picture's errors.
+pub fn compare(tracer: &GpuTracer, picture: &Picture, errors: &mut Errors) {
+    let Picture { hole, view, x, y } = picture;
     let mut paths = DevicePaths::default();
     tracer.follow(hole, view, (x, y), &mut paths).unwrap();
     assert_eq!(paths.len(), x.len());
@@ -61,7 +22,7 @@ fn add(tracer: &GpuTracer, Picture { hole, view, x, y }: &Picture, errors: &mut 
         errors.rays += 1;
         reference.trace(hole, &ray, Quantities::ALL, &mut exact);
         let Some(error) = paths.assemble(k, hole, &ray, &mut found) else {
-            errors.unknown += 1;
+            errors.flagged += 1;
             continue;
         };
         assert!((1e-7..1e-3).contains(&error), "({x}, {y}): {error:e}");
@@ -83,7 +44,7 @@ fn agree(horizon: f64, exact: &Path, found: &Path, errors: &mut Errors) -> bool 
     if ends(exact) != ends(found) || own.len() != theirs.len() {
         return false;
     }
-    errors.events.extend(own.iter().zip(theirs).map(|(a, b)| (a - b).abs() / total));
+    own.iter().zip(theirs).for_each(|(a, b)| errors.push("events", (a - b).abs() / total));
     for k in 1..PLACES {
         let time = total * k as f64 / PLACES as f64;
         points([exact.at(time), found.at(time)], horizon, exact.angular_rate(), errors);
@@ -91,27 +52,29 @@ fn agree(horizon: f64, exact: &Path, found: &Path, errors: &mut Errors) -> bool 
     exact.outcome() == Outcome::Captured || escapes([exact, found], errors)
 }
 
+/// Compares places: radii by their ratio; azimuths and delays times 1 − r₊/r, since they diverge at the horizon, delays
+/// in units of the larger of radius and impact parameter; d(1/r)/dτ, and dn/dτ by the impact parameter.
 fn points([a, b]: [PathPoint; 2], horizon: f64, impact: f64, errors: &mut Errors) {
     let gap = (1.0 - horizon * a.inverse_radius).max(0.0);
-    errors.radius.push((b.radius() * a.inverse_radius - 1.0).abs());
-    errors.theta.push((a.theta() - b.theta()).abs());
-    errors.azimuth.push((a.azimuth - b.azimuth).abs() * gap);
-    errors.delay.push((a.delay - b.delay).abs() / impact.max(a.radius()) * gap);
+    errors.push("r", (b.radius() * a.inverse_radius - 1.0).abs());
+    errors.push("θ", (a.theta() - b.theta()).abs());
+    errors.push("φ", (a.azimuth - b.azimuth).abs() * gap);
+    errors.push("delay", (a.delay - b.delay).abs() / impact.max(a.radius()) * gap);
     let speed = (a.inverse_radius_rate - b.inverse_radius_rate).abs();
     // Without the part that diverges with the azimuth.
     let across = (a.velocity[2] - b.velocity[2]).abs() / impact;
-    errors.rates.push(speed.max(across));
+    errors.push("rates", speed.max(across));
 }
 
 /// The direction in which a ray escapes, and its parts in a shell; whether there are as many.
 fn escapes(paths: [&Path; 2], errors: &mut Errors) -> bool {
     let total = paths[0].mino_total();
     let [a, b] = paths.map(|path| path.at(path.mino_total()).direction);
-    errors.theta.push(distance(a, b));
+    errors.push("θ", distance(a, b));
     let mut parts = [Vec::new(), Vec::new()];
     paths.iter().zip(&mut parts).for_each(|(path, parts)| path.intervals_within(9.0, 12.0, parts));
     let [a, b] = parts;
     let ends = a.iter().flatten().zip(b.iter().flatten());
-    errors.events.extend(ends.map(|(a, b)| (a - b).abs() / total));
+    ends.for_each(|(a, b)| errors.push("events", (a - b).abs() / total));
     a.len() == b.len()
 }
