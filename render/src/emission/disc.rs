@@ -16,6 +16,8 @@ pub struct DiscModel {
     scale: f64,
     inner: f64,
     outer: f64,
+    /// 1/r of its outer edge, of its inner one and of the horizon.
+    pub(crate) inverse: [f64; 3],
     /// True if it hides what is behind it.
     pub opaque: bool,
     color: [f32; 3],
@@ -42,15 +44,19 @@ impl DiscModel {
     pub fn new(disc: &Disc, hole: &Kerr) -> Self {
         let profile = PageThorne::new(hole);
         let (_, peak) = profile.peak();
-        let isco = orbits::isco(hole);
-        let inner = disc.inner_edge.unwrap_or(isco);
+        let inner = match disc.plunging {
+            Some(_) => hole.horizon(),
+            None => disc.inner_edge.unwrap_or_else(|| orbits::isco(hole)),
+        };
+        let outer = disc.outer_edge;
         DiscModel {
             hole: *hole,
             profile,
             peak,
             scale: disc.peak_intensity / peak,
-            inner: if disc.plunging.is_some() { hole.horizon() } else { inner },
-            outer: disc.outer_edge,
+            inner,
+            outer,
+            inverse: [outer, inner, hole.horizon()].map(f64::recip),
             opaque: disc.opaque,
             color: disc.color,
             black_body: disc.peak_temperature_k.map(|t| (t, BlackBody::new(t))),

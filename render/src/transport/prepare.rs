@@ -3,12 +3,13 @@
 use super::layers::{Numbering, Wanted};
 use super::optics::Optics;
 use super::polarized::Polarization;
-use super::sources::disc::{CROSSINGS, Disc};
+use super::sources::disc::CROSSINGS;
 use super::sources::media::Media;
 use super::sources::meshes::Meshes;
 use super::sources::sky::Sky;
 use super::sources::spots::Spots;
 use crate::Error;
+use crate::emission::disc::DiscModel;
 use crate::emission::mesh::MeshFile;
 use crate::emission::sky::{Catalogue, Panorama, SkyModel};
 use crate::scene::Scene;
@@ -52,7 +53,7 @@ pub struct PreparedScene {
     pub(super) sighting: BlockRequest,
     /// Time of observation, in M.
     pub(super) time: f64,
-    pub(super) disc: Option<Disc>,
+    pub(super) disc: Option<DiscModel>,
     pub(super) media: Media,
     pub(super) meshes: Option<Arc<Meshes>>,
     pub(super) spots: Spots,
@@ -140,7 +141,7 @@ impl PreparedScene {
             request: BlockRequest::default(),
             sighting: BlockRequest::default(),
             time: scene.observer.time,
-            disc: Disc::new(scene, &hole),
+            disc: scene.disc.as_ref().map(|disc| DiscModel::new(disc, &hole)),
             media: Media::new(scene, &assets.volumes, &hole)?,
             meshes: Meshes::new(scene, &assets.meshes, &hole)?.map(Arc::new),
             spots: Spots::new(scene, &hole),
@@ -159,7 +160,7 @@ impl PreparedScene {
             all_crossings: self.disc.is_some(),
             // dw/dτ tells whether light of plunging matter moves outward; its g depends on it.
             rates: self.optics.polarization.is_some()
-                || self.disc.as_ref().is_some_and(Disc::plunges),
+                || self.disc.as_ref().is_some_and(DiscModel::plunges),
             exit: self.sky.is_some() || self.optics.wanted.exit || self.optics.wanted.footprint,
             beams: self.optics.lensing && self.sky.as_ref().is_some_and(Sky::is_averaged),
             half_orbits,
@@ -292,7 +293,7 @@ impl PreparedScene {
 
     /// Returns whether there is a disc that hides what is behind it.
     pub fn has_opaque_disc(&self) -> bool {
-        self.disc.as_ref().is_some_and(Disc::is_opaque)
+        self.disc.as_ref().is_some_and(|disc| disc.opaque)
     }
 
     /// Spacing of rays, in the logarithm of their distance from the critical curve, that resolves what

@@ -1,7 +1,6 @@
 //! The thin disc in the equatorial plane.
 
 use crate::emission::disc::{DiscModel, Photon};
-use crate::scene::Scene;
 use crate::transport::layers::Origin;
 use crate::transport::optics::Optics;
 use crate::transport::polarized::{PolarizedRay, share};
@@ -10,15 +9,6 @@ use kerrlight_geodesic::{Kerr, Outcome, PlaneCrossing, TracedRay, orbits};
 
 /// Crossings of a ray that are located in closed form; rays with more are traced step by step.
 pub(in crate::transport) const CROSSINGS: usize = 4;
-
-/// The disc of a scene.
-#[derive(Debug, Clone)]
-pub(in crate::transport) struct Disc {
-    model: DiscModel,
-    /// 1/r of its outer edge and of its inner one, and of the horizon.
-    edges: [f64; 2],
-    horizon: f64,
-}
 
 /// Radii at which the brightest light of a disc is looked for.
 const RADII: u32 = 8;
@@ -35,57 +25,39 @@ pub(in crate::transport) struct DiscRay<'a> {
     pub blueshift: Option<f64>,
 }
 
-impl Disc {
-    /// The disc of a scene, if it has one.
-    pub fn new(scene: &Scene, hole: &Kerr) -> Option<Self> {
-        let model = DiscModel::new(scene.disc.as_ref()?, hole);
-        let [inner, outer] = model.edges();
-        let edges = [1.0 / outer, 1.0 / inner];
-        Some(Disc { model, edges, horizon: 1.0 / hole.horizon() })
-    }
-
-    /// Returns whether it hides what is behind it.
-    pub fn is_opaque(&self) -> bool {
-        self.model.opaque
-    }
-
-    /// Returns whether some of its matter plunges.
-    pub fn plunges(&self) -> bool {
-        self.model.plunges()
-    }
-
+impl DiscModel {
     /// dx/dt of its matter at a point of the plane (M): on circular geodesics, or as it plunges.
-    pub fn velocity(&self, hole: &Kerr, [x, y, _]: [f64; 3]) -> [f64; 3] {
+    pub(in crate::transport) fn velocity(&self, hole: &Kerr, [x, y, _]: [f64; 3]) -> [f64; 3] {
         let r = x.hypot(y);
-        let rates = self.model.plunging_velocity(r).map(|[t, fall, _, turn]| [fall / t, turn / t]);
+        let rates = self.plunging_velocity(r).map(|[t, fall, _, turn]| [fall / t, turn / t]);
         let [fall, turn] = rates.unwrap_or([0.0, orbits::keplerian_angular_velocity(hole, r)]);
         [fall * x / r - turn * y, fall * y / r + turn * x, 0.0]
     }
 
     /// Returns whether it hides what is behind a crossing.
     #[inline]
-    pub fn hides_at(&self, crossing: &PlaneCrossing) -> bool {
-        self.model.opaque && self.model.covers(crossing.radius)
+    pub(in crate::transport) fn hides_at(&self, crossing: &PlaneCrossing) -> bool {
+        self.opaque && self.covers(crossing.radius)
     }
 
     /// Its brightest light along rays with these constants of motion, wherever they meet it; that of electrons in the field where
     /// light is polarised.
-    pub fn brightest(
+    pub(in crate::transport) fn brightest(
         &self,
         optics: &Optics,
         polarized: Option<PolarizedRay<'_>>,
         [lambda, eta]: [f64; 2],
     ) -> f64 {
-        let [inner, outer] = self.model.edges();
+        let [inner, outer] = self.edges();
         let light = |k: u32| {
             let r = inner + (outer - inner) * f64::from(k) / f64::from(RADII);
             let boost = match polarized {
-                Some(polarized) => polarized.brightest_of_disc(&self.model, r, eta),
+                Some(polarized) => polarized.brightest_of_disc(self, r, eta),
                 None => optics.spectral_index.map_or(1.0, |index| {
-                    self.model.redshift(r, &Photon { lambda, eta, outward: true }).powf(3.0 + index)
+                    self.redshift(r, &Photon { lambda, eta, outward: true }).powf(3.0 + index)
                 }),
             };
-            boost * self.model.intensity(r)
+            boost * self.intensity(r)
         };
         (0..=RADII).map(light).fold(0.0, f64::max)
     }
@@ -94,7 +66,7 @@ impl Disc {
     /// [`Passes`](crate::transport::result::Passes).
     #[inline]
     fn place(&self, inverse_radius: f64) -> f32 {
-        let [outer, inner] = self.edges;
+        let [outer, inner, _] = self.inverse;
         ((inverse_radius - outer) / (inner - outer)) as f32
     }
 
@@ -104,14 +76,19 @@ impl Disc {
         match ray.outcome {
             _ if ray.surface.is_some() || ray.until < ray.mino_total => 0.0,
             Outcome::Escaped => self.place(0.0),
-            Outcome::Captured => self.place(self.horizon),
+            Outcome::Captured => self.place(self.inverse[2]),
             _ => 0.0,
         }
     }
 
     /// Adds its light: I = g^{3+α} I_em at every crossing up to the ray's last light.
     #[inline(always)]
-    pub fn add(&self, optics: &Optics, seen: &DiscRay<'_>, light: &mut Accumulator) {
+    pub(in crate::transport) fn add(
+        &self,
+        optics: &Optics,
+        seen: &DiscRay<'_>,
+        light: &mut Accumulator,
+    ) {
         let end = seen.ray.last_time();
         let known = seen.crossings.len().min(PASSES);
         light.passes[known..].fill(self.end(seen.ray));
@@ -122,8 +99,8 @@ impl Disc {
             if let Some(place) = light.passes.get_mut(number) {
                 *place = self.place(1.0 / crossing.radius);
             }
-            if self.model.covers(crossing.radius) {
-                let kind = if self.model.plunges_at(crossing.radius) { 16 } else { 0 };
+            if self.covers(crossing.radius) {
+                let kind = if self.plunges_at(crossing.radius) { 16 } else { 0 };
                 light.disc_images |= 1 << (kind + number.min(15));
                 let depth = seen.depths.get(number).copied().unwrap_or(0.0);
                 self.add_crossing(optics, crossing, depth, seen, light);
@@ -146,22 +123,22 @@ impl Disc {
             Some(_) => {
                 // The backward ray falls where light moves outward.
                 let outward = crossing.rates[0] > 0.0;
-                self.model.redshift(r, &Photon { lambda, eta, outward })
+                self.redshift(r, &Photon { lambda, eta, outward })
             }
             None => 1.0,
         };
-        let stokes = seen.polarized.map(|polarized| polarized.of_disc(&self.model, crossing));
+        let stokes = seen.polarized.map(|polarized| polarized.of_disc(self, crossing));
         let boost = match stokes {
             // g^{3+α} is in it, with the field and the slant.
             Some(stokes) => stokes.i,
             None => optics.spectral_index.map_or(1.0, |index| g.powf(3.0 + index)),
         };
-        let mut intensity = boost * self.model.intensity(r);
+        let mut intensity = boost * self.intensity(r);
         if depth > 0.0 {
             intensity *= (-depth).exp();
         }
         let (color, mino_time) =
-            (self.model.color(r, g * seen.blueshift.unwrap_or(1.0)), crossing.mino_time);
+            (self.color(r, g * seen.blueshift.unwrap_or(1.0)), crossing.mino_time);
         light.add(intensity, g, color, mino_time);
         if let Some(stokes) = stokes {
             light.add_stokes(intensity, share(&stokes));
