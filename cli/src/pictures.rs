@@ -122,7 +122,7 @@ impl Shown {
     /// On a failure of the encoder.
     pub fn exr(&self) -> anyhow::Result<Vec<u8>> {
         let style = Style { camera: Some(self.camera), ..Style::default() };
-        Ok(exr::encode_in_style(&self.rendered.picture, &self.attributes, style)?)
+        Ok(exr::encode(&self.rendered.picture, &self.attributes, style)?)
     }
 
     /// The bytes of a PNG.

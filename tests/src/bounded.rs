@@ -89,7 +89,9 @@ fn exact_files_that_unpack_to_too_much_are_named() {
             values: vec![0.0; 9_000_000],
         }],
     };
-    let bytes = kerrlight_render::image::exr::encode(&picture, &Default::default()).unwrap();
+    let bytes =
+        kerrlight_render::image::exr::encode(&picture, &Default::default(), Default::default())
+            .unwrap();
     std::fs::write(at.join("large.exr"), bytes).unwrap();
     refused(at, "64MiB", &observe("large.exr"), "3000 x 3000 pixels");
     image::GrayImage::new(6000, 6000).save(at.join("sky.png")).unwrap();

@@ -59,7 +59,10 @@ fn sky(color: impl Fn(f64, f64) -> [f64; 3]) -> Panorama {
     let values = |c: usize| (0..width * height).map(|k| at(k)[c] as f32).collect();
     let channel = |c: usize| Channel { name: ["R", "G", "B"][c].to_owned(), values: values(c) };
     let picture = Picture { width, height, channels: (0..3).map(channel).collect() };
-    Panorama::decode(&exr::encode(&picture, &exr::Attributes::new()).unwrap()).unwrap()
+    Panorama::decode(
+        &exr::encode(&picture, &exr::Attributes::new(), exr::Style::default()).unwrap(),
+    )
+    .unwrap()
 }
 
 fn asking(text: &str, channels: &str, more: &[&str]) -> Scene {

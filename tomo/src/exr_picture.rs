@@ -77,7 +77,8 @@ mod tests {
         let channel = |name: &str| Channel { name: name.to_owned(), values: vec![1.0, 2.0] };
         let channels = ["intensity", "Q", "U"].map(channel).to_vec();
         let picture = Picture { width: 2, height: 1, channels };
-        let mut bytes = exr::encode(&picture, &exr::Attributes::new()).unwrap();
+        let mut bytes =
+            exr::encode(&picture, &exr::Attributes::new(), exr::Style::default()).unwrap();
         let name = format!("{attribute}\0");
         let at = bytes.windows(name.len()).position(|w| w == name.as_bytes()).unwrap();
         // The name, the name of its type, and the size of the value in four bytes.

@@ -226,7 +226,7 @@ impl Sequence {
             let Plan { scene, text } = &this.plans[*k];
             let mut attributes = report::attributes(scene, text, "", film, &summary);
             attributes.append(&mut this.settings(*k));
-            let bytes = exr::encode_in_style(&picture, &attributes, style);
+            let bytes = exr::encode(&picture, &attributes, style);
             let bytes = bytes.context("cannot encode the EXR")?;
             Output::new(&this.path(*k, "exr"), "exr")?.write(&bytes)?;
             Ok(summary)

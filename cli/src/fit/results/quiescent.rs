@@ -114,7 +114,7 @@ impl Estimate<'_> {
         let channels = found.images.iter().map(channel).collect();
         let picture = Picture { width: n, height: n, channels };
         let unit = ("unit".to_owned(), "Jy/pixel".to_owned());
-        let bytes = exr::encode(&picture, &exr::Attributes::from([unit]))?;
+        let bytes = exr::encode(&picture, &exr::Attributes::from([unit]), exr::Style::default())?;
         self.folder.file(CHANNELS)?.write(&bytes)
     }
 

@@ -268,7 +268,7 @@ mod tests {
             };
             let channels = names.iter().map(channel).collect();
             let picture = Picture { width: 4, height: 2, channels };
-            exr::encode(&picture, &exr::Attributes::new()).unwrap()
+            exr::encode(&picture, &exr::Attributes::new(), exr::Style::default()).unwrap()
         };
         let color = |bytes: &[u8]| Panorama::decode(bytes).unwrap().color([1.0, 0.0, 0.0]);
         assert_eq!(

@@ -31,19 +31,11 @@ fn utf8(text: &str) -> Text {
     Text::from_slice_unchecked(text.as_bytes())
 }
 
-/// The bytes of an EXR file with the channels of `picture` and settings.
+/// The bytes of an EXR file with the channels of `picture` and settings, in some style.
 ///
 /// # Errors
 /// If the picture is empty, or on a failure of the encoder.
-pub fn encode(picture: &Picture, attributes: &Attributes) -> Result<Vec<u8>, crate::Error> {
-    encode_in_style(picture, attributes, Style::default())
-}
-
-/// The same in some style.
-///
-/// # Errors
-/// As for [`encode`].
-pub fn encode_in_style(
+pub fn encode(
     picture: &Picture,
     attributes: &Attributes,
     style: Style,
@@ -253,7 +245,7 @@ mod tests {
         let picture = Picture { width: 3, height: 2, channels: channels.clone() };
         let scene = "[hole]\nspin = 0.9 # µ – Ω\n";
         let attributes = Attributes::from([("scene".to_owned(), scene.to_owned())]);
-        let bytes = encode(&picture, &attributes).unwrap();
+        let bytes = encode(&picture, &attributes, Style::default()).unwrap();
         let (back, text) = decode(&bytes).unwrap();
         channels.sort_by(|a, b| a.name.cmp(&b.name));
         assert_eq!(back, Picture { channels, ..picture });

@@ -2,7 +2,7 @@
 
 use super::{Attributes, attributes};
 use exr::block::reader::ChunksReader;
-use exr::error::{Error, Result};
+use exr::error::Error;
 use exr::math::Vec2;
 use exr::meta::attribute::SampleType;
 use exr::prelude::f16;
@@ -41,18 +41,9 @@ pub struct Survey {
 ///
 /// # Errors
 /// If the bytes are no EXR file of flat data, or a channel is subsampled.
-pub fn survey(mut file: impl Read + Seek) -> std::result::Result<Survey, crate::Error> {
-    Ok(survey_file(&mut file)?)
-}
-
-/// A file of any kind, so that the decoder is compiled once.
-trait AnyFile: Read + Seek {}
-
-impl<F: Read + Seek> AnyFile for F {}
-
-fn survey_file(file: &mut dyn AnyFile) -> Result<Survey> {
+pub fn survey(file: impl Read + Seek) -> Result<Survey, crate::Error> {
     let reader = exr::block::read(file, true)?;
-    let unusual = |what: &'static str| Error::NotSupported(what.into());
+    let unusual = |what: &'static str| crate::Error::from(Error::NotSupported(what.into()));
     let header = reader.headers().first().ok_or_else(|| unusual("no layer"))?.clone();
     if header.deep {
         return Err(unusual("deep data"));
