@@ -3,7 +3,7 @@
 //! Q + iU = m I in every pixel with m = w/√(1 + |w|²): light is never polarised by more than all of it. Parameters are the
 //! real parts of w, pixel by pixel, then its imaginary parts; all are 0 where nothing is polarised.
 
-use crate::problem::{count, reduced_chi2};
+use crate::problem::reduced_chi2;
 use kerrlight_tomo::fit::FrameTerm;
 
 /// Loss of the polarisation of an image.
@@ -40,11 +40,6 @@ impl PolarizedProblem<'_> {
     pub fn chi2(&self, images: &[f64]) -> f64 {
         let mut none = vec![0.0; images.len()];
         reduced_chi2(self.term, &self.frames, images, 0.0, &mut none)
-    }
-
-    /// Data in the frames that count.
-    pub fn count(&self) -> usize {
-        count(self.term, &self.frames)
     }
 
     /// The loss; overwrites the gradient.
