@@ -5,34 +5,13 @@ use crate::checksum::sealed;
 use crate::output::Output;
 use crate::session;
 use anyhow::Context;
-use serde::Serialize;
+use serde_json::{Value, json};
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 /// Its name in the folder of a run or of a comparison.
 pub const FILE: &str = "record.json";
-
-/// One run of the program.
-#[derive(Serialize)]
-struct Record {
-    /// Version of the program.
-    version: String,
-    /// The command line, with the program's name.
-    command: Vec<String>,
-    /// The folder that it was given in.
-    folder: PathBuf,
-    /// The machine.
-    host: String,
-    /// Its kind.
-    system: String,
-    /// Threads of the pool.
-    threads: usize,
-    /// Seconds since 1970, UTC.
-    started: f64,
-    /// Seconds until the record was written.
-    seconds: f64,
-}
 
 /// The record of this process, which began a moment ago.
 pub struct Recorder {
@@ -55,7 +34,7 @@ impl Recorder {
 
     /// Writes the record into the folder of what was made, which knows its inputs itself.
     pub fn write_into(&self, folder: &Path) -> anyhow::Result<()> {
-        let record = sealed(serde_json::to_value(self.record()?)?);
+        let record = sealed(self.record()?);
         Output::new(&folder.join(FILE), "json")?.write(record.as_bytes())
     }
 
@@ -65,17 +44,19 @@ impl Recorder {
         std::iter::once("kerrlight".to_owned()).chain(words).collect()
     }
 
-    fn record(&self) -> anyhow::Result<Record> {
-        Ok(Record {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            command: self.command(),
-            folder: std::path::absolute(".").context("the current folder")?,
-            host: host(),
-            system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
-            threads: rayon::current_num_threads(),
-            started: self.started,
-            seconds: self.begun.elapsed().as_secs_f64(),
-        })
+    /// Times are seconds: since 1970, UTC, and from there until now.
+    fn record(&self) -> anyhow::Result<Value> {
+        let folder = std::path::absolute(".").context("the current folder")?;
+        Ok(json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "command": self.command(),
+            "folder": serde_json::to_value(folder)?,
+            "host": host(),
+            "system": format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+            "threads": rayon::current_num_threads(),
+            "started": self.started,
+            "seconds": self.begun.elapsed().as_secs_f64(),
+        }))
     }
 }
 
