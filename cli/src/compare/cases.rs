@@ -324,7 +324,7 @@ mod tests {
     "#;
 
     fn cases(choice: &Choice) -> anyhow::Result<Vec<Case>> {
-        expand(&Experiment::parse(TEXT)?, &Source::BuiltIn, choice)
+        expand(&Experiment::parse(TEXT)?, &Source::default(), choice)
     }
 
     fn table(case: &Case) -> Table {
@@ -388,7 +388,7 @@ mod tests {
             "title = \"t\"\nquestion = \"q\"\nseeds = 2\nfit = \"../scenes/fits/scene_1.toml\"\n";
         let text = [head, &factor("log_every"), &factor("steps")].concat();
         let experiment = Experiment::parse(&text).unwrap();
-        let cases = expand(&experiment, &Source::BuiltIn, &Choice::default()).unwrap();
+        let cases = expand(&experiment, &Source::default(), &Choice::default()).unwrap();
         assert_eq!(cases.len(), 3200);
         let found = |of: fn(&Case) -> bool| cases.iter().filter(|case| of(case)).count();
         // The first with a wrong step and the first with a wrong log, of both seeds.
@@ -407,7 +407,7 @@ mod tests {
         assert!(text("what=b").contains("a grid, scan"));
         let wrong = TEXT.replace("kind = \"grid\"", "kind = \"gird\"");
         let experiment = Experiment::parse(&wrong).unwrap();
-        let cases = expand(&experiment, &Source::BuiltIn, &Choice::default()).unwrap();
+        let cases = expand(&experiment, &Source::default(), &Choice::default()).unwrap();
         let error = cases[0].settings().unwrap_err();
         assert!(error.contains("gird"), "{error}");
         assert!(cases[2].error().is_none());

@@ -11,7 +11,7 @@ use kerrlight_tomo::representation::Registry;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Its name in the folder.
@@ -30,7 +30,7 @@ pub struct Plan {
     /// Version of the program.
     version: String,
     /// Folder from which paths in the experiment start; none for one that the program carries.
-    base: Option<PathBuf>,
+    base: Source,
     /// The command line's; paths in assignments start from the root.
     #[serde(flatten)]
     choice: Choice,
@@ -39,10 +39,6 @@ pub struct Plan {
 impl Plan {
     /// Takes the plan of a command line.
     pub fn new(source: &Source, choice: &Choice) -> anyhow::Result<Self> {
-        let base = match source {
-            Source::BuiltIn => None,
-            Source::Folder(folder) => Some(folder.clone()),
-        };
         if choice
             .set
             .iter()
@@ -52,7 +48,8 @@ impl Plan {
         }
         let set = choice.set.iter().map(|set| paths::from_here(set, None));
         let choice = Choice { set: set.collect::<anyhow::Result<_>>()?, ..choice.clone() };
-        Ok(Plan { version: env!("CARGO_PKG_VERSION").to_owned(), base, choice })
+        let version = env!("CARGO_PKG_VERSION").to_owned();
+        Ok(Plan { version, base: source.clone(), choice })
     }
 
     /// Reads the plan in a folder, with the text of the experiment; nothing if no comparison was begun there.
@@ -84,7 +81,7 @@ impl Plan {
 
     /// Returns the source of its experiment's files.
     pub fn source(&self) -> Source {
-        self.base.clone().map_or(Source::BuiltIn, Source::Folder)
+        self.base.clone()
     }
 
     /// Returns the choice of cases.
@@ -189,7 +186,7 @@ mod tests {
 
     fn plan(seeds: u64) -> Plan {
         let choice = Choice { seeds: Some(seeds), ..Choice::default() };
-        Plan::new(&Source::BuiltIn, &choice).unwrap()
+        Plan::new(&Source::default(), &choice).unwrap()
     }
 
     /// Eight that want the same cases in the same moment all get in, whatever there is of the folder.

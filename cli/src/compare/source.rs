@@ -3,18 +3,15 @@
 use crate::output;
 use crate::paths;
 use anyhow::{Context, anyhow, bail};
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use toml::Table;
 
-/// Source of an experiment and of the fits that it names.
-#[derive(Debug, Clone)]
-pub enum Source {
-    /// Those that the program carries.
-    BuiltIn,
-    /// A folder.
-    Folder(PathBuf),
-}
+/// Folder of an experiment, and of the fits that it names; none if the program carries them.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Source(Option<PathBuf>);
 
 /// Experiments and fits that the program carries, by their paths in the repository.
 macro_rules! carried {
@@ -75,7 +72,7 @@ impl Source {
     pub fn find(name: &Path) -> anyhow::Result<(Self, String)> {
         let path = format!("experiments/{}.toml", name.display());
         if let Some((_, text)) = CARRIED.iter().find(|(known, _)| *known == path) {
-            return Ok((Self::BuiltIn, (*text).to_owned()));
+            return Ok((Self::default(), (*text).to_owned()));
         }
         if !name.exists() && name.extension().is_none() {
             let all: Vec<&str> = built_in().map(|(name, _)| name).collect();
@@ -88,13 +85,13 @@ impl Source {
         let folder = name.parent().filter(|folder| *folder != Path::new(""));
         let folder = std::path::absolute(folder.unwrap_or(Path::new(".")))
             .with_context(|| name.display().to_string())?;
-        Ok((Self::Folder(folder), output::read_text(name)?))
+        Ok((Self(Some(folder)), output::read_text(name)?))
     }
 
     /// Settings of the experiment's own file, with paths in them from anywhere.
     pub fn anchored(&self, settings: &Table) -> Table {
         let mut settings = settings.clone();
-        if let Self::Folder(folder) = self {
+        if let Some(folder) = &self.0 {
             paths::anchor(&mut settings, folder);
         }
         settings
@@ -104,7 +101,7 @@ impl Source {
     pub fn fit(&self, path: &Path) -> anyhow::Result<Table> {
         let text = self.fit_text(path)?;
         let mut table: Table = text.parse().with_context(|| path.display().to_string())?;
-        if let Self::Folder(folder) = self {
+        if let Some(folder) = &self.0 {
             paths::anchor(&mut table, folder.join(path).parent().unwrap_or(folder));
         }
         Ok(table)
@@ -112,7 +109,7 @@ impl Source {
 
     /// A fit's settings as they stand in their file.
     pub fn fit_text(&self, path: &Path) -> anyhow::Result<Cow<'static, str>> {
-        if let Self::Folder(folder) = self {
+        if let Some(folder) = &self.0 {
             return Ok(output::read_text(&folder.join(path))?.into());
         }
         let wanted = path.to_string_lossy();

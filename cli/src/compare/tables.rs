@@ -258,7 +258,7 @@ pub mod tests {
     #[test]
     fn exact_cells_have_their_best_level() {
         let experiment = Experiment::parse(TEXT).unwrap();
-        let cases = expand(&experiment, &Source::BuiltIn, &Choice::default()).unwrap();
+        let cases = expand(&experiment, &Source::default(), &Choice::default()).unwrap();
         let results = [30.0, 20.0, 21.0, 25.0]
             .map(|x| Status::Done(Results::of(&serde_json::json!({"psnr_db": x}))));
         let summary = Summary::new(cases.iter().zip(results).collect());

@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn exact_rows_stand_in_their_order() {
         let experiment = Experiment::parse(TEXT).unwrap();
-        let cases = expand(&experiment, &Source::BuiltIn, &Choice::default()).unwrap();
+        let cases = expand(&experiment, &Source::default(), &Choice::default()).unwrap();
         let results = [30.0, 20.0, 21.0, 25.0]
             .map(|x| Status::Done(Results::of(&serde_json::json!({"psnr_db": x}))));
         let summary = Summary::new(cases.iter().zip(results).collect());
