@@ -27,7 +27,7 @@ use kerrlight_tomo::recovery::results::{GeometryResults, PerParameter};
 use kerrlight_tomo::recovery::{Problem, ResolvedFit, true_volume};
 use kerrlight_tomo::representation::Registry;
 use predictive::Check;
-use sample::{Drawn, Through};
+use sample::Through;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -312,8 +312,8 @@ impl<'a> Drawing<'a> {
             return Ok(Some(kept));
         }
         let told = |text: &str| bar.set_message(text.to_owned());
-        let Some((drawn, geometry)) = self.one(number, keeper, &told)? else { return Ok(None) };
-        keep(path, number, self.factor, drawn, geometry).map(Some)
+        let Some(drawn) = self.one(number, keeper, &told)? else { return Ok(None) };
+        keep(path, number, drawn).map(Some)
     }
 
     fn one(
@@ -321,9 +321,9 @@ impl<'a> Drawing<'a> {
         number: u64,
         keeper: &SignalGuard,
         told: &dyn Fn(&str),
-    ) -> anyhow::Result<Option<(Drawn, Option<PerParameter<f64>>)>> {
+    ) -> anyhow::Result<Option<Kept>> {
         let Problem { instrument, measured, motion, registry, .. } = self.prepared;
-        let steps = self.steps;
+        let (steps, noise_factor) = (self.steps, self.factor);
         let mut file = self.file.clone();
         // All draws have the flow of the fit: its seed is not theirs.
         file.motion.velocity = file.motion.velocity.clone().seeded(file.seed);
@@ -337,10 +337,11 @@ impl<'a> Drawing<'a> {
         }
         let noise = seed(&file, number);
         let (Some(unknown), Some(geometries)) = (self.unknown, &self.geometries) else {
-            let data = measured.perturbed(&file.loss, self.factor, noise)?;
-            let through = Through { file: &file, instrument, motion, registry, measured, steps };
-            let drawn = sample::draw(&through, &data, keeper, told)?;
-            return Ok(drawn.map(|drawn| (drawn, None)));
+            let data = measured.perturbed(&file.loss, noise_factor, noise)?;
+            let file = &file;
+            let through =
+                Through { file, instrument, motion, registry, measured, steps, noise_factor };
+            return sample::draw(&through, &data, keeper, told);
         };
         told("the geometry");
         let data = geometries.data(noise)?;
@@ -350,11 +351,13 @@ impl<'a> Drawing<'a> {
         let rays = RaySampling { lattice, ..self.rays };
         let ResolvedFit { file, instrument, motion, .. } =
             ResolvedFit::in_geometry(self.prepared, &file, &geometry, rays)?;
-        let (instrument, motion) = (&instrument, &motion);
-        let through = Through { file: &file, instrument, motion, registry, measured, steps };
-        let drawn = sample::draw(&through, &data, keeper, told)?;
-        let values = geometry.values(&unknown.free);
-        Ok(drawn.map(|drawn| (drawn, Some(values))))
+        let (file, instrument, motion) = (&file, &instrument, &motion);
+        let through = Through { file, instrument, motion, registry, measured, steps, noise_factor };
+        let mut drawn = sample::draw(&through, &data, keeper, told)?;
+        if let Some(drawn) = &mut drawn {
+            drawn.numbers.geometry = Some(geometry.values(&unknown.free));
+        }
+        Ok(drawn)
     }
 }
 
@@ -387,25 +390,13 @@ fn kept(folder: &Path, number: u64) -> anyhow::Result<Option<Kept>> {
     Ok(Some(Kept { volume: volume_files::load(&volume)?.volume, numbers }))
 }
 
-fn keep(
-    folder: &Path,
-    number: u64,
-    factor: f64,
-    drawn: Drawn,
-    geometry: Option<PerParameter<f64>>,
-) -> anyhow::Result<Kept> {
+fn keep(folder: &Path, number: u64, drawn: Kept) -> anyhow::Result<Kept> {
     let [volume, numbers] = names(folder, number);
-    let file = VolumeFile { volume: drawn.volume.clone(), axis: None };
+    let file = VolumeFile { volume: drawn.volume, axis: None };
     output::Output::new(&volume, "")?.write(&file.to_npz())?;
-    let of_draw = DrawNumbers {
-        geometry,
-        chi2_per_datum: drawn.chi2,
-        noise_factor: factor,
-        predicted: drawn.predicted,
-    };
     // Last: with it the draw is whole.
-    let text = sealed(serde_json::to_value(of_draw)?);
+    let text = sealed(serde_json::to_value(drawn.numbers)?);
     output::Output::new(&numbers, "")?.write(text.as_bytes())?;
     // As a later call reads them, to the last digit.
-    Ok(Kept { volume: drawn.volume, numbers: serde_json::from_str(&text)? })
+    Ok(Kept { volume: file.volume, numbers: serde_json::from_str(&text)? })
 }

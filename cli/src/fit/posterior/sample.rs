@@ -3,10 +3,10 @@
 use super::super::failed;
 use super::super::results::verdict::Evidence;
 use super::predictive::Check;
+use super::{DrawNumbers, Kept};
 use crate::interrupt::SignalGuard;
 use anyhow::{Context, bail};
 use kerrlight_common::frames::Frames;
-use kerrlight_render::volume::Volume;
 use kerrlight_tomo::fit::linear::LinearProgress;
 use kerrlight_tomo::fit::settings::{FitFile, Kind, Start};
 use kerrlight_tomo::fit::setup::{self, FitData, Instrument};
@@ -32,25 +32,18 @@ pub struct Through<'a> {
     pub measured: &'a FitData,
     /// Steps that the fit took.
     pub steps: u64,
+    /// Noise of the draw over the errors of the data.
+    pub noise_factor: f64,
 }
 
-/// Result of a draw.
-pub struct Drawn {
-    /// Emission at the reference time.
-    pub volume: Volume,
-    /// χ² over the number of data, of each loss, beside the data that were fitted.
-    pub chi2: Vec<f64>,
-    /// Probabilities of data that are as far from it as the measured ones.
-    pub predicted: Vec<Check>,
-}
-
-/// Fits `measured` from the start, with draws of the representation's parameters of their own; none if it was stopped.
+/// Fits `measured` from the start, with draws of the representation's parameters of their own, and says nothing of the
+/// geometry; none if it was stopped.
 pub fn draw(
     through: &Through<'_>,
     measured: &FitData,
     keeper: &SignalGuard,
     told: &dyn Fn(&str),
-) -> anyhow::Result<Option<Drawn>> {
+) -> anyhow::Result<Option<Kept>> {
     let Through { file, instrument, motion, registry, .. } = *through;
     let pixels = file.screen.pixels * file.screen.pixels;
     let data = measured.terms(&file.loss, pixels)?;
@@ -69,10 +62,12 @@ pub fn draw(
     }
     let frames: Vec<usize> = (0..measured.times.len()).collect();
     let movie = trainer.images(&state.now, &frames)?;
-    let chi2 = trainer.objective.loss_of(&frames, &movie)?.terms;
+    let chi2_per_datum = trainer.objective.loss_of(&frames, &movie)?.terms;
     let volume = super::super::results::recovered(file, &mut trainer, &state)?;
     let predicted = predicted(through, &movie)?;
-    Ok(Some(Drawn { volume, chi2, predicted }))
+    let noise_factor = through.noise_factor;
+    let numbers = DrawNumbers { geometry: None, chi2_per_datum, noise_factor, predicted };
+    Ok(Some(Kept { volume, numbers }))
 }
 
 /// Returns the probabilities of data that are as far from a draw's images as the measured ones.
