@@ -228,13 +228,14 @@ pub fn markdown(table: &Table) -> String {
 }
 
 #[cfg(test)]
-pub mod tests {
+mod tests {
     use super::*;
     use crate::compare::cases::expand;
     use crate::compare::recipe::Choice;
     use crate::compare::source::Source;
+    use crate::compare::verdicts;
 
-    pub const TEXT: &str = r#"
+    const TEXT: &str = r#"
         title = "t"
         question = "q"
         seeds = 1
@@ -265,6 +266,8 @@ pub mod tests {
         let table = table(&experiment, &summary, &experiment.table[0]);
         assert_eq!(table.rows, [["bhnerf", "30.00 (0.001)"], ["grid", "25.00 (0.002)"]]);
         assert_eq!(table.caption, "Of two. One seed. In brackets: the best level of rate.");
+        let said = verdicts::of_table(&experiment, &summary, &experiment.table[0]);
+        assert_eq!(said, ["Best, by PSNR (dB): bhnerf (30.00 (0.001)) > grid (25.00 (0.002))."]);
         let odd =
             Table { title: "a\n# b".to_owned(), rows: vec![vec!["|\u{1b}".to_owned()]], ..table };
         let text = markdown(&odd);

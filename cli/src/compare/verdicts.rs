@@ -88,24 +88,3 @@ pub fn of_table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) 
     }
     orders.iter().map(|order| order.sentence(&asked.title, &unit)).collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::compare::cases::{Status, expand};
-    use crate::compare::recipe::Choice;
-    use crate::compare::results::Results;
-    use crate::compare::source::Source;
-    use crate::compare::tables::tests::TEXT;
-
-    #[test]
-    fn exact_rows_stand_in_their_order() {
-        let experiment = Experiment::parse(TEXT).unwrap();
-        let cases = expand(&experiment, &Source::default(), &Choice::default()).unwrap();
-        let results = [30.0, 20.0, 21.0, 25.0]
-            .map(|x| Status::Done(Results::of(&serde_json::json!({"psnr_db": x}))));
-        let summary = Summary::new(cases.iter().zip(results).collect());
-        let said = of_table(&experiment, &summary, &experiment.table[0]);
-        assert_eq!(said, ["Best, by PSNR (dB): bhnerf (30.00 (0.001)) > grid (25.00 (0.002))."]);
-    }
-}
