@@ -133,9 +133,3 @@ impl de::Error for ReadError {
         ReadError::new(TYPES.iter().fold(message.join("`"), plain))
     }
 }
-
-impl serde::ser::Error for ReadError {
-    fn custom<T: Display>(message: T) -> Self {
-        ReadError::new(message.to_string())
-    }
-}

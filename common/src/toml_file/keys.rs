@@ -371,7 +371,19 @@ impl Keys {
 
 /// A value of JSON as TOML has it in a line.
 fn inline(value: &Value) -> String {
-    super::inline(value).unwrap_or_else(|_| value.to_string())
+    super::inline(&without_null(value)).unwrap_or_else(|_| value.to_string())
+}
+
+/// The same without keys of no value, which TOML does not write.
+fn without_null(value: &Value) -> Value {
+    match value {
+        Value::Object(all) => {
+            let given = all.iter().filter(|(_, value)| !value.is_null());
+            given.map(|(key, value)| (key.clone(), without_null(value))).collect()
+        }
+        Value::Array(all) => all.iter().map(without_null).collect(),
+        other => other.clone(),
+    }
 }
 
 fn types(schema: &Map<String, Value>) -> impl Iterator<Item = &str> {
