@@ -129,7 +129,9 @@ impl DataTerm<f64> for Plain {
     fn residuals(&self, model: &[Complex<f64>]) -> Vec<Residual> {
         let pairs = model.iter().zip(&self.0).map(|(model, datum)| (model - datum, datum));
         let parts = pairs.flat_map(|(left, datum)| [(left.re, datum.re), (left.im, datum.im)]);
-        parts.map(|(value, datum)| Residual { value, datum, stations: vec![0, 1] }).collect()
+        parts
+            .map(|(value, datum)| Residual { value, datum, freedom: 1.0, stations: vec![0, 1] })
+            .collect()
     }
 }
 

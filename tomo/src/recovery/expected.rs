@@ -111,7 +111,7 @@ fn statistics(
         term.map_or_else(Vec::new, |term| term.residuals(model))
     };
     let all = Statistics::of(parts.iter().map(residuals), 1);
-    (all.all.count > 0).then_some(all)
+    (all.all.count() > 0).then_some(all)
 }
 
 /// The data of a frame, if it has any.

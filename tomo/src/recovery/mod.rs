@@ -184,7 +184,7 @@ impl Fit<'_, '_> {
     ) -> Result<DataVerdict, Error> {
         let objective = &self.trainer.objective;
         let mut statistics = objective.statistics(seen)?;
-        let data: usize = statistics.iter().map(|of| of.all.count).sum();
+        let data: usize = statistics.iter().map(|of| of.all.count()).sum();
         let taken = self.solved(&state.now.parameters) as f64 / data.max(1) as f64;
         statistics.iter_mut().for_each(|of| of.taken = taken);
         self.evidence().judged((objective.names(), statistics), movie, None)

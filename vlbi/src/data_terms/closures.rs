@@ -126,6 +126,7 @@ impl<T: Float> Scan<T> {
         let of = |(column, stations): (&[f64], &Vec<u16>)| Residual {
             value: pull(column),
             datum: 0.0,
+            freedom: 1.0,
             stations: stations.clone(),
         };
         columns.zip(&self.stations).map(of).collect()

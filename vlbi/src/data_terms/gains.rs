@@ -9,7 +9,7 @@ use crate::gains::{GainPriors, GainProblem, ScanGains};
 use crate::observation::Observation;
 use crate::operator::Float;
 use crate::products::debiased_amplitude;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use num_complex::Complex;
 
 /// χ² = min over gains of Σ |g₁ ḡ₂ V − D|²/σ² + Σ (ln|g|/s)²: variable projection (Golub & Pereyra 1973). By the envelope
@@ -120,6 +120,7 @@ impl GainTerm {
         let part = |value: f64, datum: f64, stations: &[u16]| Residual {
             value,
             datum,
+            freedom: 1.0,
             stations: stations.to_vec(),
         };
         let mut all = Vec::new();
@@ -198,30 +199,23 @@ impl<T: Float> DataTerm<T> for GainTerm {
         self.problem.value(&seen, &gains)
     }
 
-    /// Real and imaginary parts of the misses and the amplitudes' priors, turned such that as many are left as there are
-    /// degrees of freedom: free gains take the others away. Each is under the stations that it belonged to before.
+    /// Real and imaginary parts of the misses, and the amplitudes' priors. Each counts as what free gains leave of it.
     fn residuals(&self, model: &[Complex<T>]) -> Vec<Residual> {
         let seen = self.seen(model);
         let gains = self.problem.solve(&seen);
         let mut all = self.all_residuals(&self.misses(&seen, &gains), &gains);
-        let taken = self.amplitudes_free().len() + self.phases_free().len();
-        if taken == 0 {
-            return all;
+        for (residual, freedom) in all.iter_mut().zip(left_free(self.slopes(&seen, &gains))) {
+            residual.freedom = freedom;
         }
-        // At the minimum residuals are orthogonal to the slopes: the first numbers of Qᵀ r, one for
-        // each free gain, are 0, and the others have the same sum of squares.
-        let turn = self.slopes(&seen, &gains).qr();
-        let column = |of: fn(&Residual) -> f64| {
-            let mut column = DVector::from_iterator(all.len(), all.iter().map(of));
-            turn.q_tr_mul(&mut column);
-            column
-        };
-        let (values, data) = (column(|r| r.value), column(|r| r.datum));
-        for (k, residual) in all.iter_mut().enumerate() {
-            (residual.value, residual.datum) = (values[k], data[k]);
-        }
-        all.split_off(taken)
+        all
     }
+}
+
+/// Returns what a linear fit with these derivatives leaves of each residual's variance: 1 less its leverage, the diagonal of
+/// S (SᵀS)⁻¹ Sᵀ.
+fn left_free(slopes: DMatrix<f64>) -> Vec<f64> {
+    let (rows, q) = (slopes.nrows(), slopes.qr().q());
+    (0..rows).map(|k| (1.0 - q.row(k).norm_squared()).max(0.0)).collect()
 }
 
 /// V/|V|; 0 where the model is dark.

@@ -63,6 +63,8 @@ pub struct Residual {
     pub value: f64,
     /// The datum in the same units; 0 for closure quantities, which have no natural zero.
     pub datum: f64,
+    /// Data that it counts as: 1, less what gains that are solved for use up of it. A right model has this mean square.
+    pub freedom: f64,
     /// Indices of the stations of the baseline, triangle or quadrangle; none for data that no stations measured.
     pub stations: Vec<u16>,
 }
@@ -105,7 +107,7 @@ pub trait DataTerm<T: Float>: Sync {
         gradient: &mut [Complex<T>],
     ) -> f64;
 
-    /// [`Self::degrees_of_freedom`] residuals, in the same order for every model.
+    /// Residuals, in the same order for every model; their freedoms add up to [`Self::degrees_of_freedom`].
     fn residuals(&self, model: &[Complex<T>]) -> Vec<Residual>;
 }
 

@@ -173,6 +173,7 @@ impl<T: Float> DataTerm<T> for RatioTerm {
             pairs.into_iter().map(move |(value, datum)| Residual {
                 value,
                 datum,
+                freedom: 1.0,
                 stations: stations.to_vec(),
             })
         };

@@ -74,6 +74,7 @@ impl<T: Float> DataTerm<T> for VisibilityTerm<T> {
             let part = |value: T, datum: T| Residual {
                 value: weight * value.double(),
                 datum: weight * datum.double(),
+                freedom: 1.0,
                 stations: stations.clone(),
             };
             [part(residual.re, self.data[k].re), part(residual.im, self.data[k].im)]
@@ -149,6 +150,7 @@ impl<T: Float> DataTerm<T> for AmplitudeTerm<T> {
             Residual {
                 value: weight * (model[k].norm() - self.data[k]).double(),
                 datum: weight * self.data[k].double(),
+                freedom: 1.0,
                 stations: self.stations[k].to_vec(),
             }
         };

@@ -55,12 +55,14 @@ impl Estimate<'_> {
             // Splines lie below the numbers of their nodes.
             let solved = file.representation.kind == Kind::LinearGrid && file.quiescent.is_none();
             let values = if solved { parameters } else { volume.values() };
-            reached(key, most, values)
+            reached(key, most, values, HANDFUL)
         });
         let still = file.quiescent.as_ref().and_then(|settings| {
             let (values, is_flux) = quiescent?.values();
             let unit = if is_flux { 1.0 } else { file.screen.jy_per_pixel };
-            reached("quiescent.upper", settings.upper * unit, &values)
+            // A light curve has one value for each of its Stokes parameters.
+            let passed = if is_flux { 0 } else { HANDFUL };
+            reached("quiescent.upper", settings.upper * unit, &values, passed)
         });
         // A simulation says where its light ends.
         let edges = if file.data.is_some() { edges(file, volume) } else { Vec::new() };
@@ -79,12 +81,13 @@ fn ceiling(file: &FitFile) -> Option<(&'static str, f64)> {
     }
 }
 
-fn reached(bound: &'static str, most: f64, values: &[f32]) -> Option<Reached> {
+/// Returns a bound that more than `passed` values have reached.
+fn reached(bound: &'static str, most: f64, values: &[f32], passed: usize) -> Option<Reached> {
     // Q and U of a quiescent image have either sign.
     let sizes = || values.iter().map(|x| f64::from(x.abs()));
     let at = || sizes().filter(|x| *x >= REACHED * most);
     let (count, light) = (at().count(), at().sum::<f64>() / sizes().sum::<f64>());
-    let is_told = count > HANDFUL && light > LIGHT;
+    let is_told = count > passed && light > LIGHT;
     is_told.then_some(Reached { bound, value: most, count: Some(count), light })
 }
 
@@ -185,9 +188,9 @@ mod tests {
     fn exact_more_than_a_handful_at_the_ceiling_is_named() {
         let mut values = vec![0.5f32; 1000];
         values[..8].fill(0.99);
-        assert_eq!(reached("representation.activation", 1.0, &values), None);
+        assert_eq!(reached("representation.activation", 1.0, &values, HANDFUL), None);
         values[..100].fill(0.99);
-        let found = reached("representation.activation", 1.0, &values).unwrap();
+        let found = reached("representation.activation", 1.0, &values, HANDFUL).unwrap();
         assert_eq!(found.count, Some(100));
         let said = found.sentence();
         assert!(

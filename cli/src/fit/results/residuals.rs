@@ -5,7 +5,7 @@ use super::{Estimate, Found};
 use crate::report::{self, Figure, LinePlot};
 use kerrlight_tomo::fit::settings::LossKind;
 use kerrlight_tomo::fit::setup::FitData;
-use kerrlight_tomo::fit::verdict::Tested;
+use kerrlight_tomo::fit::verdict::{Part, Tested};
 use kerrlight_vlbi::dirty_image;
 use num_complex::Complex;
 use std::collections::HashMap;
@@ -84,11 +84,11 @@ fn baselines(measured: &FitData) -> HashMap<[u16; 2], f64> {
 fn pixel_maps(tested: &Tested, pixels: usize) -> Option<[Vec<f32>; 2]> {
     let of = &tested.statistics.pixels;
     (of.len() == pixels).then(|| {
-        let count = |n: usize| n.max(1) as f64;
+        let count = |part: &Part| part.freedom.max(1.0);
         // The mean of n residuals scatters by 1/√n, and χ²/n by √(2/n).
-        let mean = of.iter().map(|sum| sum.sum / count(sum.part.count).sqrt());
+        let mean = of.iter().map(|sum| sum.sum / count(&sum.part).sqrt());
         let chi2 = of.iter().map(|sum| {
-            let n = count(sum.part.count);
+            let n = count(&sum.part);
             (sum.part.chi2 / n - tested.expected.chi2) / (2.0 / n).sqrt()
         });
         [mean.map(|x| x as f32).collect(), chi2.map(|x| x as f32).collect()]

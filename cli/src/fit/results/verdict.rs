@@ -91,7 +91,7 @@ impl From<&DataVerdict> for VerdictResults {
 
 impl TermResults {
     fn new(judged: &DataVerdict, name: &str, tested: &Tested) -> Self {
-        let Tested { statistics, errors, expected } = tested;
+        let Tested { statistics, errors, expected, .. } = tested;
         let expected =
             ExpectedChi2 { mean: expected.chi2, deviation: expected.spread, taken: expected.taken };
         let frame = worst(statistics.frames.iter().enumerate());
@@ -99,7 +99,7 @@ impl TermResults {
             |(station, part): (&u16, &Part)| (judged.names(&[*station]), part.per_datum());
         Self {
             data: name.to_owned(),
-            count: statistics.all.count,
+            count: statistics.all.count(),
             chi2_per_datum: statistics.chi2(),
             sigma_is: *errors,
             mean: statistics.mean(),
@@ -109,15 +109,15 @@ impl TermResults {
             expected: (*errors != Errors::Weight).then_some(expected),
             worst_frame: frame.map(|(frame, part, chi2_per_datum)| {
                 let time = judged.times.get(frame).copied();
-                WorstFrame { frame, time, chi2_per_datum, count: part.count }
+                WorstFrame { frame, time, chi2_per_datum, count: part.count() }
             }),
             worst_group: worst(statistics.groups.iter()).map(|(group, part, chi2_per_datum)| {
                 let stations = judged.names(group);
-                WorstGroup { stations, chi2_per_datum, count: part.count }
+                WorstGroup { stations, chi2_per_datum, count: part.count() }
             }),
             worst_station: worst(statistics.stations.iter()).map(|(at, part, chi2_per_datum)| {
                 let station = judged.names(&[*at]);
-                WorstStation { station, chi2_per_datum, count: part.count }
+                WorstStation { station, chi2_per_datum, count: part.count() }
             }),
             stations: statistics.stations.iter().map(station).collect(),
         }
@@ -163,7 +163,7 @@ pub fn table(judged: &DataVerdict) -> Table {
         "worst",
     ];
     let row = |(name, tested): &(String, Tested)| {
-        let Tested { statistics, errors, expected } = tested;
+        let Tested { statistics, errors, expected, .. } = tested;
         let number = |x: Option<f64>| x.map_or("–".to_owned(), |x| format!("{x:.2}"));
         let expected = match errors {
             Errors::Weight => "no noise".to_owned(),
@@ -171,7 +171,7 @@ pub fn table(judged: &DataVerdict) -> Table {
         };
         vec![
             name.clone(),
-            statistics.all.count.to_string(),
+            statistics.all.count().to_string(),
             statistics.chi2().map_or("–".to_owned(), short),
             expected,
             number(statistics.mean()),

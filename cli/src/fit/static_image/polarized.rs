@@ -137,7 +137,7 @@ impl Polarized {
         // Variability is common to many data: χ² may lie far below 1.
         let errors =
             if measured.has_intrinsic_variability { Errors::Shared } else { Errors::Stated };
-        let count = statistics.all.count;
+        let count = statistics.all.count();
         let tested = (settings.data.label().to_owned(), Tested::gaussian(statistics, errors));
         Ok(Some((Self { settings, survey, leakage, count }, tested)))
     }

@@ -73,13 +73,18 @@ pub trait FrameTerm<T: Float>: Send + Sync {
     /// χ² of a frame; adds `weight` times its gradient.
     fn value_and_gradient(&self, frame: usize, image: &[T], weight: T, gradient: &mut [T]) -> f64;
 
-    /// [`Self::degrees_of_freedom`] residuals of a frame, whose squares add up to χ²; pixels in their order.
+    /// Residuals of a frame, whose squares add up to χ² and whose freedoms to [`Self::degrees_of_freedom`]; pixels in their order.
     fn residuals(&self, frame: usize, image: &[T]) -> Vec<Residual>;
 }
 
 /// A residual of something that no stations measured.
 pub(in crate::fit) fn plain(model: f64, datum: f64, weight: f64) -> Residual {
-    Residual { value: weight * (model - datum), datum: weight * datum, stations: Vec::new() }
+    Residual {
+        value: weight * (model - datum),
+        datum: weight * datum,
+        freedom: 1.0,
+        stations: Vec::new(),
+    }
 }
 
 /// Every pixel of every frame: Σ (I − data)²/σ².

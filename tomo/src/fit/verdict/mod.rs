@@ -13,6 +13,7 @@ mod tests;
 pub use predictive::Predicted;
 use serde::Serialize;
 pub use statistics::{Pairs, Part, PixelSum, Statistics};
+use std::collections::BTreeMap;
 
 /// Standard deviations of χ² that chance is granted: 5 of them come about once in a million.
 pub const CHANCE: f64 = 5.0;
@@ -86,6 +87,34 @@ impl Expected {
     }
 }
 
+/// χ² per datum of some data if the model is right.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moments {
+    /// Its mean.
+    pub mean: f64,
+    /// Its standard deviation.
+    pub spread: f64,
+}
+
+impl Moments {
+    /// Takes those of drawn data; none of fewer than two draws, or where they are no numbers.
+    fn of(draws: impl Iterator<Item = Part>) -> Option<Self> {
+        let all: Vec<Part> = draws.filter(|part| part.count() > 0).collect();
+        let chi2 = || all.iter().filter_map(Part::per_datum);
+        let (count, data) = (all.len() as f64, all.first()?.freedom);
+        let mean = chi2().sum::<f64>() / count;
+        let square: f64 = chi2().map(|x| (x - mean).powi(2)).sum();
+        // The scatter of few draws may be too small by chance.
+        let spread = (square / (count - 1.0)).sqrt().max(mean * (2.0 / data).sqrt());
+        (mean.is_finite() && spread.is_finite()).then_some(Self { mean, spread })
+    }
+
+    /// Returns the largest χ² per datum of one baseline, station or frame that passes.
+    fn most(self) -> f64 {
+        self.mean + (CHANCE * self.spread).max(GROUP_EXCESS)
+    }
+}
+
 /// One kind of data.
 #[derive(Clone, Debug)]
 pub struct Tested {
@@ -95,15 +124,35 @@ pub struct Tested {
     pub errors: Errors,
     /// Expected residuals if the model is right.
     pub expected: Expected,
+    /// Those of each baseline, triangle or quadrangle where draws tell them: closure quantities of faint ones scatter more.
+    groups: BTreeMap<Vec<u16>, Moments>,
+    /// The same of frames.
+    frames: Vec<Option<Moments>>,
 }
 
 impl Tested {
     /// Expects the χ² of independent Gaussian data.
     pub fn gaussian(statistics: Statistics, errors: Errors) -> Self {
-        let spread = (2.0 / statistics.all.count.max(1) as f64).sqrt();
+        let spread = (2.0 / statistics.all.freedom.max(1.0)).sqrt();
         let taken = statistics.taken.clamp(0.0, 1.0);
         let expected = Expected { chi2: 1.0, spread, mean: 0.0, in_time: 0.0, taken };
-        Self { statistics, errors, expected }
+        Self { statistics, errors, expected, groups: BTreeMap::new(), frames: Vec::new() }
+    }
+
+    /// Returns what a right model has of the data of some stations.
+    pub(super) fn of_group(&self, stations: &[u16], part: &Part) -> Moments {
+        self.groups.get(stations).copied().unwrap_or_else(|| self.of_any(part))
+    }
+
+    /// The same of a frame.
+    pub(super) fn of_frame(&self, frame: usize, part: &Part) -> Moments {
+        self.frames.get(frame).copied().flatten().unwrap_or_else(|| self.of_any(part))
+    }
+
+    fn of_any(&self, part: &Part) -> Moments {
+        let (all, some) = (self.statistics.all.freedom, part.freedom.max(1.0));
+        let Expected { chi2, spread, .. } = self.expected;
+        Moments { mean: chi2, spread: spread * (all / some).sqrt() }
     }
 
     /// Returns whether χ² is less than a right model has: what the fit learns is noise.
@@ -132,7 +181,17 @@ impl Tested {
             taken: self.expected.taken,
         };
         let numbers = [expected.chi2, expected.spread, expected.mean, expected.in_time];
-        if numbers.iter().all(|x| x.is_finite()) { Self { expected, ..self } } else { self }
+        if !numbers.iter().all(|x| x.is_finite()) {
+            return self;
+        }
+        let of_group = |(stations, _): (&Vec<u16>, &Part)| {
+            let of_draws = draws.iter().filter_map(|draw| draw.groups.get(stations));
+            Some((stations.clone(), Moments::of(of_draws.copied())?))
+        };
+        let groups = self.statistics.groups.iter().filter_map(of_group).collect();
+        let of_frame = |k| Moments::of(draws.iter().filter_map(|draw| draw.frames.get(k).copied()));
+        let frames = (0..self.statistics.frames.len()).map(of_frame).collect();
+        Self { expected, groups, frames, ..self }
     }
 }
 
@@ -275,7 +334,7 @@ fn judge_structure(term: usize, tested: &Tested, verdict: &mut Verdict) {
     if tested.errors == Errors::Shared {
         return;
     }
-    if let Some(mean) = beyond(tested.statistics.mean(), expected.mean, all.count) {
+    if let Some(mean) = beyond(tested.statistics.mean(), expected.mean, all.count()) {
         verdict.add(Outcome::Unexplained, Some(term), Fault::Mean(mean));
     }
     // Errors of calibration last for longer than a frame: only noise has to be new in every one.
@@ -293,17 +352,17 @@ fn judge_structure(term: usize, tested: &Tested, verdict: &mut Verdict) {
 
 fn judge_groups(term: usize, tested: &Tested, verdict: &mut Verdict) {
     // Each part has a limit of its own: the worst of all need not be beyond its.
-    let is_bad = |part: &Part| {
-        let chance = CHANCE * (2.0 / part.count as f64).sqrt();
-        let limit = tested.expected.chi2 + chance.max(GROUP_EXCESS);
-        part.count >= GROUP_COUNT && part.per_datum().is_some_and(|chi2| chi2 > limit)
+    let is_bad = |part: &Part, expected: Moments| {
+        part.count() >= GROUP_COUNT && part.per_datum().is_some_and(|chi2| chi2 > expected.most())
     };
-    let groups = tested.statistics.groups.iter().filter(|(_, part)| is_bad(part));
+    let groups = tested.statistics.groups.iter();
+    let groups = groups.filter(|(stations, part)| is_bad(part, tested.of_group(stations, part)));
     if let Some((stations, _, chi2)) = worst(groups) {
         let stations = stations.clone();
         verdict.add(Outcome::Unexplained, Some(term), Fault::Group(stations, chi2));
     }
-    let frames = tested.statistics.frames.iter().enumerate().filter(|(_, part)| is_bad(part));
+    let frames = tested.statistics.frames.iter().enumerate();
+    let frames = frames.filter(|(frame, part)| is_bad(part, tested.of_frame(*frame, part)));
     if let Some((frame, _, chi2)) = worst(frames) {
         verdict.add(Outcome::Unexplained, Some(term), Fault::Frame(frame, chi2));
     }
@@ -314,7 +373,7 @@ pub fn worst<'a, K>(
     parts: impl Iterator<Item = (K, &'a Part)> + Clone,
 ) -> Option<(K, &'a Part, f64)> {
     let largest = |least: usize| {
-        let chosen = parts.clone().filter(move |(_, part)| part.count >= least);
+        let chosen = parts.clone().filter(move |(_, part)| part.count() >= least);
         let chosen = chosen.filter_map(|(key, part)| Some((key, part, part.per_datum()?)));
         chosen.max_by(|a, b| a.2.total_cmp(&b.2))
     };

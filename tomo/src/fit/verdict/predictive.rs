@@ -5,7 +5,7 @@
 //! simulated. The mean over the draws of the probability of a larger one is near 0 where the model cannot make such data,
 //! near 1 where it follows their noise.
 
-use super::{EXCESS, Errors, Expected, GROUP_EXCESS, Part, Tested};
+use super::{EXCESS, Errors, Expected, GROUP_EXCESS, Moments, Part, Statistics, Tested};
 use statrs::function::gamma::checked_gamma_ur;
 
 /// Probabilities, under one draw, of data of one kind that are at least as far from it as the measured ones.
@@ -27,19 +27,24 @@ impl Tested {
         if self.errors == Errors::Weight {
             return None;
         }
-        let Expected { chi2: mean, spread, .. } = self.expected;
-        let all = self.statistics.all;
-        // Over that of Gaussian errors with this mean: that of closure quantities of faint sources is larger.
-        let excess = spread / (mean * (2.0 / all.count.max(1) as f64).sqrt());
+        let Expected { chi2, spread, .. } = self.expected;
+        let Statistics { all, groups, frames, .. } = &self.statistics;
         let of = |[whole, part]: [f64; 2]| -> Option<[Option<f64>; 3]> {
             // χ² that an error of the model has added is no matter of chance, up to what is let pass.
-            let larger = |of: &Part, passed: f64| {
+            let larger = |of: &Part, Moments { mean, spread }: Moments, passed: f64| {
                 let added = (of.per_datum()? / mean - 1.0).clamp(0.0, passed);
+                // Over that of Gaussian errors with this mean: that of closure quantities of faint sources is larger.
+                let excess = spread / (mean * (2.0 / of.freedom.max(1.0)).sqrt());
                 probability_of_larger(of, mean * (1.0 + added), excess)
             };
-            let groups = self.statistics.groups.values().filter_map(|of| larger(of, part));
-            let frames = self.statistics.frames.iter().filter_map(|of| larger(of, part));
-            Some([Some(larger(&all, whole)?), least(groups), least(frames)])
+            let groups = groups.iter().map(|(key, of)| (of, self.of_group(key, of)));
+            let frames = frames.iter().enumerate().map(|(k, of)| (of, self.of_frame(k, of)));
+            let whole = larger(all, Moments { mean: chi2, spread }, whole)?;
+            Some([
+                Some(whole),
+                least(groups.filter_map(|(of, expected)| larger(of, expected, part))),
+                least(frames.filter_map(|(of, expected)| larger(of, expected, part))),
+            ])
         };
         let [all, groups, frames] = of([0.0, 0.0])?;
         let beyond = of([EXCESS, GROUP_EXCESS])?.into_iter().flatten().fold(1.0, f64::min);
@@ -51,12 +56,12 @@ impl Tested {
 /// √(2 n) times that and `excess` for its standard deviation. χ² of Gaussian data has mean 1 and excess 1. None without
 /// data.
 fn probability_of_larger(part: &Part, mean: f64, excess: f64) -> Option<f64> {
-    if part.count == 0 || part.chi2.is_nan() {
+    if part.count() == 0 || part.chi2.is_nan() {
         return None;
     }
     // A gamma distribution of shape k and scale θ has the mean k θ and the deviation √k θ.
-    let shape = 0.5 * part.count as f64 / (excess * excess);
-    let scaled = shape * part.chi2 / (part.count as f64 * mean);
+    let shape = 0.5 * part.freedom / (excess * excess);
+    let scaled = shape * part.chi2 / (part.freedom * mean);
     // The incomplete gamma function refuses infinity.
     if scaled == f64::INFINITY {
         return Some(0.0);
@@ -73,7 +78,6 @@ fn least(all: impl Iterator<Item = f64>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Statistics;
     use super::*;
     use kerrlight_vlbi::data_terms::Residual;
     use rand::{RngExt, SeedableRng};
@@ -83,21 +87,22 @@ mod tests {
     /// Tables of χ²: upper 5 % points of 1, 10 and 100 degrees of freedom; and a normal distribution for very many.
     #[test]
     fn exact_tails() {
-        for (count, chi2) in [(1, 3.841_458_82), (10, 18.307_038_05), (100, 124.342_113_4)] {
-            let found = probability_of_larger(&Part { count, chi2 }, 1.0, 1.0).unwrap();
-            assert!((found - 0.05).abs() < 1e-8, "{count} {found}");
+        for (freedom, chi2) in [(1.0, 3.841_458_82), (10.0, 18.307_038_05), (100.0, 124.342_113_4)]
+        {
+            let found = probability_of_larger(&Part { freedom, chi2 }, 1.0, 1.0).unwrap();
+            assert!((found - 0.05).abs() < 1e-8, "{freedom} {found}");
         }
-        let count = 2_000_000;
+        let freedom = 2e6f64;
         for (deviations, tail) in [(0.0, 0.5), (2.0, 0.022_750)] {
-            let chi2 = count as f64 + deviations * (2.0 * count as f64).sqrt();
-            let found = probability_of_larger(&Part { count, chi2 }, 1.0, 1.0).unwrap();
+            let chi2 = freedom + deviations * (2.0 * freedom).sqrt();
+            let found = probability_of_larger(&Part { freedom, chi2 }, 1.0, 1.0).unwrap();
             assert!((found - tail).abs() < 5e-4, "{found}");
         }
         // Twice the mean, or twice the standard deviation: a quarter of the degrees of freedom.
-        let twice = Part { count: 40, chi2: 2.0 * 18.307_038_05 };
-        let found = probability_of_larger(&Part { count: 10, ..twice }, 2.0, 1.0).unwrap();
+        let twice = Part { freedom: 40.0, chi2: 2.0 * 18.307_038_05 };
+        let found = probability_of_larger(&Part { freedom: 10.0, ..twice }, 2.0, 1.0).unwrap();
         assert!((found - 0.05).abs() < 1e-8);
-        let wide = Part { count: 40, chi2: 4.0 * 18.307_038_05 };
+        let wide = Part { freedom: 40.0, chi2: 4.0 * 18.307_038_05 };
         assert!((probability_of_larger(&wide, 1.0, 2.0).unwrap() - 0.05).abs() < 1e-8);
         assert!(probability_of_larger(&Part::default(), 1.0, 1.0).is_none());
     }
@@ -118,6 +123,7 @@ mod tests {
             value: random.sample::<f64, _>(StandardNormal)
                 + if pair == [0, 1] { offset } else { 0.0 },
             datum: 0.0,
+            freedom: 1.0,
             stations: pair.to_vec(),
         };
         let pairs = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];

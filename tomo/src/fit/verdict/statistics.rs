@@ -6,21 +6,26 @@ use std::collections::{BTreeMap, HashMap};
 /// Sums over some residuals.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Part {
-    /// Real data.
-    pub count: usize,
+    /// Real data, less what gains that are solved for use up of them: the χ² that a right model has.
+    pub freedom: f64,
     /// χ².
     pub chi2: f64,
 }
 
 impl Part {
-    fn add(&mut self, value: f64) {
-        self.count += 1;
+    fn add(&mut self, value: f64, freedom: f64) {
+        self.freedom += freedom;
         self.chi2 += value * value;
+    }
+
+    /// Returns the number of data that are left, to the nearest whole one.
+    pub fn count(&self) -> usize {
+        self.freedom.round() as usize
     }
 
     /// χ² per datum; none without data.
     pub fn per_datum(&self) -> Option<f64> {
-        (self.count > 0).then(|| self.chi2 / self.count as f64)
+        (self.count() > 0).then(|| self.chi2 / self.freedom)
     }
 }
 
@@ -107,17 +112,17 @@ impl Statistics {
         let mut frame = Part::default();
         let mut now = Frame::default();
         let mut seen: HashMap<Vec<u16>, usize> = HashMap::new();
-        for Residual { value, datum, stations } in residuals {
-            frame.add(value);
-            self.all.add(value);
+        for Residual { value, datum, freedom, stations } in residuals {
+            frame.add(value, freedom);
+            self.all.add(value, freedom);
             self.sum += value;
             self.signal += datum * datum;
             if stations.is_empty() {
                 self.add_plain(value, &mut now, width);
                 continue;
             }
-            stations.iter().for_each(|k| self.stations.entry(*k).or_default().add(value));
-            self.groups.entry(stations.clone()).or_default().add(value);
+            stations.iter().for_each(|k| self.stations.entry(*k).or_default().add(value, freedom));
+            self.groups.entry(stations.clone()).or_default().add(value, freedom);
             // Stations may have several data in a frame, such as real and imaginary part: their
             // order tells which of them is the same quantity in the next frame.
             let repeat = seen.entry(stations.clone()).or_default();
@@ -137,7 +142,7 @@ impl Statistics {
         if self.pixels.len() == at {
             self.pixels.push(PixelSum::default());
         }
-        self.pixels[at].part.add(value);
+        self.pixels[at].part.add(value, 1.0);
         self.pixels[at].sum += value;
         if let Some(before) = self.before.plain.get(at) {
             self.in_time.add(*before, value);
@@ -156,7 +161,7 @@ impl Statistics {
 
     /// Mean residual, in σ; none without data.
     pub fn mean(&self) -> Option<f64> {
-        (self.all.count > 0).then(|| self.sum / self.all.count as f64)
+        (self.all.count() > 0).then(|| self.sum / self.all.freedom)
     }
 
     /// Root mean square of the residuals over that of the data; none for data without a natural zero.

@@ -13,7 +13,7 @@ fn baselines(frames: usize, of: impl Fn(usize, usize, f64) -> f64) -> Statistics
         let pairs = (0..4u16).flat_map(|a| (a + 1..4).flat_map(move |b| [vec![a, b], vec![a, b]]));
         let noise = pairs.enumerate().map(|(at, stations)| {
             let value = of(k, at, StandardNormal.sample(&mut random));
-            Residual { value, datum: 10.0, stations }
+            Residual { value, datum: 10.0, freedom: 1.0, stations }
         });
         noise.collect()
     };
@@ -36,7 +36,7 @@ fn exact_noise_about_the_truth_is_explained() {
     let pixels = (0..20).map(|k| {
         let mut random = Pcg64Mcg::seed_from_u64(k);
         let value = |_| StandardNormal.sample(&mut random);
-        let plain = |value| Residual { value, datum: 1.0, stations: vec![] };
+        let plain = |value| Residual { value, datum: 1.0, freedom: 1.0, stations: vec![] };
         (0..256).map(value).map(plain).collect()
     });
     let found = verdict(Statistics::of(pixels, 16), Errors::Assumed);
@@ -49,6 +49,7 @@ fn exact_statistics_are_sums() {
     let one = |value: f64, stations: [u16; 2]| Residual {
         value,
         datum: 2.0,
+        freedom: 1.0,
         stations: stations.to_vec(),
     };
     let frames = [
@@ -56,15 +57,15 @@ fn exact_statistics_are_sums() {
         vec![one(4.0, [0, 1]), one(-1.0, [1, 2])],
     ];
     let found = Statistics::of(frames, 1);
-    assert_eq!((found.all.count, found.chi2()), (5, Some(31.0 / 5.0)));
+    assert_eq!((found.all.count(), found.chi2()), (5, Some(31.0 / 5.0)));
     assert_eq!(found.mean(), Some(0.6));
     assert_eq!(found.misfit(), Some((31.0f64 / 20.0).sqrt()));
-    assert_eq!(found.groups[&vec![0, 1]], Part { count: 2, chi2: 17.0 });
-    assert_eq!(found.stations[&2], Part { count: 3, chi2: 14.0 });
-    assert_eq!(found.frames[1], Part { count: 2, chi2: 17.0 });
+    assert_eq!(found.groups[&vec![0, 1]], Part { freedom: 2.0, chi2: 17.0 });
+    assert_eq!(found.stations[&2], Part { freedom: 3.0, chi2: 14.0 });
+    assert_eq!(found.frames[1], Part { freedom: 2.0, chi2: 17.0 });
     // (1, 4) and (−3, −1).
     assert_eq!(found.in_time.correlation(), Some(7.0 / (10.0f64 * 17.0).sqrt()));
-    let plain = |value| Residual { value, datum: 0.0, stations: vec![] };
+    let plain = |value| Residual { value, datum: 0.0, freedom: 1.0, stations: vec![] };
     let image = Statistics::of([[1.0, 2.0, 3.0, 4.0].map(plain).to_vec()], 2);
     assert_eq!((image.in_space.count, image.misfit()), (2, None));
     assert_eq!(image.in_space.correlation(), Some(14.0 / (10.0f64 * 20.0).sqrt()));
@@ -102,12 +103,39 @@ fn exact_what_is_wrong_is_named() {
 #[test]
 fn exact_each_baseline_is_judged_by_its_own_limit() {
     let mut statistics = Statistics::default();
-    statistics.groups.insert(vec![0, 1], Part { count: 30, chi2: 30.0 * 2.25 });
-    statistics.groups.insert(vec![0, 2], Part { count: 500, chi2: 500.0 * 2.1 });
+    statistics.groups.insert(vec![0, 1], Part { freedom: 30.0, chi2: 30.0 * 2.25 });
+    statistics.groups.insert(vec![0, 2], Part { freedom: 500.0, chi2: 500.0 * 2.1 });
     let mut found = Verdict { outcome: Outcome::Explained, reasons: vec![] };
     judge_groups(0, &Tested::gaussian(statistics, Errors::Known), &mut found);
     let faults: Vec<&Fault> = found.reasons.iter().map(|reason| &reason.fault).collect();
     assert_eq!(faults, [&Fault::Group(vec![0, 2], 2.1)]);
+}
+
+/// A triangle of faint stations whose χ² is 3 in the mean over draws of the noise is no worse than others are at 1, and
+/// another one at 3 is.
+#[test]
+fn exact_each_triangle_is_expected_to_be_as_its_draws_are() {
+    let of = |weak: f64, strong: f64| {
+        let mut statistics = Statistics::default();
+        let parts = [(vec![0, 1, 2], weak), (vec![0, 1, 3], strong)];
+        for (stations, chi2) in parts {
+            statistics.groups.insert(stations, Part { freedom: 100.0, chi2: 100.0 * chi2 });
+        }
+        statistics.all = Part { freedom: 200.0, chi2: 100.0 * (weak + strong) };
+        statistics
+    };
+    let draws = [of(2.8, 0.95), of(3.1, 1.0), of(3.1, 1.05)];
+    let judged = |weak: f64, strong: f64| {
+        let tested = Tested::gaussian(of(weak, strong), Errors::Known).among(&draws);
+        let mut found = Verdict { outcome: Outcome::Explained, reasons: vec![] };
+        judge_groups(0, &tested, &mut found);
+        (found, tested.predicted().unwrap().groups.unwrap())
+    };
+    let (right, probability) = judged(3.2, 0.98);
+    assert!(right.reasons.is_empty() && probability > 0.1, "{right:?} {probability}");
+    let (wrong, probability) = judged(3.0, 3.0);
+    assert!(matches!(&wrong.reasons[0].fault, Fault::Group(at, _) if at[..] == [0, 1, 3]));
+    assert!(probability < 1e-6, "{probability}");
 }
 
 /// Errors of calibration last: only their size is judged.
@@ -165,7 +193,7 @@ fn exact_a_fit_and_its_draws_are_judged_alike() {
             let noise: f64 = StandardNormal.sample(&mut random);
             size.sqrt() * noise
         };
-        let plain = move |value| Residual { value, datum: 9.0, stations: vec![] };
+        let plain = move |value| Residual { value, datum: 9.0, freedom: 1.0, stations: vec![] };
         (0..100).map(move |_| (0..1470).map(|_| plain(value())).collect::<Vec<_>>())
     };
     for (size, outcome) in [(1.05, Outcome::Explained), (1.3, Outcome::Unexplained)] {

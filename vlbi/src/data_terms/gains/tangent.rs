@@ -1,6 +1,6 @@
 //! Free gains about a model.
 
-use super::{GainTerm, Residual};
+use super::{GainTerm, Residual, left_free};
 use crate::Complex64;
 use crate::data_terms::DataTerm;
 use crate::operator::Float;
@@ -89,17 +89,19 @@ impl<T: Float> DataTerm<T> for TangentTerm {
         left.norm_squared()
     }
 
-    /// Those of the data at the gains that are best, each under the stations of its baseline: as many as there are degrees
-    /// of freedom, turned as [`GainTerm`]'s are.
+    /// Those of the data at the gains that are best, as [`GainTerm`]'s.
     fn residuals(&self, model: &[Complex<T>]) -> Vec<Residual> {
-        let mut left = self.left(model);
-        self.slopes.clone().qr().q_tr_mul(&mut left);
+        let left = self.left(model);
         let baselines = self.term.baselines.iter().flat_map(|pair| [pair.to_vec(), pair.to_vec()]);
         let free = self.term.amplitudes_free().into_iter();
         let stations = free.map(|(k, _)| vec![self.term.stations[k]]);
-        let all = left.iter().zip(baselines.chain(stations));
-        let residual =
-            |(value, stations): (&f64, Vec<u16>)| Residual { value: *value, datum: 0.0, stations };
-        all.map(residual).skip(self.slopes.ncols()).collect()
+        let all = left.iter().zip(left_free(self.slopes.clone())).zip(baselines.chain(stations));
+        let residual = |((value, freedom), stations): ((&f64, f64), Vec<u16>)| Residual {
+            value: *value,
+            datum: 0.0,
+            freedom,
+            stations,
+        };
+        all.map(residual).collect()
     }
 }

@@ -39,7 +39,7 @@ fn exact_gradients_of_the_least_chi2() {
     conformance::data_term::<f32>("in single precision", &free, &single, 1e-2, 2e-3);
 }
 
-/// χ² of the truth is the number of degrees of freedom; residuals add up to it, one each.
+/// χ² of the truth is the number of degrees of freedom; residuals and their freedoms add up to both.
 #[test]
 fn exact_degrees_of_freedom() {
     let (mut sums, count) = ([0.0; 2], 200);
@@ -77,6 +77,24 @@ fn exact_closures_are_the_limit_of_free_gains() {
         .sum();
     let gains = value(&free, &model);
     assert!((gains / closures - 1.0).abs() < 0.02, "{gains} {closures}");
+}
+
+/// Every baseline keeps its two residuals, and the one that is wrong has the largest over what gains leave of it.
+#[test]
+fn exact_residuals_stay_with_their_baselines() {
+    let (mut data, truth) = scan(2, 30.0);
+    let wrong = 17;
+    let sigma = data.rows[wrong].noise_sigma[0];
+    data.rows[wrong].products[0] += 12.0 * sigma;
+    let term = GainTerm::visibilities(&data, &priors(true)).unwrap();
+    let residuals = DataTerm::<f64>::residuals(&term, &truth);
+    for row in &data.rows {
+        let own = residuals.iter().filter(|residual| residual.stations == row.stations);
+        assert_eq!(own.count(), 2);
+    }
+    let size = |residual: &Residual| residual.value.powi(2) / residual.freedom;
+    let largest = residuals.iter().max_by(|a, b| size(a).total_cmp(&size(b))).unwrap();
+    assert_eq!(largest.stations, data.rows[wrong].stations);
 }
 
 #[test]

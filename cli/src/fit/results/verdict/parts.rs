@@ -12,7 +12,7 @@ fn series<'a>(name: &str, parts: impl Iterator<Item = (f64, &'a Part)>) -> Serie
     for (x, part) in parts {
         if let Some(chi2) = part.per_datum() {
             points.push([x, chi2]);
-            errors.push((2.0 / part.count as f64).sqrt());
+            errors.push((2.0 / part.freedom).sqrt());
         }
     }
     Series { name: name.to_owned(), points, errors, marks: Marks::Points }
@@ -100,7 +100,7 @@ pub fn by_station(judged: &DataVerdict) -> Option<Table> {
     let cells = |station: u16, tested: &Tested| {
         let part = tested.statistics.stations.get(&station).copied().unwrap_or_default();
         let chi2 = part.per_datum().map_or("–".to_owned(), short);
-        [chi2, part.count.to_string()]
+        [chi2, part.count().to_string()]
     };
     let row = |station: u16| {
         let cells = measured.iter().flat_map(|(_, tested)| cells(station, tested));

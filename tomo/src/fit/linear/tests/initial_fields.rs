@@ -141,7 +141,7 @@ impl FrameTerm<f64> for Broken {
     }
     fn residuals(&self, frame: usize, _: &[f64]) -> Vec<Residual> {
         let value = if frame == 4 { f64::NAN } else { 1.0 };
-        vec![Residual { value, datum: 0.0, stations: Vec::new() }]
+        vec![Residual { value, datum: 0.0, freedom: 1.0, stations: Vec::new() }]
     }
 }
 
