@@ -2,26 +2,31 @@
 
 use super::{FitData, Result};
 use crate::fit::settings::{Loss, LossKind};
+use kerrlight_vlbi::gains::GainPriors;
 use kerrlight_vlbi::noise::add_thermal_noise;
-use kerrlight_vlbi::observation::Row;
+use kerrlight_vlbi::observation::{Observation, Row};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
 impl FitData {
     /// The data with noise once more, `factor` times as large as their errors: what might as well have been measured.
-    /// Every frame's pixels get that of the loss that they are in; visibilities that of their rows.
+    /// Every frame's pixels get that of the loss that they are in; visibilities that of their rows, and where gains are solved for,
+    /// other gains of their priors.
     ///
     /// # Errors
     /// If there is no room for the movie.
     pub fn perturbed(&self, losses: &[Loss], factor: f64, seed: u64) -> Result<Self> {
         let mut copy = self.without_truth();
-        if let Some((observation, _)) = &mut copy.visibilities {
+        if let Some((observation, frames)) = &mut copy.visibilities {
             let scale = |row: &mut Row, by: f64| row.noise_sigma.iter_mut().for_each(|s| *s *= by);
             observation.rows.iter_mut().for_each(|row| scale(row, factor));
             add_thermal_noise(observation, seed);
             // Errors stay as they are stated: the noise alone is scaled.
             observation.rows.iter_mut().for_each(|row| scale(row, 1.0 / factor));
+            if let Some(priors) = &self.gains {
+                multiply_gains(observation, frames, priors, seed);
+            }
         }
         let of = |kind: LossKind| losses.iter().find(|loss| loss.data == kind)?.sigma;
         if let Some(movie) = &mut copy.movie
@@ -49,10 +54,63 @@ impl FitData {
     }
 }
 
+/// Stream of the random numbers of gains, others than those of noise.
+const GAINS: u64 = 0x6761_696e;
+
+/// Multiplies data and their errors by amplitudes of gains that the priors draw, new ones for each frame. A solution for gains then
+/// has a prior about other amplitudes than 1: draws vary by what the priors leave open, not by noise alone.
+fn multiply_gains(observation: &mut Observation, frames: &[usize], priors: &GainPriors, seed: u64) {
+    let mut random = Pcg64::seed_from_u64(seed ^ GAINS);
+    let mut draw = || {
+        priors.amplitude_sigma.iter().map(|s| s * random.sample::<f64, _>(StandardNormal)).collect()
+    };
+    let (mut gains, mut drawn): (Vec<f64>, _) = (draw(), 0);
+    for (row, frame) in observation.rows.iter_mut().zip(frames) {
+        while drawn < *frame {
+            (gains, drawn) = (draw(), drawn + 1);
+        }
+        let [first, second] = row.stations.map(|k| gains[usize::from(k)]);
+        let factor = (first + second).exp();
+        row.products.iter_mut().for_each(|product| *product *= factor);
+        row.noise_sigma.iter_mut().for_each(|sigma| *sigma *= factor);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use kerrlight_common::frames::Frames;
+    use kerrlight_vlbi::Complex64;
+    use kerrlight_vlbi::array::Station;
+    use kerrlight_vlbi::observation::Basis;
+
+    /// Gains of two stations of a prior of 0.3 scatter the amplitudes of a frame by √2 times as much, and σ with them.
+    #[test]
+    fn exact_gains_of_draws_scatter_as_their_priors_say() {
+        let mut observation = Observation::empty(Basis::Stokes);
+        observation.stations = ["A", "B"].map(Station::named).to_vec();
+        let frames: Vec<usize> = (0..2000).collect();
+        let row = |k: &usize| Row {
+            time_h: *k as f64,
+            integration_s: 1.0,
+            stations: [0, 1],
+            uv: [1e9, 0.0],
+            products: [Complex64::new(1.0, 0.0); 4],
+            noise_sigma: [1e-9, f64::NAN, f64::NAN, f64::NAN],
+            opacity: [0.0; 2],
+            channel: 0,
+        };
+        observation.rows = frames.iter().map(row).collect();
+        let gains = Some(GainPriors { free_phases: false, amplitude_sigma: vec![0.3; 2] });
+        let data = FitData { visibilities: Some((observation, frames)), gains, ..FitData::empty() };
+        let drawn = data.perturbed(&[], 1.0, 5).unwrap().visibilities.unwrap().0;
+        let squares = drawn.rows.iter().map(|row| row.products[0].norm().ln().powi(2));
+        let scatter = (squares.sum::<f64>() / 2000.0).sqrt();
+        assert!((scatter / (0.3 * 2f64.sqrt()) - 1.0).abs() < 0.06, "{scatter}");
+        for row in &drawn.rows {
+            assert!((row.noise_sigma[0] / row.products[0].norm() / 1e-9 - 1.0).abs() < 1e-6);
+        }
+    }
 
     /// Sums of pixels scatter by the error of the total flux, pixels of images by their own.
     #[test]
