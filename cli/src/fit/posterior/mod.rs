@@ -29,7 +29,6 @@ use kerrlight_tomo::representation::Registry;
 use predictive::Check;
 use sample::Through;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -198,6 +197,7 @@ fn add_up(
     // With the prior that held-out frames have chosen, which is that of the draws.
     let file = held_out::settled(&prepared.settings, folder)?;
     let found = summary::Summary::new(&file, geometry.as_deref(), all, truth)?;
+    let found = found.of_fit(Results::read(folder)?.explains());
     page::write(&found, prepared, path)?;
     let numbers = found.numbers();
     output::Output::new(&path.join(NUMBERS), "")?.write(sealed(numbers.clone()).as_bytes())?;
@@ -231,11 +231,28 @@ fn geometries<'a>(
     Ok(GeometryPosterior::new(settings, measured, unknown, best, &spread, factor)?)
 }
 
+/// What draws need of the verdict.
+#[derive(Deserialize)]
+struct Judged {
+    outcome: String,
+    data: Vec<JudgedData>,
+}
+
+#[derive(Deserialize)]
+struct JudgedData {
+    chi2_per_datum: Option<f64>,
+    expected: Option<ExpectedMean>,
+}
+
+#[derive(Deserialize)]
+struct ExpectedMean {
+    mean: f64,
+}
+
 /// What draws need of all results of a fit.
 #[derive(Deserialize)]
 struct Results {
-    /// χ² of each kind of data over their number.
-    chi2_per_datum: BTreeMap<String, Option<f64>>,
+    verdict: Judged,
     /// Steps that the fit took.
     steps: u64,
 }
@@ -246,10 +263,18 @@ impl Results {
         serde_json::from_str(&text).context("results.json is damaged")
     }
 
-    /// Noise of a draw over the errors of the data: these are too small where the model does not explain them.
+    /// Returns whether the fit explains its data.
+    fn explains(&self) -> bool {
+        self.verdict.outcome != "unexplained"
+    }
+
+    /// Noise of a draw over the errors of the data: these are too small where χ² is above that of a right model.
     fn noise(&self) -> f64 {
-        let chi2 = self.chi2_per_datum.values().flatten();
-        chi2.copied().fold(1.0f64, f64::max).sqrt()
+        let excess = |of: &JudgedData| {
+            let expected = of.expected.as_ref().map_or(1.0, |expected| expected.mean);
+            of.chi2_per_datum.map(|chi2| chi2 / expected)
+        };
+        self.verdict.data.iter().filter_map(excess).fold(1.0f64, f64::max).sqrt()
     }
 }
 

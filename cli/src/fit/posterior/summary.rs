@@ -48,6 +48,8 @@ pub struct Summary {
     samples: usize,
     /// Noise of the draws over the errors of the data.
     factor: f64,
+    /// True if the fit explains its data.
+    is_explained: bool,
     /// Part of the mean's light at nodes whose mean is above three standard deviations.
     certain: f64,
     /// Posterior predictive checks, one for each kind of data with errors.
@@ -60,8 +62,6 @@ pub struct Summary {
 
 /// Nodes are open where the draws have at least this part of the prior's standard deviation.
 const OPEN: f32 = 0.8;
-/// Noise over the errors of the data above which a model is wrong: χ² of 1.2 per data point.
-const WRONG: f64 = 1.1;
 /// Random nodes at which a truth is looked at.
 const NODES: f64 = 1000.0;
 /// Nodes shine where the truth is brighter than this part of its maximum.
@@ -103,11 +103,18 @@ impl Summary {
             ranks,
             samples: draws.len(),
             factor,
+            is_explained: true,
             certain,
             predicted: predictive::checks(draws),
             open,
             open_part,
         })
+    }
+
+    /// Says whether the fit explains its data.
+    #[must_use]
+    pub fn of_fit(self, is_explained: bool) -> Self {
+        Self { is_explained, ..self }
     }
 
     /// Numbers for a script.
@@ -153,7 +160,7 @@ impl Summary {
     /// Describes what a person wants to know.
     pub fn sentences(&self) -> Vec<String> {
         let mut all = Vec::new();
-        if self.factor > WRONG {
+        if !self.is_explained {
             all.push(format!(
                 "The model does not explain the data: draws have noise {:.1} times as large as the errors, and intervals \
                  are those of a model that is wrong.",
