@@ -225,12 +225,14 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
         chi2 / self.data()
     }
 
-    /// χ² over the number of data in a geometry with its volume, without what changes of emission cost: that is no noise.
+    /// χ² over the number of data in a geometry with its volume, without penalties and what changes of emission cost: these are no
+    /// noise. −2 ln of a Gaussian prior is part of it: voxels that follow noise there cost as much as they gain.
     ///
     /// # Errors
     /// If a number is out of its range.
     pub fn left(&self, estimate: &Estimate) -> Result<f64, Error> {
-        if !self.change.is_any() {
+        let has_penalties = self.gaussian.is_none() && !self.penalties.is_empty();
+        if !self.change.is_any() && !has_penalties {
             return Ok(self.reduced(estimate.chi2));
         }
         let forward: ForwardModel<T> = self.model.forward(&estimate.geometry)?;

@@ -118,7 +118,7 @@ impl GeometryResults {
         let free = &unknown.free;
         let spread = found.spread.as_ref();
         let sigma = |k: usize| spread.map(|spread| spread.sigma[k]);
-        let trials = trials(free, &found.trials, &sigma);
+        let trials = trials(free, &found.trials, found.noise_factor, &sigma);
         let truth = true_geometry(settings, measured)?;
         let interval = |span: Span| {
             each(free, |k, parameter| {
@@ -194,6 +194,7 @@ impl From<Resolution> for ResolutionResults {
 fn trials(
     free: &[Free],
     trials: &[Trial],
+    noise_factor: f64,
     sigma: &dyn Fn(usize) -> Option<f64>,
 ) -> Vec<TrialResults> {
     let least = trials.iter().map(|trial| trial.value).fold(f64::INFINITY, f64::min);
@@ -203,7 +204,7 @@ fn trials(
         above_best: trial.value - least,
         trials: trial.trials,
         converged: has_converged(free, trial, sigma),
-        same: is_same(free, trial, trials, sigma),
+        same: is_same(free, trial, trials, noise_factor, sigma),
     };
     trials.iter().map(one).collect()
 }
@@ -265,12 +266,13 @@ fn is_same(
     free: &[Free],
     trial: &Trial,
     trials: &[Trial],
+    noise_factor: f64,
     sigma: &dyn Fn(usize) -> Option<f64>,
 ) -> bool {
     let best = trials.iter().min_by(|a, b| a.value.total_cmp(&b.value));
     best.is_some_and(|best| {
-        // What chance makes of χ²/2 of as many data.
-        let chance = (best.value / best.reduced_chi2).sqrt().max(ALIKE);
+        // What chance makes of χ²/2 of as many data, whose errors are `noise_factor` times those that χ²/N was taken with.
+        let chance = (noise_factor * (best.value / best.reduced_chi2).sqrt()).max(ALIKE);
         let above = trial.value - best.value;
         let is_near = |(k, Free { parameter, .. }): (usize, &Free)| {
             let apart = parameter.difference(trial.end.get(*parameter), best.end.get(*parameter));
@@ -301,9 +303,9 @@ mod tests {
             [(0.51, 5.0, true), (0.53, 5.0, false), (0.53, 1.0, true), (0.51, 50.0, false)]
         {
             let trials = [trial(0.5, 100.0), trial(spin, 100.0 + above)];
-            let same = is_same(&free, &trials[1], &trials, &|_| Some(0.01));
+            let same = is_same(&free, &trials[1], &trials, 1.0, &|_| Some(0.01));
             assert_eq!(same, expected, "{spin} {above}");
-            assert!(is_same(&free, &trials[0], &trials, &|_| None));
+            assert!(is_same(&free, &trials[0], &trials, 1.0, &|_| None));
         }
         for (further, expected) in [(0.505, true), (0.52, false)] {
             let further = Some(Geometry::new(further, 1.0));

@@ -82,6 +82,15 @@ fn seen_through(file: &FitFile, model: GeometryModel, rays: RaySampling) -> Resu
 }
 
 /// Returns the properties that all geometries share.
+/// Returns whether a velocity is another one where the hole spins otherwise.
+fn follows_spin<N>(velocity: &Velocity<N>) -> bool {
+    match velocity {
+        Velocity::Keplerian { drag } | Velocity::Infall { drag, .. } => drag.is_none(),
+        Velocity::Perturbed(perturbed) => follows_spin(&perturbed.of),
+        _ => false,
+    }
+}
+
 fn model(file: &FitFile, instrument: &Instrument, motion: &Motion) -> Result<GeometryModel> {
     let Sampling::Gauss { order, split } = file.region.nodes else {
         let why = "a number with a prior needs region.nodes = { gauss = { order, split } }: nodes equidistant in Mino time \
@@ -96,9 +105,16 @@ fn model(file: &FitFile, instrument: &Instrument, motion: &Motion) -> Result<Geo
         let why = "a number with a prior needs [axis.known]: matter turns about motion.axis, in the frame of the hole";
         return Err(FitError::Conflict(why.to_owned()).into());
     }
-    let law = match file.motion.velocity {
+    let law = match &file.motion.velocity {
+        Velocity::Perturbed(perturbed)
+            if file.hole.spin.prior().is_some() && follows_spin(&perturbed.of) =>
+        {
+            let why = "a spin with a prior needs a number for `drag` in motion.velocity.perturbed.of: rates that were perturbed \
+                       stay the same in every trial";
+            return Err(FitError::Conflict(why.to_owned()).into());
+        }
         Velocity::Keplerian { drag: None } => Law::CircularOrbits,
-        Velocity::Infall { drag, .. } => Law::Infall(drag),
+        Velocity::Infall { drag, .. } => Law::Infall(*drag),
         _ => Law::Fixed(motion.velocity.clone()),
     };
     let [x, y] = instrument.pixels.clone();

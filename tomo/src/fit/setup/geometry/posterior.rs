@@ -25,7 +25,7 @@ pub(super) fn polished(
     start: &Estimate,
 ) -> Result<(Polished, f64)> {
     let polished = problem.polish(start)?;
-    let reduced = problem.scale * problem.reduced(polished.best.chi2);
+    let reduced = problem.scale * problem.left(&polished.best)?;
     Ok((polished, reduced))
 }
 
@@ -172,7 +172,7 @@ impl<'a> GeometryPosterior<'a> {
         let each = self.free.iter().zip(&shares).enumerate();
         let drawn = each.fold(self.geometry, |geometry, (k, (free, share))| {
             let value = match self.open[k] {
-                true => free.prior.quantile(*share),
+                true => free.quantile(*share),
                 false => geometry.get(free.parameter) + step[k],
             };
             geometry.with(free.parameter, value)

@@ -137,8 +137,11 @@ impl Detail<'_> {
         let Place { at, seen, .. } = &here.place;
         let nodes = finer(at.nodes);
         let (asks, degree) = self.through(&here.place, |problem| {
-            let chi2 = even.map_or(here.best.chi2, |even| even.best.chi2);
-            let excess = problem.excess(problem.scale * problem.reduced(chi2));
+            let reduced = match even {
+                Some(even) => problem.reduced(even.best.chi2),
+                None => problem.left(&here.best)?,
+            };
+            let excess = problem.excess(problem.scale * reduced);
             Ok((excess > 0.0 && problem.gaussian.is_none(), problem.effort.degree))
         })?;
         let voxels = Voxels::cube(nodes, self.file.region.r_max, degree);
