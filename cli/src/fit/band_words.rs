@@ -45,7 +45,7 @@ fn data(file: &FitFile, measured: &FitData) -> Vec<String> {
                 format!("Position angles were turned by {turn}°, to take Faraday rotation back.")
             }));
         }
-        _ => text.push("The data are simulated, with the law and the rays of the fit.".to_owned()),
+        _ => text.push("The data are simulated.".to_owned()),
     }
     text
 }

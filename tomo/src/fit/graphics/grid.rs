@@ -75,14 +75,13 @@ impl Levels {
         self.all.iter().map(uniform).collect()
     }
 
-    /// The kernels, what they add slopes up in, and the grids as shaders see them.
-    fn prepared(
-        &self,
-        device: &Compute,
-    ) -> Result<(Vec<Kernel>, [Buffer; 2], Vec<Buffer>), GpuError> {
-        let kernels = compiled(device, &[ACTIVATIONS, SHADER].join("\n"), &ENTRIES)?;
-        let sums = [device.storage(4)?, device.storage(8 * self.parameters() as u64)?];
-        Ok((kernels, sums, self.uniforms(device)?))
+    fn kernels(&self, device: &Compute) -> Result<Vec<Kernel>, GpuError> {
+        compiled(device, &[ACTIVATIONS, SHADER].join("\n"), &ENTRIES)
+    }
+
+    /// Where kernels add slopes up.
+    fn sums(&self, device: &Compute) -> Result<[Buffer; 2], GpuError> {
+        Ok([device.storage(4)?, device.storage(8 * self.parameters() as u64)?])
     }
 
     /// Voxels with an activation that read these parameters and add to this gradient; with `of_places` they find dL/dplace,
@@ -97,7 +96,8 @@ impl Levels {
         learning: &Learning,
         of_places: bool,
     ) -> Result<Field, GpuError> {
-        let (kernels, sums, uniforms) = &self.prepared(device)?;
+        let (kernels, sums) = (&self.kernels(device)?, &self.sums(device)?);
+        let uniforms = &self.uniforms(device)?;
         let block = &device.uniform(&words(&[0, points.room as u32, 0, 0]))?;
         let slopes = &device.storage(4 * points.room as u64)?;
         // Kernels of voxels are not bound to rows.
@@ -124,7 +124,8 @@ impl Levels {
         learning: &Learning,
         of_places: bool,
     ) -> Result<Field, GpuError> {
-        let (kernels, sums, uniforms) = &self.prepared(device)?;
+        let (kernels, sums) = (&self.kernels(device)?, &self.sums(device)?);
+        let uniforms = &self.uniforms(device)?;
         let Network { mut field, uniforms: blocks, rows, of_inputs } = network;
         let (rows, slopes, stride) = (&rows, &of_inputs, field.stride);
         for (tasks, block) in field.blocks.iter_mut().zip(&blocks) {

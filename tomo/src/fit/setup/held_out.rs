@@ -15,7 +15,7 @@ use kerrlight_render::dynamics::Axis;
 pub struct Held {
     /// The value of the setting.
     pub value: f64,
-    /// Loss of each part that was held out: χ² per data point, weighted as in the fit.
+    /// χ² per data point of each part that was held out; of several kinds of data their mean, weighted as in the fit.
     pub losses: Vec<f64>,
 }
 
@@ -106,7 +106,11 @@ fn loss(of: &Of<'_>, [kept, out]: &[Vec<usize>; 2], watch: &mut Watch<'_>) -> Re
     if solution.ending == Ending::Cancelled {
         return Ok(None);
     }
-    misfit(of, out, &solution.parameters()).map(Some)
+    // Beside a prior of the voxels it is a mean over all data already.
+    let has_prior = of.file.linear.as_ref().is_some_and(|linear| linear.prior.is_some());
+    let weights: f64 = of.file.loss.iter().map(|loss| loss.weight).sum();
+    let whole = if has_prior { 1.0 } else { weights };
+    misfit(of, out, &solution.parameters()).map(|sum| Some(sum / whole))
 }
 
 #[cfg(test)]

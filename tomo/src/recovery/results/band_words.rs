@@ -27,10 +27,12 @@ impl BandResults {
             orbit(self.emission_radius, self.period_min.interval, &self.radii),
             format!("At the reference time {}.", place_of(self.azimuth_deg)),
         ]);
-        if self.rotation_factor.probabilities.len() > 1 {
+        let factors = &self.rotation_factor.probabilities;
+        // Of all geometries together: that of the best one alone may be improbable.
+        let likeliest = factors.iter().max_by(|a, b| a[1].total_cmp(&b[1]));
+        if let Some([factor, _]) = likeliest.filter(|_| factors.len() > 1) {
             all.push(format!(
-                "Most probably it turns {:.2} times as fast as the law of motion says, in the law's sense with a probability of {:.3}.",
-                self.rotation_factor.best,
+                "Most probably it turns {factor:.2} times as fast as the law of motion says, in the law's sense with a probability of {:.3}.",
                 self.forward()
             ));
             all.extend(self.clockwise.map(|clockwise| {
