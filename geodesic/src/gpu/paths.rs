@@ -62,8 +62,8 @@ impl PathKernel {
             rooms.extend([all, room(end)].into_iter().flat_map(|word| (word as u32).to_le_bytes()));
             all += room(end);
         }
-        let (inputs, room) = ([points, &rooms], [(all * STEP_BYTES) as u64]);
-        let outputs = kernel::run(device, &self.0, task.rays, &task.bytes(), &inputs, &room)?;
+        let (inputs, bytes) = ([points, &rooms], [(all * STEP_BYTES) as u64]);
+        let outputs = kernel::run(device, &self.0, task.rays, &task.bytes(), &inputs, &bytes)?;
         let mut rest = &outputs[0][..];
         for end in ends {
             let (own, others) = rest.split_at(room(end) * STEP_BYTES);
