@@ -85,11 +85,12 @@ pub struct Fit {
     /// Stop, keeping what there is, when standard input ends: for programs that start fits
     #[arg(long, hide = true)]
     stop_with_input: bool,
-    /// Write a commented file to start from, for a fit of these data (visibilities or images), or of the built-in
-    /// experiment
+    /// Write a commented file to start from, for a fit of these data (visibilities, images or a light curve), or of the
+    /// built-in experiment
     #[arg(long, value_name = "DATA", num_args = 0..=1, conflicts_with_all = ["file", "set", "resume", "print"])]
     init: Option<Option<PathBuf>>,
-    /// Model for --data or --init: a static image or a volume [default: an image of M87*]
+    /// Model for --data or --init: a static image or a volume [default: an image of M87*, and of Sgr A* if it explains
+    /// the data]
     #[arg(long, value_enum, hide_possible_values = true, value_name = "image|volume", conflicts_with_all = ["file", "resume"])]
     model: Option<init::Model>,
 }

@@ -132,7 +132,7 @@ pub struct StaticVisibilities {
     pub path: DataPaths,
     /// Rows within this time are averaged and share the gains of their stations, s, 0 or above.
     pub average_s: f64,
-    /// Fraction of each amplitude, added to its error in quadrature.
+    /// Fraction of each amplitude, added to its error in quadrature; of each product where all four are fitted.
     pub systematic: f64,
     /// Drops baselines shorter than this.
     pub uv_min: Option<f64>,

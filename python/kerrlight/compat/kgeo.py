@@ -4,8 +4,8 @@ Scripts that trace with kgeo change one import::
 
     from kerrlight.compat.kgeo import raytrace_ana   # was: from kgeo import raytrace_ana
 
-What differs: ``plotdata`` is off by default and nothing is printed; nothing is drawn or saved; every spin in [-1, 1]
-and every inclination is traced, those on the axis and in the equatorial plane included; and a ray within 1e-10 of the
+What differs: ``plotdata`` and ``savedata`` are refused and nothing is printed; every spin in [-1, 1] and every
+inclination is traced, those on the axis and in the equatorial plane included; and a ray within 1e-10 of the
 critical curve is traced, not undefined.
 """
 

@@ -111,8 +111,8 @@ impl<T> Groups<'_, T> {
 ///
 /// Lengths that do not fit together are bugs and panic.
 ///
-/// [`Grid`], [`FeatureGrid`] and [`Network`] are built in. One of your own implements the first five
-/// methods, passes [`conformance`], and enters a [`Registry`] to have a name in fit files.
+/// [`Grid`], [`FeatureGrid`] and [`Network`] are built in. One of your own implements the five methods
+/// without a default, passes [`conformance`], and enters a [`Registry`] to have a name in fit files.
 ///
 /// ```
 /// use kerrlight_tomo::representation::{

@@ -269,7 +269,9 @@ fn calibrated(known: &Calibration) -> String {
     };
     format!(
         "{} images of measurements of the best simple shape tell what the method makes of a known sky: what it adds to the \
-         diameter of the ring is taken off. The shape {rest}. Where an image did not come to a minimum, nothing is taken off.",
+         diameter of the ring, and to its brightest direction where these images agree on one, is taken off. The shape {rest}. \
+         Where something is taken off diameter, direction or flux, the scatter of the draws about their mean counts in place \
+         of their distance. Where an image did not come to a minimum, nothing is taken off.",
         known.images.len()
     )
 }

@@ -18,7 +18,7 @@ pub enum DataFiles {
         /// within half a second as long as no baseline is there twice.
         #[schemars(range(min = 0.0), extend("unit" = "seconds"))]
         average_s: f64,
-        /// Fraction of each amplitude, added to its error in quadrature.
+        /// Fraction of each amplitude, added to its error in quadrature; of each product where all four are fitted.
         #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "part of the amplitude"))]
         systematic: f64,
         /// Time of the first frame, M.

@@ -25,7 +25,7 @@ pub struct Simulation {
     /// The light curve that is observed of it, at times of its own.
     pub light_curve: Option<SimulatedCurve>,
     /// Draws numbers that have a prior from it, with the seed of the fit, for calibration. With `screen.ring_rays`, along
-    /// 16 times as many rays near the critical curve.
+    /// 16 times as many rays near the critical curve where the second forward model does not make the data.
     #[serde(default)]
     pub drawn: bool,
     /// Settings of the hole that differ from the fit's.

@@ -32,7 +32,7 @@ pub struct Observer {
     /// Angle between +z and the line of sight: a value or a prior.
     #[schemars(extend("minimum" = 0.0, "maximum" = 180.0, "unit" = "degrees"))]
     pub inclination_deg: Quantity,
-    /// Position angle of +z on the sky: a value or a prior. At 0 it points north.
+    /// Position angle of +z on the sky: a value or a prior. At 0 it points north; 0 without it.
     #[serde(default = "north", skip_serializing_if = "is_north")]
     #[schemars(extend("minimum" = -360.0, "maximum" = 360.0, "unit" = "degrees east of north"))]
     pub position_angle_deg: Quantity,
