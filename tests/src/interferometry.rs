@@ -205,6 +205,41 @@ fn exact_cross_hands_are_those_of_the_input() {
     }
 }
 
+/// How simulated data came about is in files of every kind: what was not scattered is fitted as it is. Averages by the clock do not
+/// depend on the precision of times, nor do frames on the order in which their files are named.
+#[test]
+fn exact_files_of_every_kind_tell_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_image(path);
+    let kinds = [("a.uvfits", &[][..]), ("a.txt", &[]), ("a.csv", &["--comments"])];
+    for (name, more) in kinds {
+        let more = [more, &["--noise", "thermal", "--seed", "3"]].concat();
+        let seen = ["observe", "image.csv", "--fov-uas", "160", "-o", name];
+        let when = "--array EHT2017 --source sgra --mjd 57850 --utc 10-12 --frames 120 --tint 60";
+        let when: Vec<&str> = when.split(' ').collect();
+        succeed(path, &[&seen[..], &when, &more].concat());
+        let starter = format!("{name}.toml");
+        succeed(path, &["fit", "--init", name, "--model", "volume", "-o", &starter]);
+        let text = std::fs::read_to_string(path.join(&starter)).unwrap();
+        assert!(!text.contains("scattering = \"sgra\""), "{name}: {text}");
+        let mean = format!("mean_{name}.csv");
+        succeed(path, &["convert", name, &mean, "--average", "300"]);
+        let times: std::collections::BTreeSet<u64> =
+            read(path, &mean).rows.iter().map(|row| row.time_h.to_bits()).collect();
+        assert_eq!(times.len(), 24, "{name}");
+    }
+    let pixel = |k: usize| std::fs::write(path.join(format!("f_{k}.csv")), format!("{k}\n"));
+    (1..=3).chain([10]).for_each(|k| pixel(k).unwrap());
+    let shell = ["f_1.csv", "f_10.csv", "f_2.csv", "f_3.csv"];
+    let seen = "--fov-uas 1 --array EHT2017 --source sgra --mjd 57850 --utc 12-13 --frames 4 --tint 60 -o f.csv";
+    let seen: Vec<&str> = seen.split(' ').collect();
+    succeed(path, &[&["observe"], &shell[..], &seen].concat());
+    let flux = |k: usize| find(&read(path, "f.csv"), 12.0 + k as f64 / 4.0, ["ALMA", "APEX"]).1.re;
+    let fluxes: Vec<f64> = (0..4).map(|k| flux(k).round()).collect();
+    assert_eq!(fluxes, [1.0, 2.0, 3.0, 10.0]);
+}
+
 #[test]
 fn exact_uv_writes_table_and_pictures() {
     let folder = tempfile::tempdir().unwrap();

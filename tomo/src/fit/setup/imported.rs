@@ -122,9 +122,16 @@ impl Reduction {
     /// called in messages.
     ///
     /// # Errors
-    /// If a visibility has no error, none is left, the frequency of scattered light is not known, or polarised light would
-    /// get the errors of a source that varies.
+    /// If a visibility has no error, none is left, the frequency of scattered light is not known, polarised light would
+    /// get the errors of a source that varies, or turns with the feeds.
     pub fn of(&self, observation: Observation, losses: &[Loss], name: &str) -> Result<Observation> {
+        let turns = observation.history.iter().any(|line| line == "FRCAL: 0");
+        if turns && is_polarized(losses) {
+            refuse!(
+                "{name} says FRCAL: 0, so that its products turn with the feeds of the stations: take the rotation out first, \
+                 or fit total intensity"
+            );
+        }
         let mut observation = averaged(observation, self.average_s, self.uv_min).within(name)?;
         if !is_polarized(losses) {
             observation = observation.total_intensity();
