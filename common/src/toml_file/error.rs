@@ -49,7 +49,7 @@ pub(super) fn brief(text: &str) -> String {
 }
 
 impl ReadError {
-    fn new(message: String) -> Self {
+    pub(super) fn new(message: String) -> Self {
         ReadError { message, keys: Vec::new(), span: None, line: None }
     }
 

@@ -68,9 +68,15 @@ pub fn table_of<T: Serialize>(value: &T) -> Result<Table, ReadError> {
 
 fn written<T: Serialize>(value: &T) -> Result<(String, Table), ReadError> {
     let text = toml::to_string(value).map_err(|error| ReadError::syntax(&error))?;
-    // Whole numbers are written that cannot be read.
-    let table = text.parse::<Table>().map_err(|error| ReadError::syntax(&error))?;
+    let table = readable(&text)?;
     Ok((text, table))
+}
+
+/// Reads what was written: whole numbers are written that TOML does not have.
+fn readable(text: &str) -> Result<Table, ReadError> {
+    let refused =
+        |_| ReadError::new("a whole number above 2^63 − 1 is too large for TOML".to_owned());
+    text.parse::<Table>().map_err(refused)
 }
 
 /// A value as it stands behind `key = `, tables in braces.
@@ -81,7 +87,7 @@ pub fn inline<T: Serialize>(value: &T) -> Result<String, ReadError> {
     let mut text = String::new();
     let written = value.serialize(ValueSerializer::new(&mut text)).map(drop);
     written.map_err(|error| ReadError::syntax(&error))?;
-    Ok(text)
+    readable(&format!("x = {text}")).map(|_| text)
 }
 
 #[cfg(test)]
@@ -159,6 +165,19 @@ mod tests {
             let table: Table = text.parse().unwrap();
             assert_eq!(read_table::<File>(&table).unwrap(), crates, "{more}");
             assert_eq!(table_of(&crates).unwrap(), Table::try_from(&crates).unwrap());
+        }
+    }
+
+    #[test]
+    fn exact_text_of_a_value() {
+        let text = "title = \"a\"\nseed = 3\ncenter = [0.0, 1e-7, -inf]\n\n[law.infall]\nxi = 0.5\n\n\
+                    [[spot]]\nsigma = 1.0\n\n[tables]\n\"a.b\" = 0.1\n\n[own]\n";
+        let value: File = read(text).unwrap();
+        assert_eq!(write(&value).unwrap(), text);
+        assert_eq!(inline(&value.law).unwrap(), "{ infall = { xi = 0.5 } }");
+        let large = File { seed: u64::MAX, ..value };
+        for refused in [write(&large).unwrap_err(), inline(&large).unwrap_err()] {
+            assert!(!refused.to_string().contains('\n'), "{refused}");
         }
     }
 

@@ -1,4 +1,4 @@
-//! Shaders of other crates on an open device: buffers that stay there, kernels, and commands in their order.
+//! Shaders on an open device: buffers that stay there, kernels, and commands in their order.
 
 use super::device::{Adapter, Device, Needs};
 use super::error::GpuError;

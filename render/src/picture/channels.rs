@@ -48,7 +48,7 @@ impl ChannelKind {
     }
 
     /// Returns whether pictures have it only where `screen.channels` names it or its layer.
-    pub(super) fn is_on_request(&self) -> bool {
+    pub fn is_on_request(&self) -> bool {
         matches!(self.value, Value::Layers(_))
     }
 

@@ -49,7 +49,7 @@ pub enum Stopped {
     After(u64),
 }
 
-/// A fit that has come to its end, with all that it is made of.
+/// A fit, with all that it is made of.
 pub struct Fit<'a, 't> {
     /// Settings, with what was found of the geometry.
     pub file: &'a FitFile,

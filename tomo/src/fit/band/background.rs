@@ -25,7 +25,7 @@ pub struct Background {
     #[serde(rename = "variation_jy")]
     #[schemars(range(min = 0.0, max = 1000.0), extend("unit" = "Jy"))]
     pub variation: f64,
-    /// Its correlation time, minutes.
+    /// Its correlation time τ, minutes.
     #[serde(rename = "correlation_min")]
     #[schemars(range(min = 1e-3, max = 1e6), extend("unit" = "minutes"))]
     pub minutes: f64,

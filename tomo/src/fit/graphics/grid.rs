@@ -108,7 +108,7 @@ impl Levels {
         let forward = vec![binding.bind(0, &uniforms[0], &there, points.room)?];
         let mut backward = vec![binding.bind(1, &uniforms[0], &[0, 1, 2, 7, 8, 9], points.room)?];
         backward.extend(binding.scattered(self, uniforms, points.room)?);
-        Ok(Field { stride: points.room, blocks: vec![Block { forward, backward }] })
+        Ok(Field { stride: points.room.max(1), blocks: vec![Block { forward, backward }] })
     }
 
     /// Features that read these parameters and add to this gradient, for a network that is given them; with `of_places`

@@ -51,7 +51,7 @@ pub struct SimulatedCurve {
     pub sigma: PerStokes,
     /// Noise that is added.
     pub noise: Noise,
-    /// A background that is drawn and added to Q and U.
+    /// A background that is drawn and added to Q and U, independent of each other.
     pub background: Option<Background>,
     /// Scales the truth to this mean of I; as bright as its amplitudes without it.
     pub mean_flux: Option<MeanFlux>,
