@@ -20,18 +20,27 @@ pub struct Expected {
 /// Factors and their levels; those that are not named may be any.
 pub type Levels = BTreeMap<String, String>;
 
+/// Factors with several levels: something is expected of each combination of them.
+pub type Each = BTreeMap<String, Vec<String>>;
+
 /// Range of a result of every single case.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Range {
-    /// Cases.
+    /// Cases, one combination after the other.
+    #[serde(default)]
+    pub each: Each,
+    /// What all of them have in common.
+    #[serde(default)]
     pub r#where: Levels,
     /// Name of the result.
     pub value: String,
-    /// Least.
-    pub at_least: Option<f64>,
-    /// Most.
-    pub at_most: Option<f64>,
+    /// Least, of the combinations in turn.
+    #[serde(default)]
+    pub at_least: Vec<f64>,
+    /// Most, likewise.
+    #[serde(default)]
+    pub at_most: Vec<f64>,
     /// Source of the expectation.
     pub source: String,
 }
@@ -40,6 +49,9 @@ pub struct Range {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Order {
+    /// Levels of all cases of an order, unless `falling` has others; one combination after the other.
+    #[serde(default)]
+    pub each: Each,
     /// The best first.
     pub falling: Vec<Levels>,
     /// Name of the result.
@@ -66,13 +78,18 @@ impl Expected {
     /// Reads the file of an experiment.
     ///
     /// # Errors
-    /// If it is not one, or a range has no bound.
+    /// If it is not one, or a range has no bound, or not as many as take turns.
     pub fn parse(text: &str) -> anyhow::Result<Self> {
         let expected: Self = toml::from_str(text)?;
-        if let Some(range) =
-            expected.range.iter().find(|r| r.at_least.is_none() && r.at_most.is_none())
-        {
-            bail!("{}: neither at_least nor at_most", named(&range.r#where));
+        for Range { each, r#where, at_least, at_most, .. } in &expected.range {
+            if at_least.is_empty() && at_most.is_empty() {
+                bail!("{}: neither at_least nor at_most", named(r#where));
+            }
+            let count = combinations(each).len();
+            let take_turns = |all: &[f64]| count.is_multiple_of(all.len().max(1));
+            if !(take_turns(at_least) && take_turns(at_most)) {
+                bail!("{}: bounds of {count} combinations do not take turns", named(r#where));
+            }
         }
         Ok(expected)
     }
@@ -83,9 +100,14 @@ impl Expected {
     /// If these are no results, or no case has a result that is requested.
     pub fn hold(&self, results: &Value) -> anyhow::Result<Vec<Verdict>> {
         let cases = results["cases"].as_array().context("there are no cases")?;
-        let ranges = self.range.iter().map(|range| range.hold(cases));
-        let verdicts: Vec<Verdict> =
-            ranges.chain(self.order.iter().map(|order| order.hold(cases))).collect();
+        let ranges = self.range.iter().flat_map(|range| {
+            let each = combinations(&range.each).into_iter().enumerate();
+            each.map(move |(k, each)| range.hold(cases, &each, k))
+        });
+        let orders = self.order.iter().flat_map(|order| {
+            combinations(&order.each).into_iter().map(move |each| order.hold(cases, &each))
+        });
+        let verdicts: Vec<Verdict> = ranges.chain(orders).collect();
         if verdicts.iter().all(|verdict| verdict.found.is_none()) {
             bail!("no case is one that something is expected of");
         }
@@ -93,13 +115,30 @@ impl Expected {
     }
 }
 
+/// All combinations of levels; that of none where there are no factors.
+fn combinations(each: &Each) -> Vec<Levels> {
+    each.iter().fold(vec![Levels::new()], |all, (factor, levels)| {
+        let with = |of: &Levels, level: &String| {
+            overlaid(of, &Levels::from([(factor.clone(), level.clone())]))
+        };
+        all.iter().flat_map(|of| levels.iter().map(move |level| with(of, level))).collect()
+    })
+}
+
+/// Levels with others in their place.
+fn overlaid(levels: &Levels, others: &Levels) -> Levels {
+    levels.iter().chain(others).map(|(factor, level)| (factor.clone(), level.clone())).collect()
+}
+
 impl Range {
-    fn hold(&self, cases: &[Value]) -> Verdict {
-        let values = values(cases, &self.r#where, &self.value);
-        let bounds = [
-            self.at_least.map(|x| format!("at least {x}")),
-            self.at_most.map(|x| format!("at most {x}")),
-        ];
+    /// Holds the combination with this number.
+    fn hold(&self, cases: &[Value], each: &Levels, number: usize) -> Verdict {
+        let levels = overlaid(each, &self.r#where);
+        let values = values(cases, &levels, &self.value);
+        let in_turn = |all: &[f64]| all.iter().copied().cycle().nth(number);
+        let (at_least, at_most) = (in_turn(&self.at_least), in_turn(&self.at_most));
+        let bounds =
+            [at_least.map(|x| format!("at least {x}")), at_most.map(|x| format!("at most {x}"))];
         let bounds: Vec<String> = bounds.into_iter().flatten().collect();
         let least = values.iter().copied().fold(f64::INFINITY, f64::min);
         let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -111,26 +150,27 @@ impl Range {
             what: format!(
                 "{} of {}: {} ({})",
                 self.value,
-                named(&self.r#where),
+                named(&levels),
                 bounds.join(", "),
                 self.source
             ),
             passed: found.is_none()
-                || (self.at_least.is_none_or(|x| least >= x)
-                    && self.at_most.is_none_or(|x| most <= x)),
+                || (at_least.is_none_or(|x| least >= x) && at_most.is_none_or(|x| most <= x)),
             found,
         }
     }
 }
 
 impl Order {
-    fn hold(&self, cases: &[Value]) -> Verdict {
+    fn hold(&self, cases: &[Value], each: &Levels) -> Verdict {
+        let falling: Vec<Levels> =
+            self.falling.iter().map(|levels| overlaid(each, levels)).collect();
         let mean = |levels: &Levels| {
             let values = values(cases, levels, &self.value);
             (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
         };
-        let means: Option<Vec<f64>> = self.falling.iter().map(mean).collect();
-        let names: Vec<String> = self.falling.iter().map(named).collect();
+        let means: Option<Vec<f64>> = falling.iter().map(mean).collect();
+        let names: Vec<String> = falling.iter().map(named).collect();
         Verdict {
             what: format!("{}: {} ({})", self.value, names.join(" ≥ "), self.source),
             passed: means.as_ref().is_none_or(|m| m.windows(2).all(|w| w[1] <= w[0] + self.slack)),
@@ -168,9 +208,10 @@ mod tests {
 
     const EXPECTED: &str = r#"
         [[range]]
-        where = { scene = "1", kind = "grid" }
+        each = { kind = ["grid"] }
+        where = { scene = "1" }
         value = "psnr_db"
-        at_least = 50.0
+        at_least = [50.0]
         source = "someone"
         [[order]]
         falling = [{ kind = "grid" }, { kind = "network" }]
@@ -194,10 +235,32 @@ mod tests {
         assert_eq!(passed(vec![case("grid", 51.0), case("network", 51.5)]), [true, false]);
         assert!(expected.hold(&json!({"cases": [case("other", 1.0)]})).is_err());
         assert!(expected.hold(&json!({})).is_err());
-        let unbound = EXPECTED.replace("at_least = 50.0", "");
-        assert!(Expected::parse(&unbound).is_err());
+        for wrong in ["", "at_least = [50.0, 40.0]"] {
+            assert!(Expected::parse(&EXPECTED.replace("at_least = [50.0]", wrong)).is_err());
+        }
         let fits = json!({"chi2_per_datum": {"image": 2.0}, "seconds": 3.0});
         assert_eq!([result(&fits, "chi2"), result(&fits, "seconds")], [Some(2.0), Some(3.0)]);
+    }
+
+    /// Each combination has a verdict of its own; bounds take turns, and levels of an order count before those of all.
+    #[test]
+    fn exact_combinations_are_held_one_by_one() {
+        let both = EXPECTED
+            .replace("[\"grid\"]", "[\"grid\", \"network\"]")
+            .replace("[50.0]", "[50.0, 45.0]")
+            .replace(
+                "falling",
+                "each = { kind = [\"grid\", \"other\"], scene = [\"1\"] }\n falling",
+            )
+            .replace("{ kind = \"network\" }", "{}");
+        let results = json!({ "cases": [case("grid", 49.0), case("network", 46.0)] });
+        let verdicts = Expected::parse(&both).unwrap().hold(&results).unwrap();
+        let passed: Vec<bool> = verdicts.iter().map(|verdict| verdict.passed).collect();
+        assert_eq!(passed, [false, true, true, true]);
+        assert!(verdicts[1].what.starts_with("psnr_db of kind network, scene 1: at least 45 ("));
+        assert!(
+            verdicts[3].what.starts_with("psnr_db: kind grid, scene 1 ≥ kind other, scene 1 (")
+        );
     }
 
     /// The files that the program reads.
