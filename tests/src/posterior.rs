@@ -4,6 +4,7 @@ use crate::support::{
     are_the_same, fail_with, folder_with, json, kill, root, sets, start, succeed, told, until,
 };
 use crate::unknown_geometry::{NEAR, of_unknown_view};
+use std::path::Path;
 
 /// The built-in flare, few pixels, scans and voxels.
 pub fn settings() -> String {
@@ -54,10 +55,25 @@ fn exact_draws_of_voxels_resume_to_the_same_bytes() {
     }
     succeed(folder.path(), &["posterior", "run", "--samples", "4", "--threads", "1"]);
     assert_eq!(all, ["mean.npz", "deviation.npz", "posterior.json"].map(of));
+    survive_a_kill(folder.path());
     // More draws keep those that there are.
     let first = of("sample_0001.json");
     succeed(folder.path(), &["posterior", "run", "--samples", "5"]);
     assert_eq!(first, of("sample_0001.json"));
+}
+
+/// A killed call leaves whole draws, and the next one the bytes of a call that was not.
+fn survive_a_kill(at: &Path) {
+    std::fs::rename(at.join("run/posterior"), at.join("whole")).unwrap();
+    for after in ["sample_0001.npz", "sample_0003.json"] {
+        let child = start(at, &["posterior", "run", "--samples", "4"]);
+        let path = at.join("run/posterior").join(after);
+        until("a draw", || path.exists());
+        kill(child);
+    }
+    succeed(at, &["posterior", "run", "--samples", "4"]);
+    let same = ["sample_0001.npz", "sample_0004.json", "mean.npz", "posterior.json"];
+    are_the_same(at, ["whole", "run/posterior"], &same);
 }
 
 /// χ² of the measured data beside a draw is that of as many data, where the model is right: fitted parameters make it smaller, the
@@ -97,25 +113,6 @@ fn exact_draws_of_a_right_model_predict_the_data() {
     let page = std::fs::read_to_string(folder.path().join("run/posterior/report.html")).unwrap();
     assert!(page.contains("The visibilities are such as the draws predict"));
     assert!(page.contains("What the data leave open"));
-}
-
-/// A killed call leaves whole draws, and the next one the bytes of a call that was not.
-#[test]
-fn exact_draws_survive_a_kill() {
-    let folder = folder_with("fit.toml", settings());
-    for name in ["run", "killed"] {
-        succeed(folder.path(), &[&["fit", "fit.toml", "-o", name][..], &VOXELS].concat());
-    }
-    succeed(folder.path(), &["posterior", "run", "--samples", "4"]);
-    for after in ["sample_0001.npz", "sample_0003.json"] {
-        let child = start(folder.path(), &["posterior", "killed", "--samples", "4"]);
-        let path = folder.path().join("killed/posterior").join(after);
-        until("a draw", || path.exists());
-        kill(child);
-    }
-    succeed(folder.path(), &["posterior", "killed", "--samples", "4"]);
-    let same = ["sample_0001.npz", "sample_0004.json", "mean.npz", "posterior.json"];
-    are_the_same(folder.path(), ["run/posterior", "killed/posterior"], &same);
 }
 
 const PRIOR: &str =
