@@ -38,7 +38,15 @@ fn resumes_to_the_same_bytes(at: &Path, words: &[&str], results: usize, names: &
 fn exact_a_killed_search_for_a_geometry_resumes_to_the_same_bytes() {
     let view = "{ trials = 30, nodes = 12, iterations = 20, pixels = 12, frames = 8 }";
     let folder = folder_with("fit.toml", of_unknown_view(&settings(), NEAR, 2, view));
-    resumes_to_the_same_bytes(folder.path(), &VOXELS, 45, &["geometry.json", "volume.npz"]);
+    let at = folder.path();
+    let names = ["geometry.json", "volume.npz"];
+    resumes_to_the_same_bytes(at, &VOXELS, 45, &names);
+    // Without its result a run searches once more.
+    for name in ["geometry.json", "checkpoint.safetensors"] {
+        std::fs::remove_file(at.join("killed").join(name)).unwrap();
+    }
+    succeed(at, &["fit", "--resume", "killed"]);
+    are_the_same(at, ["whole", "killed"], &names);
 }
 
 #[test]
