@@ -278,20 +278,37 @@ impl Convert {
             let same = |known: &&Station| is_same_station(&known.name, &station.name);
             let Some(known) = array.stations.iter().find(same) else { continue };
             match (station.position, known.position) {
-                (None, _) => *station = Station { name: station.name.clone(), ..known.clone() },
+                (None, _) => fill(station, known),
                 (Some(told), Some(given)) if far_apart(told, given) => {
                     unused("--array", format!("{} at {told:?} m", station.name));
                 }
                 _ => {}
             }
         }
+        let has =
+            |name: &str| array.stations.iter().any(|known| is_same_station(&known.name, name));
         let lost = observation.stations.iter().filter(|station| station.position.is_none());
+        let lost = lost.filter(|station| !has(&station.name));
         let lost: Vec<&str> = lost.map(|station| station.name.as_str()).collect();
         if !lost.is_empty() {
             bail!("--array has no station {}", lost.join(", "));
         }
         Ok(())
     }
+}
+
+/// Gives a station without a position what the data do not tell of it.
+fn fill(station: &mut Station, known: &Station) {
+    let without = Station::named(&station.name);
+    station.position = known.position;
+    if station.sefd == without.sefd {
+        station.sefd = known.sefd;
+    }
+    if station.leakage == without.leakage {
+        station.leakage = known.leakage;
+    }
+    station.elevation_deg = station.elevation_deg.or(known.elevation_deg);
+    station.feed_rotation = station.feed_rotation.or(known.feed_rotation);
 }
 
 /// Returns whether two positions in metres are not of one station: farther apart than surveys of it.

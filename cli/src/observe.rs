@@ -21,7 +21,7 @@ pub struct Observe {
     /// Images to observe: a grid of Jy/pixel (.csv, first line north, first column east), an array or
     /// movie (.npy, .npz: (frames,) height, width), an image (.fits), a picture (.exr), a movie of
     /// pictures (a folder of .exr, a pattern such as 'frame_%04d.exr' or 'frames/*.exr', or several
-    /// files), or a scene (.toml)
+    /// files, in the order of the numbers in their names), or a scene (.toml)
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
     #[command(flatten)]

@@ -102,6 +102,8 @@ impl Metadata {
 pub fn station((name, position, sefd, feed, leakage): Telescope) -> Result<Station, Error> {
     check_position(&name, position.unwrap_or_default())?;
     let feed_rotation = FeedRotation::told(feed);
+    // The centre of the Earth is what tables have of a station whose position nobody told.
+    let position = position.filter(|place| *place != [0.0; 3]);
     Ok(Station { position, sefd, feed_rotation, leakage, ..Station::named(&name) })
 }
 

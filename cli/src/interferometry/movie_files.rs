@@ -103,9 +103,23 @@ impl<'a> Pattern<'a> {
     }
 }
 
-/// Sorts files by the numbers in their names.
+/// Sorts files whose names differ by a whole number alone by it; others, decimals among them, keep their order.
 pub fn sort_by_numbers(files: &mut [PathBuf]) {
-    files.sort_by_cached_key(|file| numbered(&file.to_string_lossy()));
+    let names: Vec<_> = files.iter().map(|file| numbered(&file.to_string_lossy())).collect();
+    let Some(first) = names.first() else { return };
+    let are_alike = |name: &Vec<(u128, String)>| {
+        name.len() == first.len() && name.iter().zip(first).all(|(a, b)| a.1 == b.1)
+    };
+    if !names.iter().all(are_alike) {
+        return;
+    }
+    let differs = |k: &usize| names.iter().any(|name| name[*k].0 != first[*k].0);
+    if let [only] = (0..first.len()).filter(differs).collect::<Vec<_>>()[..] {
+        let is_decimal = only > 1 && first[only - 1].1 == ".";
+        if !is_decimal {
+            files.sort_by_cached_key(|file| numbered(&file.to_string_lossy()));
+        }
+    }
 }
 
 /// A name for sorting, runs of digits as numbers: `frame_9` comes before `frame_10`.

@@ -53,8 +53,6 @@ impl Uncertainty {
 
     /// The larger of both in every component; NaN where one of them is.
     pub fn max(self, o: Self) -> Self {
-        // `f64::max` would take the number: an error that nobody could compute is not a small one.
-        let larger = |a: f64, b: f64| if a > b || a.is_nan() { a } else { b };
         Uncertainty {
             radius: larger(self.radius, o.radius),
             theta: larger(self.theta, o.theta),
@@ -62,6 +60,12 @@ impl Uncertainty {
             delay: larger(self.delay, o.delay),
         }
     }
+}
+
+/// The larger of two errors; NaN where one of them is: `f64::max` would take the other, and an error that nobody could compute is
+/// not a small one.
+pub(crate) fn larger(a: f64, b: f64) -> f64 {
+    if a > b || a.is_nan() { a } else { b }
 }
 
 /// The errors that the steps of a path have made so far, in scaled units.

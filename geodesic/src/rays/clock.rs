@@ -1,6 +1,6 @@
 //! Error estimates of rays in closed form.
 
-use crate::integrate::uncertainty::Uncertainty;
+use crate::integrate::uncertainty::{Uncertainty, larger};
 use crate::screen::observer::Ray;
 use crate::simd::{LEAST_STEPS, MAX_STEP};
 use crate::spacetime::kerr::Kerr;
@@ -57,7 +57,7 @@ impl Clock {
         let quadrature = self.quadrature(self.b * step / fine);
         let outside = radii.iter().zip(delays).filter(|(r, _)| **r > horizon);
         let each = outside.map(|(r, delay)| self.rounding(*delay, *r) + error * self.reach(*r));
-        each.fold(0.0, f64::max) + quadrature
+        each.fold(0.0, larger) + quadrature
     }
 
     /// Returns the rounding error at radius `r`.

@@ -67,7 +67,7 @@ impl PolarizedRay<'_> {
     }
 
     /// Returns the brightest light of the disc at a radius for unit intensity in the gas frame, in whichever direction a ray with
-    /// Carter's constant η + a² − λ² crosses it there.
+    /// this η = Q/E² crosses it there.
     pub fn brightest_of_disc(&self, disc: &DiscModel, r: f64, eta: f64) -> f64 {
         let a = self.hole.spin();
         let (energy, drag) = (r * r + a * a - a * self.lambda, self.lambda - a);

@@ -142,8 +142,7 @@ impl Array {
     /// Geocentric positions in metres.
     ///
     /// # Errors
-    /// If a station has none or stands at the centre of the Earth, which is how eht-imaging marks
-    /// a spacecraft: orbits are not supported.
+    /// If a station has none, or stands at the centre of the Earth: orbits of spacecraft are not supported.
     pub fn positions(&self) -> Result<Vec<[f64; 3]>, Error> {
         Ok(self.stations.iter().map(position).collect::<Result<_, _>>()?)
     }

@@ -63,7 +63,7 @@ pub(crate) fn station(cells: &[&str]) -> Result<Station, String> {
 }
 
 /// The 13 columns of a station. Numbers have as many digits as they need; one without position
-/// stands at the centre of the Earth, as if it were a spacecraft.
+/// stands at the centre of the Earth.
 pub(crate) fn columns(station: &Station) -> String {
     let [x, y, z] = station.position.unwrap_or_default();
     let [r, l] = station.sefd;

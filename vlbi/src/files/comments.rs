@@ -2,7 +2,7 @@
 //! other keys are passed over.
 
 use super::{Names, locate, number};
-use crate::array;
+use crate::array::{self, Station};
 use crate::observation::{Channel, Observation};
 use core::fmt::Write;
 
@@ -30,7 +30,7 @@ pub fn write(observation: &Observation) -> String {
     for (k, channel) in observation.channels.iter().enumerate() {
         line("channel", &format!("{k} {} {}", channel.frequency_hz, channel.bandwidth_hz));
     }
-    for station in observation.stations.iter().filter(|s| s.position.is_some()) {
+    for station in observation.stations.iter().filter(|s| **s != Station::named(&s.name)) {
         line("station", &array::columns(station));
     }
     observation.history.iter().for_each(|entry| line("history", entry));

@@ -57,6 +57,9 @@ impl GainTable {
             row.noise_sigma.iter_mut().for_each(|sigma| *sigma /= factor.norm());
             true
         });
+        let solved =
+            |line: &String| line == "AMPCAL: 0" || (line == "PHASECAL: 0" && self.has_phases());
+        observation.history.retain(|line| !solved(line));
         observation.history.push("station gains of a table taken out".to_owned());
         before - observation.rows.len()
     }

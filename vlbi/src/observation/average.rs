@@ -131,7 +131,7 @@ impl Observation {
 }
 
 /// Returns whether a row has a product: one that is flagged altogether takes no part in times and (u, v) of a mean.
-fn has_data(row: &&Row) -> bool {
+pub(super) fn has_data(row: &&Row) -> bool {
     (0..4).any(|k| row.product(k).is_some())
 }
 

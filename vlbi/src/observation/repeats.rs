@@ -1,6 +1,6 @@
 //! Rows of the same baseline, channel and time as others.
 
-use super::average::mean;
+use super::average::{has_data, mean};
 use super::{Observation, Row};
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -30,7 +30,11 @@ impl Observation {
     #[must_use]
     pub fn with_repeats_merged(&self) -> Cow<'_, Self> {
         let Some(groups) = self.groups() else { return Cow::Borrowed(self) };
-        let one = |rows: &Vec<Row>| Row { time_h: rows[0].time_h, ..mean(&distinct(rows), true) };
+        let one = |rows: &Vec<Row>| {
+            let (with, without): (Vec<Row>, Vec<Row>) = rows.iter().partition(has_data);
+            let rows = if with.is_empty() { without } else { with };
+            Row { time_h: rows[0].time_h, ..mean(&distinct(&rows), true) }
+        };
         let rows = groups.iter().map(|rows| if rows.len() > 1 { one(rows) } else { rows[0] });
         let mut merged = Observation { rows: rows.collect(), ..self.clone_without_rows() };
         let Repeats { rows, copies } = self.repeats();

@@ -90,6 +90,7 @@ impl LeakageTable {
             row.noise_sigma = summed(row.noise_sigma, &first, &second);
             row.products = leaked(&[[rr, rl], [lr, ll]], &first, &second);
         }
+        observation.history.retain(|line| line != "DCAL: 0");
         observation.history.push("leakage of a table taken out".to_owned());
         Ok(before - observation.rows.len())
     }

@@ -223,10 +223,10 @@ fn geometries<'a>(
     let best = best.with_context(|| folder.damaged(geometry_search::FILE))?;
     let spread = geometry.spread(best, free);
     let spread = spread.context("the search for the geometry has no errors")?;
-    let is_changing = prepared.settings.change.is_some();
+    let (results, is_changing) = (Results::read(folder)?, prepared.settings.change.is_some());
     // Residuals of the best geometry, but no less than the errors that the search assumed.
-    let left = geometry.noise_factor.max(geometry.chi2_per_datum.sqrt());
-    let factor = if is_changing { Results::read(folder)?.noise() } else { left };
+    let left = (geometry.chi2_per_datum / results.expected()).sqrt().max(geometry.noise_factor);
+    let factor = if is_changing { results.noise() } else { left };
     let Problem { settings, measured, .. } = prepared;
     Ok(GeometryPosterior::new(settings, measured, unknown, best, &spread, factor)?)
 }
@@ -266,6 +266,12 @@ impl Results {
     /// Returns whether the fit explains its data.
     fn explains(&self) -> bool {
         self.verdict.outcome != "unexplained"
+    }
+
+    /// Largest mean of χ² per datum among the data of a right model.
+    fn expected(&self) -> f64 {
+        let means = self.verdict.data.iter().filter_map(|of| of.expected.as_ref());
+        means.map(|expected| expected.mean).fold(1.0, f64::max)
     }
 
     /// Noise of a draw over the errors of the data: these are too small where χ² is above that of a right model.

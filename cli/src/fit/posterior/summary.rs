@@ -161,10 +161,14 @@ impl Summary {
     pub fn sentences(&self) -> Vec<String> {
         let mut all = Vec::new();
         if !self.is_explained {
+            let noise = match self.factor {
+                factor if factor > 1.05 => {
+                    format!("draws have noise {factor:.1} times as large as the errors, and ")
+                }
+                _ => String::new(),
+            };
             all.push(format!(
-                "The model does not explain the data: draws have noise {:.1} times as large as the errors, and intervals \
-                 are those of a model that is wrong.",
-                self.factor
+                "The model does not explain the data: {noise}intervals are those of a model that is wrong."
             ));
         }
         all.extend(self.predicted.iter().map(Check::sentence));

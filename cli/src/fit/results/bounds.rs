@@ -147,7 +147,11 @@ impl Reached {
             }
         };
         let count = count.unwrap_or(0);
-        let what = if *key == "quiescent.upper" { "pixels" } else { "nodes" };
+        let what = match *key {
+            "quiescent.upper" if count > HANDFUL => "pixels",
+            "quiescent.upper" => "fluxes",
+            _ => "nodes",
+        };
         let setting = if *key == "representation.activation" { "emission" } else { *key };
         format!(
             "{count} {what} with {percent:.0} % of the light are at {setting} = {value}, {advice}."

@@ -53,7 +53,7 @@ pub struct BandScan {
     /// any.
     pub validation: Option<f64>,
     /// ln of the probability of the data with a flare, all geometries together, over that without one.
-    pub ln_bayes_factor: f64,
+    pub ln_bayes_factor: Option<f64>,
     /// Periods of the orbit in minutes, geometry by geometry and radius by radius; infinite where matter stands still.
     pub periods_min: Vec<Vec<f64>>,
     /// Expected background at all data in the best geometry and its standard deviation, Jy; none if there is none.
@@ -104,9 +104,11 @@ pub fn scan_band(
     let rows = rows(file, measured, settings, curve, geometry.flow())?;
     let data = turned(curve, geometry.position_angle_deg);
     let validation = validation(&rows, &data, &geometry.band)?;
-    let ln_bayes_factor = ln_bayes_factor(&rows, &data, &geometries, settings)?;
-    let background = settings.background.is_some();
-    let background = background.then(|| expected(&rows, curve, &data, geometry)).transpose()?;
+    // Against noise alone anything that varies is a flare.
+    let has_background = settings.background.is_some();
+    let ln_bayes_factor = || ln_bayes_factor(&rows, &data, &geometries, settings);
+    let ln_bayes_factor = has_background.then(ln_bayes_factor).transpose()?;
+    let background = has_background.then(|| expected(&rows, curve, &data, geometry)).transpose()?;
     let radii = settings.radii.values();
     let period = |geometry: &BandGeometry| periods(file, measured, geometry, &radii);
     let periods_min = geometries.iter().map(period).collect::<Result<_>>()?;

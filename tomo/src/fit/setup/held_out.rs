@@ -6,7 +6,7 @@ use super::linear_problem::{Of, misfit, solve_frames};
 use crate::fit::Objective;
 use crate::fit::journal::{self, Journal};
 use crate::fit::linear::{Ending, LinearProgress, Watch};
-use crate::fit::settings::{FitError, FitFile, HeldOutSettings};
+use crate::fit::settings::{FieldKind, FitError, FitFile, HeldOutSettings};
 use core::ops::ControlFlow;
 use kerrlight_render::dynamics::Axis;
 
@@ -106,8 +106,9 @@ fn loss(of: &Of<'_>, [kept, out]: &[Vec<usize>; 2], watch: &mut Watch<'_>) -> Re
     if solution.ending == Ending::Cancelled {
         return Ok(None);
     }
-    // Beside a prior of the voxels it is a mean over all data already.
-    let has_prior = of.file.linear.as_ref().is_some_and(|linear| linear.prior.is_some());
+    // Beside a Gaussian prior of the voxels it is a mean over all data already.
+    let prior = of.file.linear.as_ref().and_then(|linear| linear.prior_of(FieldKind::Gaussian));
+    let has_prior = prior.is_some();
     let weights: f64 = of.file.loss.iter().map(|loss| loss.weight).sum();
     let whole = if has_prior { 1.0 } else { weights };
     misfit(of, out, &solution.parameters()).map(|sum| Some(sum / whole))

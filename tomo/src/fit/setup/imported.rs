@@ -132,6 +132,12 @@ impl Reduction {
                  or fit total intensity"
             );
         }
+        let mut observation = observation;
+        if !is_polarized(losses) {
+            // Rows without Stokes I take no part in its times and (u, v).
+            let basis = observation.basis;
+            observation.rows.retain(|row| row.stokes_i(basis).is_some());
+        }
         let mut observation = averaged(observation, self.average_s, self.uv_min).within(name)?;
         if !is_polarized(losses) {
             observation = observation.total_intensity();

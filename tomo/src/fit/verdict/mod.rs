@@ -101,7 +101,11 @@ impl Moments {
     fn of(draws: impl Iterator<Item = Part>) -> Option<Self> {
         let all: Vec<Part> = draws.filter(|part| part.count() > 0).collect();
         let chi2 = || all.iter().filter_map(Part::per_datum);
-        let (count, data) = (all.len() as f64, all.first()?.freedom);
+        if all.len() < 2 {
+            return None;
+        }
+        let count = all.len() as f64;
+        let data = all.iter().map(|part| part.freedom).sum::<f64>() / count;
         let mean = chi2().sum::<f64>() / count;
         let square: f64 = chi2().map(|x| (x - mean).powi(2)).sum();
         // The scatter of few draws may be too small by chance.
@@ -341,10 +345,10 @@ fn judge_structure(term: usize, tested: &Tested, verdict: &mut Verdict) {
     if tested.errors == Errors::Stated {
         return;
     }
-    if let Some(correlation) = beyond(in_time.correlation(), expected.in_time, in_time.count) {
+    if let Some(correlation) = beyond(in_time.correlation(), expected.in_time, in_time.count()) {
         verdict.add(Outcome::Unexplained, Some(term), Fault::InTime(correlation));
     }
-    if let Some(correlation) = beyond(in_space.correlation(), 0.0, in_space.count) {
+    if let Some(correlation) = beyond(in_space.correlation(), 0.0, in_space.count()) {
         verdict.add(Outcome::Unexplained, Some(term), Fault::InSpace(correlation));
     }
     judge_groups(term, tested, verdict);

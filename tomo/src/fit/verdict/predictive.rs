@@ -32,14 +32,14 @@ impl Tested {
         let of = |[whole, part]: [f64; 2]| -> Option<[Option<f64>; 3]> {
             // χ² that an error of the model has added is no matter of chance, up to what is let pass.
             let larger = |of: &Part, Moments { mean, spread }: Moments, passed: f64| {
-                let added = (of.per_datum()? / mean - 1.0).clamp(0.0, passed);
+                let added = ((of.per_datum()? - mean).clamp(0.0, passed)) / mean;
                 // Over that of Gaussian errors with this mean: that of closure quantities of faint sources is larger.
                 let excess = spread / (mean * (2.0 / of.freedom.max(1.0)).sqrt());
                 probability_of_larger(of, mean * (1.0 + added), excess)
             };
             let groups = groups.iter().map(|(key, of)| (of, self.of_group(key, of)));
             let frames = frames.iter().enumerate().map(|(k, of)| (of, self.of_frame(k, of)));
-            let whole = larger(all, Moments { mean: chi2, spread }, whole)?;
+            let whole = larger(all, Moments { mean: chi2, spread }, whole * chi2)?;
             Some([
                 Some(whole),
                 least(groups.filter_map(|(of, expected)| larger(of, expected, part))),

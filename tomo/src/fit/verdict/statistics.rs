@@ -41,18 +41,23 @@ pub struct PixelSum {
 /// Sums over pairs of residuals that are neighbours.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pairs {
-    /// Number of residuals.
-    pub count: usize,
+    /// Number of pairs, each counted as the freedom of its later residual.
+    freedom: f64,
     product: f64,
     squares: [f64; 2],
 }
 
 impl Pairs {
-    fn add(&mut self, a: f64, b: f64) {
-        self.count += 1;
+    fn add(&mut self, a: f64, b: f64, freedom: f64) {
+        self.freedom += freedom;
         self.product += a * b;
         self.squares[0] += a * a;
         self.squares[1] += b * b;
+    }
+
+    /// Returns the number of pairs, to the nearest whole one.
+    pub fn count(&self) -> usize {
+        self.freedom.round() as usize
     }
 
     /// Correlation Σ ab/√(Σ a² Σ b²), dimensionless; none where one of the sums is 0.
@@ -129,7 +134,7 @@ impl Statistics {
             let key = (stations, *repeat);
             *repeat += 1;
             if let Some(before) = self.before.named.get(&key) {
-                self.in_time.add(*before, value);
+                self.in_time.add(*before, value, freedom);
             }
             now.named.insert(key, value);
         }
@@ -145,11 +150,11 @@ impl Statistics {
         self.pixels[at].part.add(value, 1.0);
         self.pixels[at].sum += value;
         if let Some(before) = self.before.plain.get(at) {
-            self.in_time.add(*before, value);
+            self.in_time.add(*before, value, 1.0);
         }
         // The first pixel of a row has no neighbour before it.
         if !at.is_multiple_of(width.max(1)) {
-            self.in_space.add(now.plain[at - 1], value);
+            self.in_space.add(now.plain[at - 1], value, 1.0);
         }
         now.plain.push(value);
     }

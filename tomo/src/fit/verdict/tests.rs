@@ -67,7 +67,7 @@ fn exact_statistics_are_sums() {
     assert_eq!(found.in_time.correlation(), Some(7.0 / (10.0f64 * 17.0).sqrt()));
     let plain = |value| Residual { value, datum: 0.0, freedom: 1.0, stations: vec![] };
     let image = Statistics::of([[1.0, 2.0, 3.0, 4.0].map(plain).to_vec()], 2);
-    assert_eq!((image.in_space.count, image.misfit()), (2, None));
+    assert_eq!((image.in_space.count(), image.misfit()), (2, None));
     assert_eq!(image.in_space.correlation(), Some(14.0 / (10.0f64 * 20.0).sqrt()));
 }
 

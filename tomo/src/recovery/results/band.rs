@@ -122,8 +122,7 @@ impl BandResults {
             azimuth_deg: azimuth(scan.azimuth),
             period_min: median(&periods, None),
             periods: binned(&periods, BINS),
-            // Against noise alone anything that varies is a flare.
-            ln_bayes_factor: scan.background.is_some().then_some(scan.ln_bayes_factor),
+            ln_bayes_factor: scan.ln_bayes_factor,
             background: scan.background.is_some().then_some(best.band.background),
             background_jy: scan.background.clone(),
             validation_chi2_per_datum: scan.validation,
@@ -160,7 +159,7 @@ impl BandResults {
             ("band_period_min", Some(period.median)),
             ("band_period_low_min", Some(period.low)),
             ("band_period_high_min", Some(period.high)),
-            ("band_ln_bayes_factor", self.ln_bayes_factor),
+            ("band_ln_bayes_factor", self.ln_against_background()),
             ("band_forward", Some(self.forward())),
             ("band_clockwise", self.clockwise),
             ("band_validation", self.validation_chi2_per_datum),

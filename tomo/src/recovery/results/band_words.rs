@@ -9,7 +9,7 @@ impl BandResults {
         self.ln_against_background().map(|ln| ln > SEEN)
     }
 
-    fn ln_against_background(&self) -> Option<f64> {
+    pub(super) fn ln_against_background(&self) -> Option<f64> {
         self.ln_bayes_factor.filter(|_| self.background.is_some())
     }
 

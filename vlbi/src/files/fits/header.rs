@@ -48,11 +48,19 @@ impl<'a> Header<'a> {
         Err(FileError::byte(offset, "the header that begins here has no END"))
     }
 
-    /// Lines of free text about how the file came about, without those by which AIPS tells the order of the rows.
+    /// Lines of free text about how the file came about, without those by which AIPS tells the order of its rows and the scale of its
+    /// weights, which are not those of another file.
     pub fn history(&self) -> Vec<String> {
         let lines = self.history.iter().map(|text| text.replace(char::is_control, " "));
         let lines = lines.map(|line| line.trim().to_owned());
-        lines.filter(|line| !line.is_empty() && !line.starts_with("AIPS SORT ORDER")).collect()
+        let is_of_file = |line: &str| {
+            let mut words = line.split_whitespace();
+            words.next() == Some("AIPS")
+                && words
+                    .next()
+                    .is_some_and(|word| ["SORT", "WTSCAL"].iter().any(|of| word.starts_with(of)))
+        };
+        lines.filter(|line| !line.is_empty() && !is_of_file(line)).collect()
     }
 
     fn wrong(&self, keyword: &str, message: impl core::fmt::Display) -> FileError {
@@ -209,6 +217,8 @@ mod tests {
             "EMPTY   =",
             "SOURCE  = 'a\u{1b}[31m\nb'",
             "HISTORY  AIPS SORT ORDER='TB'",
+            "HISTORY AIPS   SORT ORDER = 'TB'",
+            "HISTORY AIPS WTSCAL =  1.0",
             "HISTORY  kerrlight observe",
             "END",
         ]);

@@ -19,6 +19,8 @@ pub struct Group {
 #[derive(Debug)]
 pub struct Flag {
     selected: [Option<i64>; 2],
+    /// True if all flags name the same one, which is that of groups that name none.
+    is_only: [bool; 2],
     subarray: Option<i64>,
     antennas: [Option<i64>; 2],
     mjd: [f64; 2],
@@ -32,15 +34,16 @@ pub struct Flag {
 impl Flag {
     /// Returns whether it is about some data of a group.
     pub fn is_about(&self, group: &Group) -> bool {
-        let is = |wanted: Option<i64>, found: Option<i64>| {
-            // Groups that do not tell a source are of the only one.
-            wanted.is_none() || found.is_none() || wanted == found
+        let is = |wanted: Option<i64>, found: Option<i64>| wanted.is_none() || wanted == found;
+        let is_selected = |k: usize| {
+            let found = group.selected[k];
+            is(self.selected[k], found) || (found.is_none() && self.is_only[k])
         };
         let [first, second] = self.antennas;
         let has = |antenna: Option<i64>| antenna.is_none_or(|a| group.antennas.contains(&a));
         // A baseline of a station with itself is no pair of others that hold it.
         let is_pair = first.is_none() || first != second || group.antennas[0] == group.antennas[1];
-        self.selected.iter().zip(group.selected).all(|(wanted, found)| is(*wanted, found))
+        (0..2).all(is_selected)
             && is(self.subarray, Some(group.subarray))
             && (has(first) && has(second) && is_pair)
             && (self.mjd[0]..=self.mjd[1]).contains(&group.mjd)
@@ -70,7 +73,14 @@ pub fn read(units: &[Unit<'_>]) -> Result<Vec<Flag>, FileError> {
     let day = reference_day(units).ok_or_else(|| {
         units[0].header.error("DATE-OBS", "a date: times of flags (AIPS FG) count from it")
     })?;
-    Ok((0..table.rows()).map(|row| flag(&table, row, day)).collect())
+    let mut flags: Vec<Flag> = (0..table.rows()).map(|row| flag(&table, row, day)).collect();
+    let only = [0, 1].map(|k| {
+        let mut named = flags.iter().filter_map(|flag| flag.selected[k]);
+        let first = named.next();
+        named.all(|other| Some(other) == first)
+    });
+    flags.iter_mut().for_each(|flag| flag.is_only = only);
+    Ok(flags)
 }
 
 fn flag(table: &Table<'_>, row: usize, day: f64) -> Flag {
@@ -84,6 +94,7 @@ fn flag(table: &Table<'_>, row: usize, day: f64) -> Flag {
     let time = |k: usize| number("TIME RANGE", k).map_or(ends[k], |days| day + days);
     Flag {
         selected: [one_of("SOURCE", 0), one_of("FREQ ID", 0)],
+        is_only: [false; 2],
         subarray: one_of("SUBARRAY", 0),
         antennas: [0, 1].map(|k| one_of("ANTS", k)),
         mjd: [time(0), time(1)],

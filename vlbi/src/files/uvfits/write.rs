@@ -47,7 +47,8 @@ pub fn write(observation: &Observation) -> Result<Vec<u8>, Error> {
         channels: if several { observation.channels.clone() } else { only },
         uv_scale: 1.0,
     };
-    if observation.stations.iter().any(|station| station.position.is_none()) {
+    // One of several may be a spacecraft, which tables have at 0 0 0.
+    if observation.stations.iter().all(|station| station.position.is_none()) {
         return Err(MissingMetadata("the stations' positions (an array)").into());
     }
     if observation.stations.len() > 255 {

@@ -81,7 +81,6 @@ fn seen_through(file: &FitFile, model: GeometryModel, rays: RaySampling) -> Resu
     Ok(GeometryModel { parts, ring, ..model }.seen_along(rays.lattice))
 }
 
-/// Returns the properties that all geometries share.
 /// Returns whether a velocity is another one where the hole spins otherwise.
 fn follows_spin<N>(velocity: &Velocity<N>) -> bool {
     match velocity {
@@ -91,6 +90,7 @@ fn follows_spin<N>(velocity: &Velocity<N>) -> bool {
     }
 }
 
+/// Returns the properties that all geometries share.
 fn model(file: &FitFile, instrument: &Instrument, motion: &Motion) -> Result<GeometryModel> {
     let Sampling::Gauss { order, split } = file.region.nodes else {
         let why = "a number with a prior needs region.nodes = { gauss = { order, split } }: nodes equidistant in Mino time \

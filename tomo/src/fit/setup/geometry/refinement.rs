@@ -136,11 +136,9 @@ impl Detail<'_> {
     pub fn more_voxels(&self, here: &Solved, even: Option<&Solved>) -> Result<Option<Resolution>> {
         let Place { at, seen, .. } = &here.place;
         let nodes = finer(at.nodes);
+        let of = even.unwrap_or(here);
+        let reduced = self.through(&of.place, |problem| Ok(problem.left(&of.best)?))?;
         let (asks, degree) = self.through(&here.place, |problem| {
-            let reduced = match even {
-                Some(even) => problem.reduced(even.best.chi2),
-                None => problem.left(&here.best)?,
-            };
             let excess = problem.excess(problem.scale * reduced);
             Ok((excess > 0.0 && problem.gaussian.is_none(), problem.effort.degree))
         })?;
