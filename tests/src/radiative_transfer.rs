@@ -57,6 +57,57 @@ fn code_left_and_right_of_gold_2020() {
     }
 }
 
+/// Light from farther out than a near observer, behind the hole: the closed form ends where the observer is, light does not.
+#[test]
+fn code_integrators_see_beyond_a_near_observer() {
+    let far = "
+        [hole]
+        spin = 0.5
+        mass_msun = 6.5e9
+        distance_kpc = 16800.0
+        [observer]
+        inclination_deg = 70.0
+        azimuth_deg = 0.0
+        radius = 20.0
+        time = 0.0
+        [screen]
+        field_of_view_m = 24.0
+        width = 16
+        height = 16
+        channels = [\"intensity\"]
+        [effects]
+        redshift = false
+        [tracer]
+        integrator = \"elliptic\"
+        tolerance = 1e-7
+    ";
+    let disc = "
+        [disc]
+        inner_edge = 30.0
+        outer_edge = 60.0
+        peak_intensity = 1.0
+        opaque = true
+        color = [1.0, 1.0, 1.0]
+    ";
+    let gas = "
+        [gas]
+        profile = \"gaussian\"
+        scale_radius = 25.0
+        flatness = 0
+        motion = \"keplerian\"
+        emissivity = 1e-15
+        outer_radius = 60.0
+    ";
+    let light = |more: &str, integrator: &str| {
+        let choice = format!("tracer.integrator=\"{integrator}\"");
+        sum(&render(&scene(&format!("{far}{more}"), &[&choice])))
+    };
+    for more in [disc, gas] {
+        let [closed, stepped] = ["elliptic", "taylor-mino"].map(|name| light(more, name));
+        assert!(stepped > 0.0 && (closed / stepped - 1.0).abs() < 1e-5, "{closed} {stepped}");
+    }
+}
+
 /// Every way to trace rays gives the same picture.
 #[test]
 fn code_integrators_agree_on_gas() {

@@ -37,7 +37,9 @@ pub struct Crossing {
 }
 
 impl ClosedForm {
-    /// Prepares the ray's motion. All that follows is NaN, and there is no crossing, if `ray` was made for another hole.
+    /// Prepares the motion of a ray that starts inwards, from outside of all turning points: one that a camera sees outwards, or
+    /// within the barrier of its potential, moves otherwise. All that follows is NaN, and there is no crossing, if `ray` was made
+    /// for another hole.
     ///
     /// # Examples
     /// ```

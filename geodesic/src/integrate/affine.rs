@@ -20,6 +20,7 @@ use crate::numbers::polynomial::{Polynomial, hermite};
 use crate::screen::observer::Observer;
 use crate::spacetime::kerr::Kerr;
 use crate::spacetime::point::PathPoint;
+use core::f64::consts::{PI, TAU};
 use equations::{MINO_TIME, State, derivative, radius};
 use nalgebra::SVector;
 use ode_solvers::{Dopri5, OutputType};
@@ -286,8 +287,8 @@ impl AffinePath {
         a.s + h * Polynomial(&clock).solve(mino_time, 0.0, 1.0)
     }
 
-    /// The position at a Mino time in \[0, [`mino_total`](Self::mino_total)\]: r, θ, azimuth
-    /// in \[−π, π\] and delay t_o − t. Rates of change are left 0.
+    /// The position at a Mino time in \[0, [`mino_total`](Self::mino_total)\], and its rates of change: r, θ, azimuth
+    /// in \[−π, π\] and delay t_o − t.
     pub fn at(&self, mino_time: f64) -> PathPoint {
         self.point(self.affine(mino_time).min(self.end))
     }
@@ -300,19 +301,46 @@ impl AffinePath {
         // e^{iφ} sin θ = (x + iy)/(r + ia); reflected back.
         let angle = (r * y[1] - a * y[0]).atan2(r * y[0] + a * y[1]);
         let reflected = angle - self.hole.azimuth_closed_form(w);
-        let azimuth = self.origin[0] - reflected;
+        let azimuth = (self.origin[0] - reflected + PI).rem_euclid(TAU) - PI;
         let cos_theta = (y[2] / r).clamp(-1.0, 1.0);
         let sin_theta = y[0].hypot(y[1]) / r.hypot(a);
         let delay = y[6] - (self.hole.tortoise(w) - r) + self.origin[1];
+        let (inverse_radius_rate, velocity) = self.rates(&y, r);
         PathPoint {
             mino_time: y[MINO_TIME],
             inverse_radius: w,
-            inverse_radius_rate: 0.0,
+            inverse_radius_rate,
             direction: [sin_theta * azimuth.cos(), sin_theta * azimuth.sin(), cos_theta],
-            velocity: [0.0; 3],
+            velocity,
             azimuth,
             delay,
         }
+    }
+
+    /// d(1/r)/dτ and the rate of the direction, from those of the Kerr–Schild coordinates.
+    fn rates(&self, y: &State<f64>, r: f64) -> (f64, [f64; 3]) {
+        let (a, [x, y_, z, ..]) = (self.hole.spin(), *y);
+        let [dx, dy, dz, _, _, _, _, clock] = derivative(a, y);
+        let sum = r * r + a * a;
+        // From (x² + y²)/(r² + a²) + z²/r² = 1.
+        let across = (x * dx + y_ * dy) / sum + z * dz / (r * r);
+        let dr = across / (r * ((x * x + y_ * y_) / (sum * sum) + z * z / r.powi(4)));
+        // e^{iφ} sin θ of the reflected ray, (x + iy)/(r + ia), and its rate.
+        let swirl = [(r * x + a * y_) / sum, (r * y_ - a * x) / sum];
+        let rate = [
+            (dr * x + r * dx + a * dy) / sum - swirl[0] * 2.0 * r * dr / sum,
+            (dr * y_ + r * dy - a * dx) / sum - swirl[1] * 2.0 * r * dr / sum,
+        ];
+        // Reflected back it is turned by the azimuth's singular term, whose rate is a dr/Δ.
+        let turn = a * dr / self.hole.delta(r);
+        let (sin, cos) = (self.origin[0] + self.hole.azimuth_closed_form(1.0 / r)).sin_cos();
+        let back = [rate[0] + turn * swirl[1], -rate[1] + turn * swirl[0]];
+        let velocity = [
+            back[0] * cos - back[1] * sin,
+            back[0] * sin + back[1] * cos,
+            (r * dz - z * dr) / (r * r),
+        ];
+        (-dr / (r * r) / clock, velocity.map(|rate| rate / clock))
     }
 
     /// The pieces of the path with lo ≤ r ≤ hi (M) as intervals of Mino time (M⁻¹), in order: at most

@@ -21,7 +21,8 @@ pub enum Integrator {
     /// ([`simd`](crate::simd)), by far the fastest for samples equidistant in Mino time and for
     /// equatorial crossings. What it does not serve is traced as with `taylor-mino`: rays next to the
     /// critical curve, where it has errors above the tolerance or 1e-11; observers nearer than 5 M;
-    /// requests for momenta or for other samples.
+    /// requests for momenta or for other samples. Rays that reach a finite observer nearly along its
+    /// sphere, (dr/dτ)²/r⁴ below 0.01, are refused.
     Elliptic,
 }
 

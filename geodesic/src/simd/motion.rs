@@ -190,7 +190,10 @@ impl<V: Lanes<f64>> Journey<V> {
     pub fn by(clock: &Clock<V>, cam: &Camera, m: &Motion<V>) -> Self {
         let s = V::splat;
         let Clock { e, half, gap, .. } = *clock;
-        let smallest = V::select(gap.lt(s(0.0)), e, e.min(half - gap.max(s(0.0)).sqrt()));
+        // Far from the hole the two lesser roots coincide within rounding: their gap is 0 there, not below it.
+        let rounding = V::select(s(0.0).lt(e), e * e * s(1e-12), s(0.0));
+        let is_alone = (gap + rounding).lt(s(0.0));
+        let smallest = V::select(is_alone, e, e.min(half - gap.max(s(0.0)).sqrt()));
         // Ferrari: r = z ± √(−A/2 − z² − B/(4z)), z² = −A/6 − (the smallest root).
         let z2 = m.a.mul_add(s(-1.0 / 6.0), -smallest).max(s(1e-30));
         let z = z2.sqrt();

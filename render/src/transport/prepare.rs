@@ -161,7 +161,11 @@ impl PreparedScene {
             // dw/dτ tells whether light of plunging matter moves outward; its g depends on it.
             rates: self.optics.polarization.is_some()
                 || self.disc.as_ref().is_some_and(DiscModel::plunges),
-            exit: self.sky.is_some() || self.optics.wanted.exit || self.optics.wanted.footprint,
+            // The closed form ends at the radius of an observer, light comes from beyond it.
+            exit: self.sky.is_some()
+                || self.optics.wanted.exit
+                || self.optics.wanted.footprint
+                || self.shines_beyond_observer(),
             beams: self.optics.lensing && self.sky.as_ref().is_some_and(Sky::is_averaged),
             half_orbits,
             paths: self.meshes.is_some() || self.media.have_cells() || !self.spots.is_empty(),
@@ -169,6 +173,14 @@ impl PreparedScene {
             samples: 0,
             nodes: self.media.nodes(&self.optics),
         }
+    }
+
+    /// Returns whether a disc or gas reaches farther out than a screen at a finite radius.
+    fn shines_beyond_observer(&self) -> bool {
+        let disc = self.disc.as_ref().map(|disc| disc.edges()[1]);
+        let media = self.media.nodes(&self.optics).into_iter().map(|nodes| nodes.radius);
+        let reach = media.chain(disc).fold(0.0, f64::max);
+        self.optics.view.observer().is_some_and(|observer| reach * observer.inverse_radius() > 1.0)
     }
 
     /// The same where spots are sighted: see [`Spots::sight`].

@@ -267,8 +267,10 @@ fn errors(table: &RayTable, oracle: &Oracle) -> (Uncertainty, bool) {
         for k in 0..points.len().min(most) {
             let at = [points.radius[k], points.theta[k], points.azimuth[k], points.delay[k]];
             finite &= at.iter().all(|x| x.is_finite());
-            // Azimuth and delay have no limit at the horizon, where the last sample lies.
-            let last = points.mino_time[k] >= table.mino_total[0] * (1.0 - 1e-12);
+            // Azimuth and delay have no limit at the horizon, where the last sample lies, or 1e-8 before it.
+            let is_captured = table.outcome[0] == Outcome::Captured;
+            let last = points.mino_time[k] >= table.mino_total[0] * (1.0 - 1e-12)
+                || (is_captured && most == usize::MAX && k + 1 == points.len());
             if !last && finite {
                 worst = worst.max(oracle.judge(points, k));
             }
