@@ -75,6 +75,7 @@ mod view;
 mod volume_files;
 
 pub use call::Call;
+pub use fit::is_same_fit;
 pub use memory::Bounded;
 pub use program::Program;
 pub use session::Said;

@@ -53,6 +53,16 @@ pub fn anchor(table: &mut Table, folder: &Path) {
     }
 }
 
+/// The same with one name for each file that is there: without links and `..`.
+pub fn resolve(table: &mut Table, folder: &Path) {
+    for (key, value) in table.iter_mut() {
+        move_paths(key, value, &|path| {
+            let full = folder.join(path);
+            full.canonicalize().unwrap_or(full).display().to_string()
+        });
+    }
+}
+
 /// Keys that name files.
 fn is_path(key: &str, value: &str) -> bool {
     let is_array = key == "array" && kerrlight_vlbi::array::built_in(value).is_none();

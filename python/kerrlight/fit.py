@@ -205,7 +205,7 @@ class Fit:
     def _check_same(self) -> None:
         kept = (self.folder / "fit.toml").read_text(encoding="utf-8")
         name, content = self._given or ("", b"")
-        is_same = _core.same_toml(kept, self.settings)
+        is_same = _core.is_same_fit(kept, self.settings, self._base)
         if not is_same or name and (self.folder / name).read_bytes() != content:
             raise ValueError(
                 f"{self.folder} holds a fit with other settings: give another folder, or Fit.open({str(self.folder)!r})"

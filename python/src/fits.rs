@@ -3,6 +3,7 @@
 use crate::refusal::refused;
 use kerrlight_tomo::fit::settings::Hole;
 use pyo3::prelude::*;
+use std::path::PathBuf;
 
 /// Mass (solar masses) and distance (kpc) of Sgr A* or M87*.
 #[pyfunction]
@@ -24,4 +25,11 @@ pub fn data_key(text: &str) -> PyResult<String> {
     let kind =
         kind.ok_or_else(|| refused("the settings name no data: there is no table [data]"))?;
     Ok(format!("data.{kind}.path"))
+}
+
+/// Returns whether two texts are settings of the same fit, whatever their order and their comments. Relative paths start
+/// from the folder that the first line of a text names, where it does, or else from `folder`.
+#[pyfunction]
+pub fn is_same_fit(one: &str, other: &str, folder: PathBuf) -> PyResult<bool> {
+    kerrlight_cli::is_same_fit(one, other, &folder).map_err(refused)
 }

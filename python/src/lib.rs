@@ -32,16 +32,14 @@ mod _core {
     #[pymodule_export]
     use crate::{
         curve::{band, critical_curve, critical_points},
-        fits::{data_key, known_hole},
+        fits::{data_key, is_same_fit, known_hole},
         fourier::Fourier,
         lengths::{path_lengths, path_points},
         model::{Model, check_voxels},
         observation::{Visibilities, hours_utc_of_gmst},
         observing::{array, observe},
         orbits::{keplerian_redshift, radii, velocity},
-        pictures::{
-            Picture, film, render, same_toml, scene_of_exr, toml_of_json, toml_value_of_json,
-        },
+        pictures::{Picture, film, render, scene_of_exr, toml_of_json, toml_value_of_json},
         program::{call, program},
         rays::{differentiate, trace},
         volume::view,

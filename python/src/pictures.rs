@@ -43,13 +43,6 @@ fn with_infinities(value: &mut toml::Value) {
     }
 }
 
-/// Returns whether two texts are the same TOML, whatever their order and their comments.
-#[pyfunction]
-pub fn same_toml(first: &str, second: &str) -> PyResult<bool> {
-    let [first, second] = [first, second].map(|text| text.parse::<toml::Table>().map_err(refused));
-    Ok(first? == second?)
-}
-
 /// The scene that a picture's file holds.
 #[pyfunction]
 pub fn scene_of_exr(path: PathBuf) -> PyResult<String> {

@@ -240,6 +240,13 @@ def test_exact_images_and_relative_paths(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "data")
     again = Fit.open(tmp_path / "run").run(progress=False)
     np.testing.assert_array_equal(again.image.recovered, fit.image.recovered)
+    # The same words in another folder name other data.
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "image.toml").write_text(IMAGE)
+    with pytest.raises(ValueError, match="holds a fit with other settings"):
+        Fit("../other/image.toml", folder=tmp_path / "run").run(progress=False)
+    same = Fit("../data/image.toml", folder=tmp_path / "run").run(progress=False)
+    np.testing.assert_array_equal(same.image.recovered, fit.image.recovered)
     with pytest.raises(ValueError, match="data.uvfits is no text of settings.*--init"):
         Fit("data.uvfits")
     with pytest.raises(ValueError, match="pixels"):

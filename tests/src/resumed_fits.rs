@@ -129,6 +129,19 @@ fn exact_a_changed_movie_is_refused() {
     assert!(refused(at).contains("movie.csv"));
     std::fs::write(at.join("movie.csv"), &image).unwrap();
     succeed(at, &["fit", "--resume", "run"]);
+    // The same words in another folder name another movie.
+    let text = std::fs::read_to_string(at.join("run/fit.toml")).unwrap();
+    let (_, text) = text.split_once('\n').unwrap();
+    std::fs::create_dir(at.join("other")).unwrap();
+    std::fs::write(at.join("other/movie.csv"), image.replacen('1', "7", 1)).unwrap();
+    for name in ["again.toml", "other/again.toml"] {
+        std::fs::write(at.join(name), text).unwrap();
+    }
+    let said = ["differs from the settings", "its paths start from", "other"];
+    fail_with(at, &["fit", "other/again.toml", "--resume", "run"], &said);
+    for same in ["again.toml", "other/../again.toml", "run/fit.toml"] {
+        succeed(at, &["fit", same, "--resume", "run"]);
+    }
 }
 
 /// Two processes in one folder: the second is refused, and a lock does not survive a kill.

@@ -268,12 +268,22 @@ impl Fit {
             bail!("--resume uses the settings of the run: --set is for a new one");
         }
         let Some(path) = &self.file else { return Ok(()) };
-        let given = output::read_text(path)?;
+        let (given, folder) = self.settings(None)?;
         if Work::read(&given)? != Work::read(text)? {
             // The settings of a run have a line more at their head: where paths start from.
             let at = text.lines().skip(1).zip(given.lines()).position(|(a, b)| a != b);
             let line = at.map_or(String::new(), |k| format!(", first in line {}", k + 1));
             bail!("{} differs from the settings that the run began with{line}", path.display());
+        }
+        // The same relative path from another folder is another file.
+        let work = |text: &str| Work::read(&whole(text, &folder)?.to_string());
+        if work(&given)? != work(text)? {
+            let (path, own) = (path.display(), base_dir_of(text));
+            bail!(
+                "{path} differs from the settings that the run began with: its paths start from {}, not from {}",
+                folder.display(),
+                own.display()
+            );
         }
         Ok(())
     }
@@ -307,6 +317,23 @@ fn placed((text, folder): (String, PathBuf)) -> (String, PathBuf) {
 fn base_dir_of(text: &str) -> PathBuf {
     let first = text.lines().next().unwrap_or_default();
     PathBuf::from(first.strip_prefix(BASE_DIR).unwrap_or("."))
+}
+
+/// Settings with whole paths in place of those from the folder that the text says itself, or else from `folder`.
+fn whole(text: &str, folder: &Path) -> anyhow::Result<toml::Table> {
+    let (text, folder) = placed((text.to_owned(), folder.to_owned()));
+    let mut table = text.parse::<toml::Table>()?;
+    paths::resolve(&mut table, &folder);
+    Ok(table)
+}
+
+/// Returns whether two texts are settings of the same fit, whatever their order and their comments. Relative paths start
+/// from the folder that the first line of a text names, where it does, or else from `folder`.
+///
+/// # Errors
+/// If a text is no TOML.
+pub fn is_same_fit(one: &str, other: &str, folder: &Path) -> anyhow::Result<bool> {
+    Ok(whole(one, folder)? == whole(other, folder)?)
 }
 
 fn parse(text: &str) -> anyhow::Result<FitFile> {
