@@ -71,7 +71,10 @@ def test_dataset_of_bhnerf():
     geos = raytrace_ana(0.5, [0, 1000.0, 1.0, 0], [alpha.ravel(), beta.ravel()], 20)
     data = geos.get_dataset(4, 3)
     assert dict(data.sizes) == {"alpha": 4, "beta": 3, "geo": 20}
-    assert float(data.r[3, 1, 7]) == geos.r_s[7, 3 * 3 + 1]
+    # BH-NeRF gives velocities these axes by name.
+    assert data.r.dims == ("beta", "alpha", "geo") and data.lam.dims == data.eta.dims == ("beta", "alpha")
+    assert float(data.r[1, 3, 7]) == geos.r_s[7, 3 * 3 + 1]
+    assert float(data.eta[1, 3]) == geos.eta[3 * 3 + 1]
     np.testing.assert_array_equal(data.alpha, np.linspace(-8, 8, 4))
     # The momentum from R and Theta is null.
     k_r2, k_th2 = data.R / data.Delta**2, data.Theta

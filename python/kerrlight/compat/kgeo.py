@@ -155,7 +155,7 @@ class Geodesics:
         """The rays of a screen as the ``xarray.Dataset`` that BH-NeRF computes with.
 
         The screen is one of ``num_alpha`` × ``num_beta`` rays in the order of
-        ``np.meshgrid(alpha, beta, indexing="ij")``; dimensions are alpha, beta and geo. Needs xarray.
+        ``np.meshgrid(alpha, beta, indexing="ij")``; dimensions are beta, alpha and geo, as kgeo has them. Needs xarray.
         """
         import xarray as xr
 
@@ -164,7 +164,7 @@ class Geodesics:
             raise ValueError(f"{self.npix} rays are no screen of {num_alpha} x {num_beta}")
 
         def grid(column: Floats) -> Any:
-            return (("alpha", "beta", "geo"), column.T.reshape(*shape, -1))
+            return (("beta", "alpha", "geo"), column.T.reshape(*shape, -1).transpose(1, 0, 2))
 
         t, r, theta, phi = self.geo_coords
         a = self.a
@@ -193,7 +193,7 @@ class Geodesics:
             "Theta": polar,
             "omega": 2.0 * M * a * r / xi,
         }
-        screen = {name: (("alpha", "beta"), v.reshape(shape)) for name, v in (("lam", lam), ("eta", eta))}
+        screen = {name: (("beta", "alpha"), v.reshape(shape).T) for name, v in (("lam", lam), ("eta", eta))}
         scalars = {"spin": a, "inc": self.th_o, "r_o": self.r_o, "E": E, "M": M}
         axes = {
             "alpha": self.alpha.reshape(shape)[:, 0],
