@@ -13,16 +13,29 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-def real(name: str, value: Any) -> Floats:
-    """``value`` as an array of real numbers; quantities of astropy must have no unit."""
+def given(name: str, value: Any) -> NDArray[Any]:
+    """``value`` as an array, none of whose elements is masked; quantities of astropy must have no unit."""
     if hasattr(value, "to_value"):
         value = value.to_value("")
     if np.ma.is_masked(value):
         raise ValueError(f"{name} has masked elements: fill them, or leave them out")
-    array = np.asarray(value)
+    return np.asarray(value)
+
+
+def real(name: str, value: Any) -> Floats:
+    """The same of real numbers."""
+    array = given(name, value)
     if array.dtype.kind not in "buif" and array.size > 0:
         raise TypeError(f"{name} has the type {array.dtype}: real numbers are needed")
     return np.asarray(array, dtype=np.float64)
+
+
+def complexes(name: str, value: Any) -> NDArray[np.complex128]:
+    """The same of complex numbers."""
+    array = given(name, value)
+    if array.dtype.kind not in "buifc" and array.size > 0:
+        raise TypeError(f"{name} has the type {array.dtype}: complex numbers are needed")
+    return np.asarray(array, dtype=np.complex128)
 
 
 def flat(array: NDArray[Any]) -> NDArray[Any]:
@@ -31,7 +44,7 @@ def flat(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def finite(name: str, value: Any) -> Floats:
-    """The same without infinities and what is no number."""
+    """``value`` as an array of real numbers without infinities and what is no number."""
     array = real(name, value)
     wrong = array[~np.isfinite(array)]
     if wrong.size:

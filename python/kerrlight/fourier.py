@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kerrlight import _core
-from kerrlight._arrays import Floats, finite, whole
+from kerrlight._arrays import Floats, complexes, finite, whole
 from kerrlight.model import _Linear, precision
 
 __all__ = ["Fourier"]
@@ -75,7 +75,7 @@ class Fourier(_Linear):
 
     def vjp(self, cotangent: ArrayLike) -> Floats:
         """The adjoint under the inner product Re Σ x̄ y: from dL/dRe V + i dL/dIm V to dL/dpixel."""
-        data = np.require(cotangent, np.complex128, ["C", "A"])
+        data = np.require(complexes("cotangent", cotangent), requirements=["C", "A"])
         if data.shape != self.output_shape:
             raise ValueError(f"cotangent has the shape {data.shape}, not {self.output_shape}")
         return self._core.vjp(data).reshape(self.input_shape)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kerrlight import _core, _ehtim, _pyuvdata
-from kerrlight._arrays import Floats, real
+from kerrlight._arrays import Floats, complexes, real
 from kerrlight._stations import PRODUCTS, Station
 from kerrlight.fourier import Fourier
 
@@ -128,7 +128,7 @@ class Observation:
             object.__setattr__(self, name, _frozen(column))
         object.__setattr__(self, "stations", _frozen(names))
         object.__setattr__(self, "array", (*self.array, *map(Station, missing)))
-        products = np.ascontiguousarray(self.products, dtype=np.complex128)
+        products = np.ascontiguousarray(complexes("products", self.products))
         if products.shape != (count, 4):
             raise ValueError(f"products have the shape {products.shape}, not {(count, 4)}")
         if not np.isfinite(products[~np.isnan(columns["sigmas"])]).all():
@@ -212,7 +212,7 @@ class Observation:
         time: ArrayLike, stations: ArrayLike, uv: ArrayLike, vis: ArrayLike, sigma: ArrayLike, **more: Any
     ) -> Observation:
         """An observation of Stokes I alone, from columns of its rows; ``more`` are other fields of the class."""
-        values = np.atleast_1d(np.asarray(vis, dtype=np.complex128))
+        values = np.atleast_1d(complexes("vis", vis))
         if values.ndim != 1:
             raise ValueError(f"vis has the shape {values.shape}, not (rows,)")
         products = np.zeros((len(values), 4), dtype=np.complex128)

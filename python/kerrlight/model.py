@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from kerrlight import _core
-from kerrlight._arrays import Floats, finite, flat, real, together, whole
+from kerrlight._arrays import Floats, finite, flat, given, real, together, whole
 from kerrlight.flow import Keplerian, Law, PolarizationLaw, Velocity
 from kerrlight.rays import Observer
 
@@ -46,9 +46,9 @@ def screen(pixels: int, width: float) -> tuple[Floats, Floats]:
 
 def precision(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[Any]:
     """``value`` as a contiguous column in single precision if it is in single precision, else in double."""
-    array = np.asarray(value)
+    array = given(name, value)
     if array.dtype != np.float32:
-        array = real(name, value)
+        array = real(name, array)
     if array.shape != shape:
         raise ValueError(f"{name} has the shape {array.shape}, not {shape}")
     return flat(array)

@@ -140,6 +140,8 @@ def test_fourier_is_the_sum_over_pixels():
 
 
 def test_refusals():
+    hidden = np.ma.masked_array(np.ones((1, 4), complex), True)
+    row = ([1.0], [["A", "B"]], [[1.0, 2.0]])
     for call, words in [
         (lambda: Fourier((4, 4), 100.0, [[1.0, 2.0]], pulse="round"), 'pulse = "round"'),
         (lambda: Fourier((4, 4), -1.0, [[1.0, 2.0]]), "field of view"),
@@ -151,6 +153,9 @@ def test_refusals():
         (lambda: Fourier((4, 4), 1.0, []), "uv is empty"),
         (lambda: Fourier((4, 4, 4), 1.0, [[1.0, 2.0]]), "(rows, columns)"),
         (lambda: Observation.of_stokes_i([1.0], [["A", "B"]], [[1.0]], [1.0], [0.1]), "uv has the shape"),
+        (lambda: Observation.of_stokes_i(*row, hidden[0, :1], [0.1]), "vis has masked elements"),
+        (lambda: Observation(*row, hidden, np.ones((1, 4))), "products has masked elements"),
+        (lambda: Fourier((4, 4), 1.0, [[1.0, 2.0]]).vjp(hidden[0, :1]), "cotangent has masked elements"),
     ]:
         with pytest.raises(ValueError) as refused:
             call()

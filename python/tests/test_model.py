@@ -183,6 +183,7 @@ def test_refusals():
         (lambda: model(times=[0.0, np.nan]), "times = nan"),
         (lambda: model(stokes="QU"), "needs polarization"),
         (lambda: of.apply(np.ma.masked_array(np.zeros(of.input_shape), True)), "masked"),
+        (lambda: of.apply(np.ma.masked_array(np.zeros(of.input_shape, np.float32), True)), "masked"),
         (lambda: screen(0, 9.0), "pixels = 0"),
         (lambda: screen(8, -1.0), "width = -1"),
     ]:
