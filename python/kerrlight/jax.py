@@ -126,7 +126,9 @@ class Representation(kerrlight.representation.Representation):
             yield slice(start, start + len(part)), np.concatenate([part, filling])
 
     def initialise(self, seed: int) -> Any:
-        return np.asarray(ravel_pytree(self.initial(jax.random.key(seed)))[0])
+        # Seeds of draws have 64 bits, of which JAX takes 63, and without its x64 mode 32.
+        key = jax.random.key((seed ^ (seed >> 32)) & 0xFFFFFFFF)
+        return np.asarray(ravel_pytree(self.initial(key))[0])
 
     def eval(self, parameters: Any, points: Any) -> Any:
         values = np.empty(len(points), np.float32)

@@ -212,6 +212,8 @@ def test_jax(tmp_path, monkeypatch):
     own = own_blobs.Blobs(kerrlight.Region(2.0, 8.0, np.inf), count=7)
     own.chunk = 64
     derivatives(own)
+    starts = [own.initialise(seed) for seed in (0, 2**33, 2**63, 2**64 - 2)]
+    assert all((one != other).any() for one, other in zip(starts, starts[1:]))
     chosen = {"kind": "own_blobs:Blobs", "own": {"settings": {"count": 16}, **RATES}}
     settings = {**QUICK, "representation": chosen, "training.batch": {"frames": 8}}
     fit = Fit(folder="run", set=settings).run(progress=False)
