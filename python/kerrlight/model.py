@@ -111,12 +111,14 @@ class ForwardModel(_Linear):
     :param split: into how many panels each of the coarsest ones is cut.
     :param per_ray: nodes equidistant in Mino time instead, with BH-NeRF's weights |x_i - x_{i-1}|; for observers at a
         finite radius.
-    :param times: times of the frames (M).
-    :param reference_time: time of the field of emission (M); matter turns from there to each frame.
+    :param times: times of the frames (M): those of arrival, less r_o + 2 ln r_o of an observer at a finite radius r_o.
+        Without ``slow_light`` those of emission.
+    :param reference_time: time of the field of emission (M), on the clock of ``times``; matter turns from there to each
+        frame.
     :param velocity: how matter moves: :class:`Keplerian`, :class:`PowerLaw`, :class:`Tabulated`, :class:`Infall` or
         :class:`Profile`.
     :param axis: what it turns about, right-handed.
-    :param injection_time: when it begins to shine (M); always, without one.
+    :param injection_time: when it begins to shine (M), on the clock of ``times``; always, without one.
     :param slow_light: whether light takes its time.
     :param redshift_power: emission goes like g to this power; without it there is no redshift.
     :param scale: flux of a pixel with an integral of 1.
@@ -256,7 +258,8 @@ class ForwardModel(_Linear):
 
     @property
     def delays(self) -> Floats:
-        """Time before the frame's time at which the light of each node left (M); 0 without ``slow_light``."""
+        """Time of flight of the light of each node (M), less r_o + 2 ln r_o of an observer at a finite radius r_o: so long
+        before the frame's time it left. 0 without ``slow_light``."""
         delay: Floats = self._columns["delay"]
         return delay if len(delay) else np.zeros(self.nodes)
 
