@@ -36,7 +36,7 @@ class Comparison:
 
     def rows(self) -> list[dict[str, Any]]:
         """A row for each case: its levels, its seed, its status, its verdict, and every result that is a single
-        number."""
+        number. A factor with the name of a result, such as ``steps``, takes the place of that."""
         return [_row(case) for case in self.cases]
 
     def table(self) -> Any:
@@ -68,7 +68,7 @@ def _row(case: Mapping[str, Any]) -> dict[str, Any]:
         row["verdict"] = verdict["outcome"]
     for name, value in results.items():
         if isinstance(value, (int, float)) and not isinstance(value, bool):
-            row[name] = value
+            row.setdefault(name, value)
     return row
 
 

@@ -1,6 +1,7 @@
 """Representations written in Python: beside kerrlight's own, in fits and comparisons, and what goes wrong in them."""
 
 import importlib.util
+import json
 import pathlib
 import sys
 
@@ -132,6 +133,15 @@ def test_takes_part_in_a_comparison(voxels):
         assert done.table()["loss"].tolist() == [row["loss"] for row in done.rows()]
     assert done.fit(0).volume.emission.shape == (12, 12, 12)
     assert "Mine and theirs" in done.report().path.read_text(encoding="utf-8")
+
+
+def test_levels_stay_beside_results_of_their_name(tmp_path):
+    found = {"steps": 30, "loss": 0.5, "verdict": {"outcome": "explained"}}
+    case = {"levels": {"steps": "few"}, "seed": 1, "status": "done", "results": found}
+    text = json.dumps({"title": "Steps", "quick": False, "cases": [case]})
+    (tmp_path / "results.json").write_text(text, encoding="utf-8")
+    expected = {"steps": "few", "seed": 1, "status": "done", "verdict": "explained", "loss": 0.5}
+    assert kerrlight.Comparison(tmp_path).rows() == [expected]
 
 
 def test_what_goes_wrong(voxels, capfd):

@@ -206,6 +206,7 @@ fn experiments_are_listed_and_mistakes_are_named() {
         ("seeds = 2", "seeds = 0", "seeds = 0 is not allowed"),
         ("[set]", "[set]\nseed = 5", "`seed` is not allowed among the settings"),
         ("seeds = 2", "seed = 2", "unknown field `seed`"),
+        ("name = \"rate\"", "name = \"seed\"", "name = \"seed\" is not allowed"),
         ("rows = [\"rate\"]", "rows = [\"rates\"]", "there is no factor \"rates\""),
         ("kind = \"time\"", "kind = \"tim\"", "unknown variant `tim`"),
         (

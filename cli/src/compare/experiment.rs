@@ -342,9 +342,15 @@ fn known_result(value: &str) -> anyhow::Result<()> {
     )
 }
 
+/// Columns of every case, which no factor may be called.
+const COLUMNS: [&str; 3] = ["seed", "status", "verdict"];
+
 impl Factor {
     fn check(&self) -> anyhow::Result<()> {
         let name = &self.name;
+        if COLUMNS.contains(&name.as_str()) {
+            bail!("factor: name = {name:?} is not allowed: every case has such a column");
+        }
         match (&self.key, self.level.is_empty(), self.values.is_empty()) {
             (None, false, true) | (Some(_), true, false) => {}
             _ => bail!("factor {name:?} needs either levels, or a key with values"),
