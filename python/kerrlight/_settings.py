@@ -42,6 +42,17 @@ INFINITE = "\0inf"
 """Text for infinity in JSON, which has none."""
 
 
+def of_json(value: Any) -> Any:
+    """What the compiled half has written as JSON, with infinities in place of the words that stand for them."""
+    if isinstance(value, dict):
+        return {key: of_json(of) for key, of in value.items()}
+    if isinstance(value, list):
+        return [of_json(of) for of in value]
+    if isinstance(value, str) and value.lstrip("-").startswith("\0"):
+        return float(value.replace("\0", ""))
+    return value
+
+
 def _table(value: Any) -> Any:
     """Objects such as a ``Hole`` as tables."""
     if is_dataclass(value) and not isinstance(value, type):

@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kerrlight._arrays import flat
+from kerrlight._settings import of_json
 
 __all__ = ["Region", "Representation"]
 
@@ -138,7 +139,7 @@ def _load(kind: str, region: tuple[float, float, float], own: str) -> _Checked:
     module, _, name = kind.rpartition(":")
     if not module or not name:
         raise ValueError(f'representation.kind = "{kind}" is not allowed: "module:Class"')
-    made = getattr(_module(module), name)(Region(*region), **json.loads(own))
+    made = getattr(_module(module), name)(Region(*region), **of_json(json.loads(own)))
     missing = [part for part in ("dimension", "parameters") if not hasattr(made, part)]
     missing += [part for part in ("initialise", "eval", "vjp", "project") if not hasattr(made, part)]
     if missing:

@@ -43,6 +43,27 @@ fn with_infinities(value: &mut toml::Value) {
     }
 }
 
+/// The settings of a table as JSON, in which words stand for infinities and what is no number.
+pub fn json_of_toml(table: &toml::Table) -> PyResult<String> {
+    let mut table = table.clone();
+    table.iter_mut().for_each(|(_, value)| without_infinities(value));
+    serde_json::to_string(&table).map_err(refused)
+}
+
+fn without_infinities(value: &mut toml::Value) {
+    match value {
+        toml::Value::Float(number) if !number.is_finite() => {
+            let sign = if *number < 0.0 { "-" } else { "" };
+            *value = format!("{sign}\0{}", number.abs()).into();
+        }
+        toml::Value::Array(all) => all.iter_mut().for_each(without_infinities),
+        toml::Value::Table(table) => {
+            table.iter_mut().for_each(|(_, value)| without_infinities(value));
+        }
+        _ => {}
+    }
+}
+
 /// The scene that a picture's file holds.
 #[pyfunction]
 pub fn scene_of_exr(path: PathBuf) -> PyResult<String> {

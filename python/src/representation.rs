@@ -2,6 +2,7 @@
 //!
 //! `kerrlight.representation` loads the class and checks what its methods give; here is the trait for it.
 
+use crate::pictures::json_of_toml;
 use kerrlight_tomo::representation::{
     BuildError, Coordinates, Gradient, OwnSettings, Representation, Workspace,
 };
@@ -36,7 +37,7 @@ pub fn find(
 }
 
 fn load(py: Python<'_>, name: &str, own: &OwnSettings) -> PyResult<OfPython> {
-    let settings = serde_json::to_string(&own.table).map_err(crate::refusal::refused)?;
+    let settings = json_of_toml(&own.table)?;
     let region = (own.r_min, own.r_max, own.z_width);
     let module = py.import("kerrlight.representation")?;
     let instance = module.call_method1("_load", (name, region, settings))?;

@@ -51,7 +51,7 @@ class Voxels(kerrlight.Representation):
 class Wrong(Voxels):
     def __init__(self, region, *, how):
         super().__init__(region, nodes=4)
-        self.how = how
+        self.how = Wrong.given = how
 
     def eval(self, parameters, points):
         if self.how == "raises":
@@ -133,6 +133,12 @@ def test_takes_part_in_a_comparison(voxels):
         assert done.table()["loss"].tolist() == [row["loss"] for row in done.rows()]
     assert done.fit(0).volume.emission.shape == (12, 12, 12)
     assert "Mine and theirs" in done.report().path.read_text(encoding="utf-8")
+
+
+def test_infinite_settings_arrive(voxels):
+    how = [np.inf, -np.inf, 2.5, "inf"]
+    Fit(set={**QUICK, "representation": {"kind": "own_voxels:Wrong", "own": {"settings": {"how": how}, **RATES}}})
+    assert sys.modules["own_voxels"].Wrong.given == how
 
 
 def test_levels_stay_beside_results_of_their_name(tmp_path):
