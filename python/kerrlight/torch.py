@@ -86,8 +86,9 @@ class Representation(kerrlight.representation.Representation):
         raise NotImplementedError
 
     def _drawn(self, seed: int) -> Any:
+        # Networks are made on the processor: torch.manual_seed would seed the generators of all devices.
         with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
+            torch.default_generator.manual_seed(seed)
             return self.network()
 
     @cached_property

@@ -236,7 +236,7 @@ def test_jax(tmp_path, monkeypatch):
     assert losses(fit)[-1] < losses(fit)[0]
 
 
-def test_torch():
+def test_torch(monkeypatch):
     torch = pytest.importorskip("torch")
     import kerrlight.torch
 
@@ -248,4 +248,11 @@ def test_torch():
         def emission(self, network, points):
             return network(points / 8)[:, 0]
 
-    derivatives(Plain())
+    seeded = []
+    monkeypatch.setattr(torch.cuda, "manual_seed_all", seeded.append)
+    own, before = Plain(), torch.random.get_rng_state()
+    starts = [own.initialise(seed) for seed in (5, 5, 2**64 - 1)]
+    assert (starts[0] == starts[1]).all() and (starts[0] != starts[2]).any()
+    # Neither the caller's random numbers nor those of graphics devices begin anew.
+    assert torch.equal(torch.random.get_rng_state(), before) and not seeded
+    derivatives(own)
