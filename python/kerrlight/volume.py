@@ -77,13 +77,14 @@ class Volume:
         :param azimuth_deg: direction to the viewer around +z from +x.
         :param elevation_deg: the same above the plane z = 0.
         :param pixels: rows and columns.
-        :param width: of the picture (M); by default that of the box along its longest side.
+        :param width: of the picture (M), whose centre is the origin; by default twice the largest coordinate of the box.
         :param hole_radius: radius (M) of a ball about the origin that hides what is behind it.
         """
         pixels = whole("pixels", pixels, 1, 8192)
         azimuth_deg = degrees("azimuth_deg", azimuth_deg)
         elevation_deg = degrees("elevation_deg", elevation_deg)
-        side = float(np.max(self.high - self.low)) if width is None else float(width)
+        farthest = np.abs([self.low, self.high]).max()
+        side = 2.0 * float(farthest) if width is None else float(width)
         if not (side > 0 and math.isfinite(side)):
             raise ValueError(f"width = {width} is not allowed: above 0 (M)")
         numbers = (float(azimuth_deg), float(elevation_deg), float(hole_radius))

@@ -64,6 +64,14 @@ def test_xarray(tmp_path):
     assert dict(array.sizes) == {"x": 2, "y": 3, "z": 4} and array.x.attrs["units"] == "M"
 
 
+def test_a_view_holds_a_box_beside_the_hole(tmp_path):
+    np.savez(tmp_path / "v.npz", emission=np.ones((4, 4, 4), "f4"), low=[2.0, -1.0, -1.0], high=[6.0, 1.0, 1.0])
+    volume = kerrlight.Volume(tmp_path / "v.npz")
+    light = volume.view(-90.0, 0.0, pixels=24).sum() * (12.0 / 24) ** 2
+    assert light == pytest.approx(4.0 * 2.0 * 2.0, rel=0.1)
+    np.testing.assert_array_equal(volume.view(), volume.view(width=12.0))
+
+
 def stop_at(step, how):
     def stop(now):
         if now.step == step:
