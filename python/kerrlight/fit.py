@@ -168,7 +168,7 @@ class Fit:
         """Runs the fit, or resumes it where its folder holds a part of it.
 
         :param callback: called on this thread with each :class:`Step` of the log, for which the fit waits. What it raises
-            stops the fit after the step, and is raised.
+            stops the fit after the step, and is raised. A static image has no steps.
         :param progress: whether to show a bar, if tqdm is installed.
         :param threads: how many threads to use, which changes no result.
         :param memory: a limit, such as ``"4GiB"``.
