@@ -63,17 +63,25 @@ fn fresh(to: &Path) {
 /// Returns the arguments that make a command take seconds, not minutes; whatever it is, it is printed.
 fn shorter(line: &str) -> &'static str {
     let is_whole = line.contains("--resume") || line.contains("--init");
+    if is_whole || !line.contains(" fit") {
+        return "";
+    }
     if line.contains("unknown_geometry.toml") {
-        return " --set training.steps=5 --set search.starts=1 --set search.coarse.trials=40 \
-                --set 'search.fine={trials=20,nodes=16,iterations=30,pixels=20,frames=12}'";
+        return " --set training.steps=5 --set training.start.linear.steps=20 --set screen.pixels=20 \
+                --set screen.ring_rays=2 --set search.starts=1 \
+                --set 'search.coarse={trials=20,nodes=12,iterations=15,pixels=20,frames=12}' \
+                --set 'search.fine={trials=10,nodes=12,iterations=20,pixels=20,frames=12}'";
     }
-    if line.contains(" fit") && line.contains("linear") {
-        return " --set training.steps=5 --set output.nodes=24 --set screen.pixels=12 --set linear.iterations=10";
-    }
-    if line.contains(" fit") && !is_whole {
+    if line.contains("data") || line.contains("my_fit") {
         return " --set training.steps=5 --set output.nodes=24";
     }
-    ""
+    if line.contains("linear") {
+        return " --set training.steps=5 --set training.start.linear.steps=20 --set output.nodes=24 \
+                --set screen.pixels=12 --set linear.iterations=10";
+    }
+    // Enough for the flare to be seen to move where its movie is observed.
+    " --set training.steps=5 --set training.start.linear.steps=200 --set output.nodes=24 \
+     --set screen.pixels=20 --set screen.jy_per_pixel=0.32"
 }
 
 fn run(folder: &Path, shown: &Shown) {
