@@ -221,7 +221,7 @@ fn exact_unresolved_stars_of_the_orbit_around_the_hole() {
     // Half the field of 70 degrees on its plane: 2 atan(tan(35 degrees)/2).
     let middle = ["screen.width=160", "screen.height=100", "camera.field_of_view_deg=38.592"];
     let stars = ["sky.stars.count=1000"];
-    let (off, changes) = photometry(&text, &[&middle[..], &stars].concat(), 20, 3.0);
+    let (off, changes) = photometry(&text, &[&middle[..], &stars].concat(), 8, 3.0);
     println!(
         "{} images, flux off by {:.2e} rms, {:.2e} at most; from frame to frame {:.2e} rms, {:.2e} \
          at most",

@@ -31,13 +31,13 @@ fn exact_leakage_is_found_beside_emission_that_changes() {
     let folder = tempfile::tempdir().unwrap();
     let scene = scene_path("fits/polarized_flare.toml");
     let changes = sets(&[
-        "screen.pixels=24",
-        "simulation.observation.scans=12",
-        "instrument.leakage.rounds=4",
+        "screen.pixels=20",
+        "simulation.observation.scans=8",
+        "instrument.leakage.rounds=3",
         "change={allowed='any',weight=0.01,spacing=40.0}",
         "representation.kind=grid",
         "representation.grid={nodes=20}",
-        "training.start={linear={nodes=20,stride=1,steps=400,iterations=40}}",
+        "training.start={linear={nodes=20,stride=1,steps=400,iterations=20}}",
         "training.steps=60",
         "linear.rounds=1",
     ]);

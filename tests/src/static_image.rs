@@ -16,8 +16,8 @@ const SEEN: &str = "observe image.csv --fov-uas 120 --array EHT2017 --source m87
 
 /// Fewer draws do not tell an error: four in a row may lie together.
 const QUICK: [&str; 5] = [
-    "image.pixels=32",
-    "image.iterations=1000",
+    "image.pixels=24",
+    "image.iterations=400",
     "image.draws=8",
     "strength={values=[10.0,30.0],folds=3}",
     "image.starts=[{gaussian={fwhm_uas=60.0}}]",
@@ -96,7 +96,7 @@ fn exact_a_ring_is_found_at_once() {
     let first = std::fs::read(run.join("image.npz")).unwrap();
     succeed(path, &["fit", "--resume", "run"]);
     assert_eq!(std::fs::read(run.join("image.npz")).unwrap(), first);
-    assert!(succeed(path, &["inspect", "run"]).contains("static image of 32 x 32 pixels"));
+    assert!(succeed(path, &["inspect", "run"]).contains("static image of 24 x 24 pixels"));
     for words in ["Closure phase ", "χ² of amplitudes is the least", "a circle is the beam"] {
         assert!(page.contains(words), "{words}");
     }
@@ -315,7 +315,7 @@ fn exact_polarisation_of_a_ring_is_found() {
         assert_eq!(found["leakage"].is_object(), kind == "polarized visibilities");
         assert!(path.join(kind).join("polarized.png").is_file());
         let all = array(&path.join(kind).join("image.npz"), "recovered_q.npy");
-        assert_eq!(all.len(), 32 * 32);
+        assert_eq!(all.len(), 24 * 24);
         let page = std::fs::read_to_string(path.join(kind).join("report.html")).unwrap();
         assert!(
             page.contains("net polarisation") && page.contains("Held-out frames: polarisation")
