@@ -43,12 +43,18 @@ pub fn array(path: &Path, name: &str) -> Vec<f64> {
     }
 }
 
-/// The picture of a run's scene is the frame of its movie, and its film the others.
+/// Results of a fit for other verbs.
 #[test]
-fn exact_scene_of_a_run_is_its_movie() {
+fn exact_runs_are_scenes_movies_and_data() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
-    fit(path);
+    fit(folder.path());
+    scene_of_a_run_is_its_movie(folder.path());
+    movie_of_a_run_is_observed(folder.path());
+    starters_of_images_ask_for_what_is_missing(folder.path());
+}
+
+/// The picture of a run's scene is the frame of its movie, and its film the others.
+fn scene_of_a_run_is_its_movie(path: &Path) {
     let movie = path.join("run/movie.npz");
     let (frames, times) = (array(&movie, "recovered.npy"), array(&movie, "time.npy"));
     let intensity = |name: &str| -> Vec<f64> {
@@ -75,11 +81,7 @@ fn exact_scene_of_a_run_is_its_movie() {
 }
 
 /// Telescopes see a fit's movie with the field and the times that it has.
-#[test]
-fn exact_movie_of_a_run_is_observed() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
-    fit(path);
+fn movie_of_a_run_is_observed(path: &Path) {
     fn see<'a>(more: &[&'a str]) -> Vec<&'a str> {
         let words = [
             "observe",
@@ -152,11 +154,7 @@ fn exact_starters_of_visibilities_run() {
 }
 
 /// Images: what they do not tell is requested, key by key.
-#[test]
-fn exact_starters_of_images_ask_for_what_is_missing() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
-    fit(path);
+fn starters_of_images_ask_for_what_is_missing(path: &Path) {
     succeed(path, &["fit", "--init", "run/movie.npz", "-o", "images.toml"]);
     let few =
         ["--set", "training.steps=2", "--set", "output.nodes=8", "--set", "training.start=drawn"];

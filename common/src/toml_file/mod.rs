@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn exact_text_of_a_value() {
-        let text = "title = \"a\"\nseed = 3\ncenter = [0.0, 1e-7, -inf]\n\n[law.infall]\nxi = 0.5\n\n\
+        let text = "title = \"a\"\nseed = 3\ncenter = [0.0, 0.0000001, -inf]\n\n[law.infall]\nxi = 0.5\n\n\
                     [[spot]]\nsigma = 1.0\n\n[tables]\n\"a.b\" = 0.1\n\n[own]\n";
         let value: File = read(text).unwrap();
         assert_eq!(write(&value).unwrap(), text);
