@@ -110,7 +110,7 @@ fn exact_changed_inputs_and_damaged_state_are_refused() {
     are_the_same(at, ["whole", "run"], &["volume.npz", "movie.npz"]);
 }
 
-/// A movie with one number changed is another movie.
+/// A movie with one number changed is another movie. `-o` takes an empty folder, as its help says.
 #[test]
 fn exact_a_changed_movie_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -120,6 +120,9 @@ fn exact_a_changed_movie_is_refused() {
     let row = (0..n).map(|k| format!("{}", k % 3)).collect::<Vec<_>>().join(",");
     let image = format!("{row}\n").repeat(n);
     std::fs::write(at.join("movie.csv"), &image).unwrap();
+    std::fs::create_dir(at.join("run")).unwrap();
+    let help = succeed(at, &["fit", "--help"]);
+    assert!(help.contains("new or empty"), "{help}");
     let words = ["fit", "movie.toml", "-o", "run", "--set", "training.batch={pixels=100}"];
     succeed(at, &words);
     std::fs::write(at.join("movie.csv"), image.replacen('1', "7", 1)).unwrap();
@@ -162,17 +165,6 @@ fn exact_a_folder_belongs_to_one_process() {
     array.push_str("# changed\n");
     std::fs::write(at.join("array.txt"), array).unwrap();
     assert!(fail(at, &resume).contains("array.txt has changed"));
-}
-
-/// `-o` takes an empty folder, as its help says.
-#[test]
-fn exact_an_empty_folder_is_free() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::create_dir(folder.path().join("run")).unwrap();
-    succeed(folder.path(), &with(&small(), &["-o", "run", "--set", "training.steps=5"]));
-    let help = succeed(folder.path(), &["fit", "--help"]);
-    assert!(help.contains("new or empty"), "{help}");
-    assert!(root().join("cli").is_dir());
 }
 
 /// The same of a comparison: one at a time, and cases of other data are not mixed with those that are there.
