@@ -1,6 +1,5 @@
 //! Times a scene with each effect off and on, alone and together, and a disc without effects against
-//! a loop that knows none, and writes docs/measurements/effects.md. `effects library N` and `effects loop N`
-//! run one of these two N times, for a profiler.
+//! a loop that knows none, and writes docs/measurements/effects.md.
 
 mod off;
 
@@ -54,10 +53,6 @@ const SIDE: usize = 64;
 const RUNS: usize = 5;
 
 fn main() -> anyhow::Result<()> {
-    let asked: Vec<String> = std::env::args().skip(1).collect();
-    if let [which, times] = &asked[..] {
-        return off::repeat(which, times.parse().context("a number of times")?);
-    }
     let [library, plain] = off::compare()?;
     let mut table = String::new();
     let off = time(&[])?;

@@ -165,20 +165,3 @@ pub fn compare() -> anyhow::Result<[f64; 2]> {
     anyhow::ensure!(off.agree(), "the library and the loop do not see the same");
     Ok(least.map(|seconds| seconds / off.rays() as f64 * 1e6))
 }
-
-/// Runs one of the two `times` times, for a profiler.
-///
-/// # Errors
-/// If there is no such one.
-pub fn repeat(which: &str, times: usize) -> anyhow::Result<()> {
-    let mut off = Off::new()?;
-    for _ in 0..times {
-        match which {
-            "library" => off.library()?,
-            "loop" => off.plain_loop()?,
-            _ => anyhow::bail!("`{which}`: either `library` or `loop`"),
-        }
-    }
-    println!("{} rays", off.rays() * times);
-    Ok(())
-}
