@@ -63,12 +63,17 @@ fn counts(folder: &Path, name: &str) -> [u64; 4] {
     [count("done"), count("running"), failed, count("open")]
 }
 
+/// Asserts that so many cases are done, and have found what one process finds.
+fn as_alone(at: &Path, cases: u64) {
+    assert_eq!(counts(at, "out"), [cases, 0, 0, 0]);
+    if !at.join("alone").exists() {
+        succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
+    }
+    assert_eq!(volumes(&at.join("out")), volumes(&at.join("alone")));
+}
+
 /// The commands of --list, four at a time, find what one process finds; once more they run nothing.
-fn runs_each_case_once(engine: &str) {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    experiment(at, 6, 20);
-    succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
+fn runs_each_case_once(at: &Path, engine: &str) {
     let script =
         format!("kerrlight compare seeds.toml -o out --list --threads 1 | cut -f 3 | {engine}");
     let written = [(); 2].map(|()| {
@@ -82,26 +87,24 @@ fn runs_each_case_once(engine: &str) {
         entries.filter_map(time).collect::<BTreeMap<_, _>>()
     });
     assert!(written[0].len() == 6 && written[0] == written[1]);
-    assert_eq!(counts(at, "out"), [6, 0, 0, 0]);
-    assert_eq!(volumes(&at.join("out")), volumes(&at.join("alone")));
+    as_alone(at, 6);
     succeed(at, &["compare", "out", "--collect"]);
     let table = |name: &str| std::fs::read_to_string(at.join(name).join("results.csv")).unwrap();
     assert_eq!(table("out").lines().count(), table("alone").lines().count());
+    std::fs::remove_dir_all(at.join("out")).unwrap();
 }
 
 #[test]
-fn exact_xargs_runs_each_case_once() {
-    runs_each_case_once("xargs -d '\\n' -P 4 -n 1 sh -c");
-}
-
-#[test]
-fn exact_gnu_parallel_runs_each_case_once() {
+fn exact_xargs_and_gnu_parallel_run_each_case_once() {
+    let folder = tempfile::tempdir().unwrap();
+    experiment(folder.path(), 6, 20);
+    runs_each_case_once(folder.path(), "xargs -d '\\n' -P 4 -n 1 sh -c");
     let version = Command::new("parallel").arg("--version").output();
-    if !version.is_ok_and(|output| output.stdout.starts_with(b"GNU parallel")) {
+    if version.is_ok_and(|output| output.stdout.starts_with(b"GNU parallel")) {
+        runs_each_case_once(folder.path(), "parallel -j 4");
+    } else {
         eprintln!("GNU PARALLEL IS NOT TESTED: there is none; apt-get install parallel");
-        return;
     }
-    runs_each_case_once("parallel -j 4");
 }
 
 /// Ten thousand cases of which one was run, and two thousand have its results.
@@ -161,9 +164,7 @@ fn exact_a_case_has_one_process_and_survives_kills() {
     kill(first);
     assert_eq!(counts(at, "out"), [0, 0, 0, 1]);
     succeed(at, &words);
-    assert_eq!(counts(at, "out"), [1, 0, 0, 0]);
-    succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
-    assert_eq!(volumes(&at.join("out")), volumes(&at.join("alone")));
+    as_alone(at, 1);
     // What is done is done at once, and another name is refused.
     let clock = Instant::now();
     succeed(at, &words);
@@ -240,9 +241,7 @@ fn exact_an_array_of_slurm_runs_each_case_once() {
     }
     let told = slurm.says(at, &format!("scontrol show job {job}_1"));
     assert!(told.contains("Restarts=1"), "{told}");
-    assert_eq!(counts(at, "out"), [4, 0, 0, 0]);
-    succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
-    assert_eq!(volumes(&at.join("out")), volumes(&at.join("alone")));
+    as_alone(at, 4);
 }
 
 fn counts_if_begun(at: &Path) -> [u64; 4] {
@@ -284,7 +283,5 @@ fn exact_snakemake_runs_each_case_once() {
     assert!(engine.wait().unwrap().success());
     let said = std::fs::read_to_string(at.join("said")).unwrap();
     assert!(said.contains("Trying to restart job"), "{said}");
-    assert_eq!(counts(at, "out"), [4, 0, 0, 0]);
-    succeed(at, &["compare", "seeds.toml", "-o", "alone"]);
-    assert_eq!(volumes(&at.join("out")), volumes(&at.join("alone")));
+    as_alone(at, 4);
 }

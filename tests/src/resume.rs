@@ -5,6 +5,7 @@ use crate::support::{
 };
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 /// Ten bands of a scene whose rays are slow enough to be interrupted.
@@ -14,21 +15,24 @@ fn arguments(scene: &str) -> Vec<&str> {
     [&["render", scene, "-o", "a.exr", "--preview", "a.png"][..], &SIZE[..]].concat()
 }
 
-/// The whole picture, and how long it takes.
-fn undisturbed(scene: &str) -> (Vec<u8>, Duration) {
-    let folder = tempfile::tempdir().unwrap();
-    binary();
-    let clock = Instant::now();
-    succeed(folder.path(), &arguments(scene));
-    let taken = clock.elapsed();
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "nothing is left behind");
-    (std::fs::read(folder.path().join("a.exr")).unwrap(), taken)
+/// The whole picture of the scene that tests interrupt, and how long it takes.
+fn undisturbed() -> &'static (Vec<u8>, Duration) {
+    static PICTURE: OnceLock<(Vec<u8>, Duration)> = OnceLock::new();
+    PICTURE.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        binary();
+        let clock = Instant::now();
+        succeed(folder.path(), &arguments(&scene_path("hot_spots.toml")));
+        let taken = clock.elapsed();
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "nothing is left behind");
+        (std::fs::read(folder.path().join("a.exr")).unwrap(), taken)
+    })
 }
 
 #[test]
 fn exact_same_bytes_after_kills_at_twenty_moments() {
     let scene = scene_path("hot_spots.toml");
-    let (whole, taken) = undisturbed(&scene);
+    let (whole, taken) = undisturbed();
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("a.exr");
     let mut resumed = 0;
@@ -40,13 +44,13 @@ fn exact_same_bytes_after_kills_at_twenty_moments() {
         std::thread::sleep(moment);
         kill(child);
         if output.exists() {
-            assert!(std::fs::read(&output).unwrap() == whole, "a half file after kill {k}");
+            assert!(std::fs::read(&output).unwrap() == *whole, "a half file after kill {k}");
             std::fs::remove_file(&output).unwrap();
         }
     }
     assert!(resumed > 5, "{resumed} runs went on with another's work");
     succeed(folder.path(), &arguments(&scene));
-    assert!(std::fs::read(&output).unwrap() == whole);
+    assert!(std::fs::read(&output).unwrap() == *whole);
 }
 
 /// Ctrl-C keeps what is there and says how to go on; other scenes do not take it up.
@@ -54,14 +58,14 @@ fn exact_same_bytes_after_kills_at_twenty_moments() {
 #[test]
 fn exact_same_bytes_after_an_interrupt() {
     let scene = scene_path("hot_spots.toml");
-    let (whole, taken) = undisturbed(&scene);
+    let (whole, taken) = undisturbed();
     let folder = tempfile::tempdir().unwrap();
     let partial = folder.path().join("a.exr.partial");
     let child = start(folder.path(), &arguments(&scene));
     // Its head alone is not yet a band.
     let head = || std::fs::metadata(&partial).map_or(0, |m| m.len());
     let clock = Instant::now();
-    while head() < 4096 && clock.elapsed() < 20 * taken + Duration::from_secs(60) {
+    while head() < 4096 && clock.elapsed() < 20 * *taken + Duration::from_secs(60) {
         std::thread::sleep(Duration::from_millis(1));
     }
     crate::signals::signal(child.id(), "-INT");
@@ -73,12 +77,12 @@ fn exact_same_bytes_after_an_interrupt() {
 
     let changed = [&arguments(&scene)[..], &["--set", "hole.spin=0.4"]].concat();
     assert!(told(folder.path(), &changed).contains("to another picture"));
-    assert!(std::fs::read(folder.path().join("a.exr")).unwrap() != whole);
+    assert!(std::fs::read(folder.path().join("a.exr")).unwrap() != *whole);
 
     std::fs::write(&partial, kept).unwrap();
     let tiles = [&arguments(&scene)[..], &["--tile", "7", "--threads", "3"]].concat();
     assert!(told(folder.path(), &tiles).contains("bands are done"));
-    assert!(std::fs::read(folder.path().join("a.exr")).unwrap() == whole);
+    assert!(std::fs::read(folder.path().join("a.exr")).unwrap() == *whole);
     assert!(!partial.exists());
 }
 
@@ -87,7 +91,7 @@ fn exact_same_bytes_after_an_interrupt() {
 #[test]
 fn exact_same_bytes_after_a_full_disk() {
     let scene = scene_path("hot_spots.toml");
-    let (whole, _) = undisturbed(&scene);
+    let (whole, _) = undisturbed();
     let folder = tempfile::tempdir().unwrap();
     let output = cramped(folder.path(), 16, &arguments(&scene));
     let said = message(&output);
@@ -95,7 +99,7 @@ fn exact_same_bytes_after_a_full_disk() {
     assert!(said.contains("cannot write") && said.contains("same command"), "{said}");
     assert!(!folder.path().join("a.exr").exists());
     succeed(folder.path(), &arguments(&scene));
-    assert!(std::fs::read(folder.path().join("a.exr")).unwrap() == whole);
+    assert!(std::fs::read(folder.path().join("a.exr")).unwrap() == *whole);
 }
 
 /// All files of a folder.
