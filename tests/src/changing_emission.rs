@@ -130,7 +130,8 @@ fn exact_held_out_frames_choose_the_price_of_a_network() {
     let folder = tempfile::tempdir().unwrap();
     let network = ["representation.kind=bhnerf", "representation.network.width=16"];
     let held = "held_out={setting=\"change.weight\",values=[0.003,3.0],folds=2}";
-    let few = ["training.steps=2", "linear.iterations=10", held];
+    let start = "training.start.linear={nodes=14,stride=1,steps=2}";
+    let few = ["training.steps=2", "linear.iterations=10", start, held];
     let results = fit(folder.path(), &[&LEARNT[..], &network, &few].concat());
     assert_eq!(results["held_out"]["chosen"].as_f64(), Some(0.003));
 }
