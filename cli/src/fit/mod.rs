@@ -240,7 +240,10 @@ impl Fit {
                 let folder = path.parent().filter(|folder| *folder != Path::new(""));
                 let folder = std::path::absolute(folder.unwrap_or(Path::new(".")))
                     .with_context(|| path.display().to_string())?;
-                placed((output::read_text(path)?, folder))
+                placed((
+                    output::read_text(path).map_err(|error| not_settings(path, error))?,
+                    folder,
+                ))
             }
         };
         // It stands in a line of the run's settings.
@@ -336,9 +339,23 @@ pub fn is_same_fit(one: &str, other: &str, folder: &Path) -> anyhow::Result<bool
     Ok(whole(one, folder)? == whole(other, folder)?)
 }
 
+/// The error of a file that holds no settings; data are named as such.
+fn not_settings(path: &Path, error: anyhow::Error) -> anyhow::Error {
+    let is_fits = std::fs::read(path).is_ok_and(|bytes| bytes.starts_with(b"SIMPLE  ="));
+    let shown = plain::path(path);
+    match is_fits {
+        true => anyhow!(
+            "{shown} is a FITS file, no settings: to fit data, `kerrlight fit --data {shown}`"
+        ),
+        false => error,
+    }
+}
+
 fn parse(text: &str) -> anyhow::Result<FitFile> {
     if StaticImageFile::is_static_image(text) {
-        bail!("there is a table [image]: a static image has no volume, and this needs one");
+        bail!(
+            "there is a table [image]: a static image has no volume, and this needs one; errors of an image are in its report"
+        );
     }
     FitFile::parse(text).map_err(work::explained)
 }

@@ -112,6 +112,11 @@ impl Observing {
 
     /// Receivers and conventions.
     pub fn setup(&self) -> anyhow::Result<Setup> {
+        for (name, ghz) in [("--frequency", self.frequency), ("--bandwidth", self.bandwidth)] {
+            if !(1e-3..=1e6).contains(&ghz) {
+                bail!("{name} {ghz} is not allowed: GHz in [1e-3, 1e6]");
+            }
+        }
         let ut1 = match self.ut1_utc {
             None => Ut1::Table,
             Some(seconds) if seconds.abs() < 1.0 => Ut1::Given(seconds),

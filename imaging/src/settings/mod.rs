@@ -131,10 +131,13 @@ pub struct StaticVisibilities {
     /// folder that this variable names. Several files (bands, days) in a list make one image, each with gains of its own.
     pub path: DataPaths,
     /// Rows within this time are averaged and share the gains of their stations, s, 0 or above.
+    #[schemars(range(min = 0.0), extend("unit" = "seconds"))]
     pub average_s: f64,
     /// Fraction of each amplitude, added to its error in quadrature; of each product where all four are fitted.
+    #[schemars(range(min = 0.0, max = 10.0), extend("unit" = "part of the amplitude"))]
     pub systematic: f64,
     /// Drops baselines shorter than this.
+    #[schemars(range(min = 0.0), extend("unit" = "wavelengths"))]
     pub uv_min: Option<f64>,
     /// First and last hour of UTC, hours; all without it.
     #[schemars(inner(range(min = 0.0, max = 1000.0)), extend("unit" = "hours"))]

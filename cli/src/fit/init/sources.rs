@@ -114,15 +114,20 @@ const BAND_HZ: core::ops::RangeInclusive<f64> = 200e9..=260e9;
 /// and without scattering where `kerrlight observe` has simulated none.
 pub fn known(observation: &Observation) -> Option<Source> {
     let source = *found(observation)?;
-    let told = |is_told: fn(&str) -> bool| observation.history.iter().any(|line| is_told(line));
-    let is_simulated = told(|line| line.contains("kerrlight ") && line.contains(" observe"));
-    let is_sharp = is_simulated && !told(|line| line.contains(SCATTERED));
+    let is_scattered = observation.history.iter().any(|line| line.contains(SCATTERED));
+    let is_sharp = is_simulated(observation) && !is_scattered;
     let source = Source { blur: source.blur.filter(|_| !is_sharp), ..source };
     let is_far = observation.frequency_hz.is_some_and(|hz| !BAND_HZ.contains(&hz));
     Some(match is_far {
         true => Source { uv_min: None, compact_jy: None, image: None, ..source },
         false => source,
     })
+}
+
+/// Returns whether `kerrlight observe` has made it.
+pub fn is_simulated(observation: &Observation) -> bool {
+    let is_told = |line: &String| line.contains("kerrlight ") && line.contains(" observe");
+    observation.history.iter().any(is_told)
 }
 
 fn found(observation: &Observation) -> Option<&'static Source> {

@@ -1,6 +1,6 @@
 //! Starter file for a volume from visibilities, and what every starter file says of them.
 
-use super::sources::{called, known};
+use super::sources::{called, is_simulated, known};
 use super::template::{complete, digits, plain_words};
 use anyhow::bail;
 use kerrlight_common::units::gravitational_angle;
@@ -50,8 +50,9 @@ pub fn of_visibilities(
     let of_source: Vec<&str> = of_source.flatten().collect();
     // Pixels of the region, 8 M deep, with emission 0.02.
     let per_pixel = flux / (core::f64::consts::PI * (10.0f64 / 24.0 * 32.0).powi(2) * 8.0 * 0.02);
+    let kind = if is_simulated(observation) { "simulated" } else { "measured" };
     let fields = [
-        ("title", format!("{}{day}: measured visibilities", plain_words(name))),
+        ("title", format!("{}{day}: {kind} visibilities", plain_words(name))),
         ("mass", mass),
         ("inclination", inclination),
         ("field", field),

@@ -114,6 +114,9 @@ pub struct Results {
 pub struct Closeness {
     /// Cosine of the angle between the axes.
     pub axis_dot_truth: f64,
+    /// True if the axis was given.
+    #[serde(skip)]
+    is_axis_known: bool,
     /// Note on a truth of which nothing is defined.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub note: Option<&'static str>,
@@ -216,6 +219,7 @@ impl Estimate<'_> {
         let inside = metrics::compare(&found.volume, volume, Some(&mask))?;
         Ok(Some(Closeness {
             axis_dot_truth: found.state.now.axis.dot(truth.axis()),
+            is_axis_known: matches!(self.file.axis, AxisSearch::Known {}),
             note: all.psnr_db.is_none().then_some(DARK),
             psnr_db: all.psnr_db,
             psnr_inside_db: inside.psnr_db,
@@ -310,7 +314,10 @@ const MEANINGS: [Line; 15] = [
         "normalised cross-correlation with the truth: 1 is perfect, whatever the scale",
     ),
     (
-        |of| Some(of.closeness.as_ref()?.axis_dot_truth),
+        |of| {
+            let closeness = of.closeness.as_ref().filter(|closeness| !closeness.is_axis_known);
+            Some(closeness?.axis_dot_truth)
+        },
         "axis",
         6,
         "",

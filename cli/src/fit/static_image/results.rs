@@ -230,7 +230,10 @@ impl Found<'_> {
             let (value, error) = of_ring(&self.survey, &ring, name, number);
             [(name.to_owned(), Some(value)), (format!("{name}_error"), error)]
         };
-        let of_image = ("ring_diameter_of_image_uas".to_owned(), Some(ring.diameter_uas));
-        RING.into_iter().flat_map(one).chain([of_image]).collect()
+        let of_image = [
+            ("ring_diameter_of_image_uas".to_owned(), Some(ring.diameter_uas)),
+            ("ring_position_angle_of_image_deg".to_owned(), Some(ring.position_angle_deg)),
+        ];
+        RING.into_iter().flat_map(one).chain(of_image).collect()
     }
 }

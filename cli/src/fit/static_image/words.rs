@@ -48,7 +48,11 @@ fn ring(survey: &Survey, shapes: &[ShapeFit], between: &RingSettings) -> String 
 
 /// States that the image has no ring, and whether a simple shape with one fits the data better than those without.
 fn no_ring(survey: &Survey, shapes: &[ShapeFit], between: &RingSettings) -> String {
-    let none = "The image has no ring between the radii that were asked for";
+    let [with, all] = survey.with_ring();
+    let none = format!(
+        "The image has no ring between the radii of [ring], as {} of {all} images that explain the data",
+        all - with
+    );
     let Some(best) = best_shape(shapes.iter()).filter(|best| best.shape.is_ring()) else {
         return format!("{none}.");
     };

@@ -105,6 +105,7 @@ fn exact_each_baseline_is_judged_by_its_own_limit() {
     let mut statistics = Statistics::default();
     statistics.groups.insert(vec![0, 1], Part { freedom: 30.0, chi2: 30.0 * 2.25 });
     statistics.groups.insert(vec![0, 2], Part { freedom: 500.0, chi2: 500.0 * 2.1 });
+    statistics.all = Part { freedom: 530.0, chi2: 530.0 };
     let mut found = Verdict { outcome: Outcome::Explained, reasons: vec![] };
     judge_groups(0, &Tested::gaussian(statistics, Errors::Known), &mut found);
     let faults: Vec<&Fault> = found.reasons.iter().map(|reason| &reason.fault).collect();
