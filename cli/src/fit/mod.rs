@@ -29,7 +29,7 @@ use crate::changed::{self, Changed};
 use crate::devices::{FitDevice, StepsOption};
 use crate::record::Recorder;
 use crate::{interrupt, output, paths, plain, session};
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 pub use api::{assigned, check, coverage, sizes, turned, velocities};
 pub use band_plots::{loop_plot, of_runs as plots_of_bands};
 pub use band_search::FILE as BAND;

@@ -178,7 +178,7 @@ impl PreparedScene {
     /// Returns whether a disc or gas reaches farther out than a screen at a finite radius.
     fn shines_beyond_observer(&self) -> bool {
         let disc = self.disc.as_ref().map(|disc| disc.edges()[1]);
-        let media = self.media.nodes(&self.optics).into_iter().map(|nodes| nodes.radius);
+        let media = self.media.nodes(&self.optics).into_iter().map(|nodes| nodes.request.radius);
         let reach = media.chain(disc).fold(0.0, f64::max);
         self.optics.view.observer().is_some_and(|observer| reach * observer.inverse_radius() > 1.0)
     }

@@ -50,7 +50,7 @@ fn ring(survey: &Survey, shapes: &[ShapeFit], between: &RingSettings) -> String 
 fn no_ring(survey: &Survey, shapes: &[ShapeFit], between: &RingSettings) -> String {
     let [with, all] = survey.with_ring();
     let none = format!(
-        "The image has no ring between the radii of [ring], as {} of {all} images that explain the data",
+        "The image has no ring between the radii of [ring], nor have {} of {all} images that the data allow",
         all - with
     );
     let Some(best) = best_shape(shapes.iter()).filter(|best| best.shape.is_ring()) else {

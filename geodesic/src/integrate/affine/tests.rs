@@ -51,7 +51,7 @@ fn code_affine_and_mino_tracers_agree() {
             let end = referee.mino_total();
             for part in [0.1, 0.5, 0.9, 0.98] {
                 let (a, b) = (referee.at(part * end), path.at(part * end));
-                let turn = (a.azimuth - b.azimuth) / std::f64::consts::TAU;
+                let turn = (a.azimuth - b.azimuth) / TAU;
                 // A relative error in r moves both azimuths by this much more, without
                 // bound at the horizon: dφ = a dr/Δ.
                 let r = b.radius();
@@ -59,7 +59,7 @@ fn code_affine_and_mino_tracers_agree() {
                 let miss = [
                     (a.radius() / b.radius() - 1.0).abs(),
                     (a.theta() - b.theta()).abs(),
-                    (turn - turn.round()).abs() * std::f64::consts::TAU / amplified,
+                    (turn - turn.round()).abs() * TAU / amplified,
                     (a.delay - b.delay).abs() / b.delay.max(1.0),
                 ];
                 for (worst, miss) in worst.iter_mut().zip(miss) {

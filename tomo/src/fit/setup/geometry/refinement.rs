@@ -137,7 +137,7 @@ impl Detail<'_> {
         let Place { at, seen, .. } = &here.place;
         let nodes = finer(at.nodes);
         let of = even.unwrap_or(here);
-        let reduced = self.through(&of.place, |problem| Ok(problem.left(&of.best)?))?;
+        let reduced = self.through(&of.place, |problem| problem.left(&of.best))?;
         let (asks, degree) = self.through(&here.place, |problem| {
             let excess = problem.excess(problem.scale * reduced);
             Ok((excess > 0.0 && problem.gaussian.is_none(), problem.effort.degree))
