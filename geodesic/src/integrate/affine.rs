@@ -305,42 +305,32 @@ impl AffinePath {
         let cos_theta = (y[2] / r).clamp(-1.0, 1.0);
         let sin_theta = y[0].hypot(y[1]) / r.hypot(a);
         let delay = y[6] - (self.hole.tortoise(w) - r) + self.origin[1];
-        let (inverse_radius_rate, velocity) = self.rates(&y, r);
+        let [inverse_radius_rate, polar] = self.rates(&y, r);
+        // Along the meridian, and without dragging −λ/sin θ along the circle of latitude.
+        let (sin, cos) = azimuth.sin_cos();
+        let lambda = y[0] * y[4] - y[1] * y[3];
+        let [meridian, around] = [polar * cos_theta, lambda].map(|part| -part / sin_theta);
+        let velocity = [meridian * cos - around * sin, meridian * sin + around * cos, polar];
         PathPoint {
             mino_time: y[MINO_TIME],
             inverse_radius: w,
             inverse_radius_rate,
-            direction: [sin_theta * azimuth.cos(), sin_theta * azimuth.sin(), cos_theta],
+            direction: [sin_theta * cos, sin_theta * sin, cos_theta],
             velocity,
             azimuth,
             delay,
         }
     }
 
-    /// d(1/r)/dτ and the rate of the direction, from those of the Kerr–Schild coordinates.
-    fn rates(&self, y: &State<f64>, r: f64) -> (f64, [f64; 3]) {
+    /// d(1/r)/dτ and d cos θ/dτ, from the rates of the Kerr–Schild coordinates.
+    fn rates(&self, y: &State<f64>, r: f64) -> [f64; 2] {
         let (a, [x, y_, z, ..]) = (self.hole.spin(), *y);
         let [dx, dy, dz, _, _, _, _, clock] = derivative(a, y);
         let sum = r * r + a * a;
         // From (x² + y²)/(r² + a²) + z²/r² = 1.
         let across = (x * dx + y_ * dy) / sum + z * dz / (r * r);
         let dr = across / (r * ((x * x + y_ * y_) / (sum * sum) + z * z / r.powi(4)));
-        // e^{iφ} sin θ of the reflected ray, (x + iy)/(r + ia), and its rate.
-        let swirl = [(r * x + a * y_) / sum, (r * y_ - a * x) / sum];
-        let rate = [
-            (dr * x + r * dx + a * dy) / sum - swirl[0] * 2.0 * r * dr / sum,
-            (dr * y_ + r * dy - a * dx) / sum - swirl[1] * 2.0 * r * dr / sum,
-        ];
-        // Reflected back it is turned by the azimuth's singular term, whose rate is a dr/Δ.
-        let turn = a * dr / self.hole.delta(r);
-        let (sin, cos) = (self.origin[0] + self.hole.azimuth_closed_form(1.0 / r)).sin_cos();
-        let back = [rate[0] + turn * swirl[1], -rate[1] + turn * swirl[0]];
-        let velocity = [
-            back[0] * cos - back[1] * sin,
-            back[0] * sin + back[1] * cos,
-            (r * dz - z * dr) / (r * r),
-        ];
-        (-dr / (r * r) / clock, velocity.map(|rate| rate / clock))
+        [-dr / (r * r) / clock, (r * dz - z * dr) / (r * r) / clock]
     }
 
     /// The pieces of the path with lo ≤ r ≤ hi (M) as intervals of Mino time (M⁻¹), in order: at most
