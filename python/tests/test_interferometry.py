@@ -51,6 +51,8 @@ def test_files(tmp_path, ending):
     np.testing.assert_allclose(after.uv[order[0]], before.uv[order[1]], rtol=1e-6)
     np.testing.assert_allclose(after.vis[order[0]], before.vis[order[1]], rtol=1e-5, atol=1e-6)
     np.testing.assert_allclose(after.sigma[order[0]], before.sigma[order[1]], rtol=1e-5, atol=1e-6)
+    # Tables do not tell it.
+    np.testing.assert_allclose(after.integration, 0.0 if ending == ".csv" else 60.0, rtol=1e-6)
     if ending == ".uvfits":
         assert {station.feed_rotation for station in after.array} == {(1.0, -1.0, 30.0)}
 

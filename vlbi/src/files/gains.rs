@@ -132,8 +132,10 @@ mod tests {
     #[test]
     fn exact_what_is_written_is_read() {
         let read = parse(&to_csv(&table())).unwrap();
+        assert_eq!(read.gains.len(), 2);
         for (a, b) in read.gains.iter().zip(&table().gains) {
             assert!((a.gain - b.gain).norm() < 1e-8 && a.station == b.station);
+            assert_eq!((a.time_h, a.span_s), (b.time_h, b.span_s));
             assert!((a.errors[0] - 0.01).abs() < 1e-5 && (a.errors[1] - 0.02).abs() < 1e-5);
         }
     }

@@ -296,6 +296,7 @@ mod tests {
         assert_eq!((back.mjd, back.basis), (observation.mjd, observation.basis));
         for (a, b) in observation.rows.iter().zip(&back.rows) {
             assert_eq!((a.time_h, a.uv, a.stations), (b.time_h, b.uv, b.stations));
+            assert_eq!((a.integration_s, a.opacity), (b.integration_s, b.opacity));
             for k in 0..4 {
                 assert_eq!(a.noise_sigma[k].to_bits(), b.noise_sigma[k].to_bits());
                 assert!((a.products[k] - b.products[k]).norm() < 1e-15);

@@ -88,3 +88,80 @@ fn table(times: &BTreeMap<u64, Vec<Complex64>>, names: &[&str]) -> GainTable {
     };
     GainTable { gains: times.iter().flat_map(of_time).collect() }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::array::Station;
+    use crate::observation::{Basis, Measured, Row};
+
+    const UNIT: Complex64 = Complex64::new(1.0, 0.0);
+
+    /// Scans of two stations that see 1 Jy.
+    fn observed(scans: usize) -> Observation {
+        let mut observation = Observation::empty(Basis::Stokes);
+        observation.stations = ["A", "B"].map(Station::named).to_vec();
+        let i = Measured { visibility: UNIT, noise_sigma: 0.1 };
+        let row = |k: usize| Row::total_intensity(k as f64, [0, 1], [1e9, 0.0], i);
+        observation.rows = (0..scans).map(row).collect();
+        observation
+    }
+
+    /// ln |g| of a station.
+    fn logs(table: &GainTable, name: &str) -> Vec<f64> {
+        let own = table.gains.iter().filter(|gain| gain.station == name);
+        own.map(|gain| gain.gain.norm().ln()).collect()
+    }
+
+    /// Asserts mean 0 and a standard deviation, within five standard errors.
+    fn scatter_is(logs: &[f64], sigma: f64) {
+        let count = logs.len() as f64;
+        let mean = logs.iter().sum::<f64>() / count;
+        let variance = logs.iter().map(|x| x * x).sum::<f64>() / count;
+        assert!(mean.abs() < 5.0 * sigma / count.sqrt(), "{mean}");
+        let error = 5.0 * (2.0 / count).sqrt();
+        assert!((variance / sigma.powi(2) - 1.0).abs() < error, "{sigma}: {variance}");
+    }
+
+    /// Amplitudes scatter from scan to scan as the settings say, or as they say of one station; phases do not.
+    #[test]
+    fn exact_scatter_over_scans() {
+        let stations = BTreeMap::from([("B".to_owned(), 0.4)]);
+        let errors = GainErrors { scan_amplitude: 0.1, stations, ..Default::default() };
+        let table = apply_gains(&mut observed(20_000), &errors, 7);
+        assert_eq!(table.gains.len(), 40_000);
+        scatter_is(&logs(&table, "A"), 0.1);
+        scatter_is(&logs(&table, "B"), 0.4);
+        assert!(table.gains.iter().all(|gain| gain.gain.im == 0.0));
+    }
+
+    /// Constant gains are the same in all scans, and scatter from seed to seed and between stations.
+    #[test]
+    fn exact_constant_gains() {
+        let errors = GainErrors { constant_amplitude: 0.2, ..Default::default() };
+        let mut all = Vec::new();
+        for seed in 0..5000 {
+            let table = apply_gains(&mut observed(3), &errors, seed);
+            let [a, b] = ["A", "B"].map(|name| logs(&table, name));
+            for of_scans in [&a, &b] {
+                assert!(of_scans.len() == 3 && of_scans.iter().all(|x| *x == of_scans[0]));
+            }
+            assert_ne!(a[0], b[0]);
+            all.extend([a[0], b[0]]);
+        }
+        scatter_is(&all, 0.2);
+    }
+
+    /// V₁₂ becomes g₁ ḡ₂ V₁₂.
+    #[test]
+    fn exact_gains_of_a_baseline() {
+        let mut observation = observed(4);
+        let errors = GainErrors { scan_amplitude: 0.3, random_phases: true, ..Default::default() };
+        let table = apply_gains(&mut observation, &errors, 1);
+        for (row, gains) in observation.rows.iter().zip(table.gains.chunks(2)) {
+            assert_eq!(row.time_h, gains[0].time_h);
+            let expected = gains[0].gain * gains[1].gain.conj();
+            assert!((row.products[0] - expected).norm() < 1e-15 && expected.im != 0.0);
+        }
+    }
+}

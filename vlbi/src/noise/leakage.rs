@@ -37,3 +37,26 @@ pub fn apply_leakage(
     }
     Ok(leakage)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::array::Station;
+    use crate::earth::SourcePosition;
+
+    /// Mean squares of 20,000 draws, within five standard errors: of |d|, and of its real part.
+    #[test]
+    fn exact_moments() {
+        let mut observation = Observation::empty(Basis::Circular);
+        observation.stations = ["A", "B"].map(Station::named).to_vec();
+        (observation.position, observation.mjd) = (Some(SourcePosition::SGR_A), Some(57850));
+        let draw = |seed| apply_leakage(&mut observation, 0.1, seed).unwrap().concat();
+        let all: Vec<Complex64> = (0..5000).flat_map(draw).collect();
+        assert_eq!(all.len(), 20_000);
+        let mean = |f: fn(&Complex64) -> f64| all.iter().map(f).sum::<f64>() / 20_000.0;
+        let error = 5.0 / 20_000f64.sqrt();
+        assert!((mean(Complex64::norm_sqr) / 0.01 - 1.0).abs() < error);
+        assert!((mean(|d| d.re * d.re) / 0.005 - 1.0).abs() < error * 2.0f64.sqrt());
+        assert!(mean(|d| d.re).abs() < 0.1 * error && mean(|d| d.im).abs() < 0.1 * error);
+    }
+}

@@ -187,6 +187,8 @@ fn factors(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Complex64;
+    use crate::observation::{Basis, Measured};
 
     /// A baseline of q wavelengths at an angle from the major axis.
     fn at(q: f64, angle_deg: f64, frequency_hz: f64) -> f64 {
@@ -286,6 +288,34 @@ mod tests {
         }
         let (six, eight) = (at(6e9, 0.0, 226.191_789_062_5e9), at(8e9, 0.0, 226.191_789_062_5e9));
         assert!((six - 0.341_37).abs() < 1e-5 && (eight - 0.188_96).abs() < 1e-5);
+    }
+
+    /// All four products have the kernel's factor and the errors that they had; undone, they are what they were.
+    #[test]
+    fn exact_scattered_products() {
+        let kernel = ScatteringKernel::sgr_a();
+        let products = [1.0, 2.0, -0.5, 0.25].map(|x| Complex64::new(x, 0.5 - x));
+        let i = Measured { visibility: products[0], noise_sigma: 0.1 };
+        let row = |uv| Row {
+            products,
+            noise_sigma: [0.1, 0.2, 0.3, 0.4],
+            ..Row::total_intensity(4.0, [0, 1], uv, i)
+        };
+        let mut observation = Observation::empty(Basis::Circular);
+        observation.frequency_hz = Some(230e9);
+        observation.rows = vec![row([2e9, 1e9]), row([-1e9, 5e9])];
+        let is_everywhere = |row: &Row, factor: f64| {
+            let mut pairs = row.products.iter().zip(products);
+            pairs.all(|(found, product)| (found - product * factor).norm() < 1e-14)
+        };
+        scatter(&mut observation, &kernel).unwrap();
+        for row in &observation.rows {
+            let factor = kernel.transform(row.uv, 230e9);
+            assert!((0.1..0.95).contains(&factor) && is_everywhere(row, factor), "{factor}");
+            assert_eq!(row.noise_sigma, [0.1, 0.2, 0.3, 0.4]);
+        }
+        unscatter(&mut observation, &kernel).unwrap();
+        assert!(observation.rows.iter().all(|row| is_everywhere(row, 1.0)));
     }
 
     #[test]

@@ -16,3 +16,18 @@ use super::observation::Measured;
 pub fn debiased_amplitude(measured: &Measured) -> f64 {
     (measured.visibility.norm_sqr() - measured.noise_sigma.powi(2)).max(0.0).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Complex64;
+
+    #[test]
+    fn exact_amplitudes_without_bias() {
+        let of = |re, im, noise_sigma| {
+            debiased_amplitude(&Measured { visibility: Complex64::new(re, im), noise_sigma })
+        };
+        assert_eq!(of(3.0, 4.0, 3.0), 4.0);
+        assert_eq!(of(0.3, 0.4, 0.6), 0.0);
+    }
+}

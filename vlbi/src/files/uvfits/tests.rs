@@ -67,6 +67,7 @@ fn same(a: &Row, b: &Row) -> bool {
         && a.noise_sigma.iter().zip(b.noise_sigma).all(|(x, y)| relative(*x, y))
         && a.uv.iter().zip(b.uv).all(|(x, y)| relative(*x, y))
         && a.opacity == b.opacity
+        && relative(a.integration_s, b.integration_s)
 }
 
 #[test]
