@@ -1,6 +1,6 @@
 //! The binary as a user runs it.
 
-use crate::support::{done, folder_with, message, scene_path, succeed};
+use crate::support::{done, folder_with, message, object, scene_path, succeed};
 use kerrlight_render::image::exr;
 
 const SIZE: [&str; 4] = ["--set", "screen.width=48", "--set", "screen.height=40"];
@@ -78,6 +78,34 @@ fn trace_reads_columns_in_any_order() {
     assert!(lines[2].contains(",captured,"));
     succeed(folder.path(), &["trace", "--rays", "rays.csv", "--crossings", "1", "-o", "out.csv"]);
     assert_eq!(std::fs::read_to_string(folder.path().join("out.csv")).unwrap(), text);
+}
+
+/// Of the ray along the equator without spin dr is the affine parameter: weights sum up to the way from a sphere to the
+/// horizon, or from a radius to another. At the observer p_θ = β.
+#[test]
+fn trace_places_samples_and_weighs_them() {
+    let heading = "spin,inclination_deg,alpha,beta\n";
+    let folder = folder_with("radial.csv", format!("{heading}0,90,0,0\n"));
+    std::fs::write(folder.path().join("bent.csv"), format!("{heading}0.9,60,7,3\n")).unwrap();
+    let numbers = |file: &str, options: &str, column: &str| {
+        let mut words = vec!["trace", "--observer", "100", "--rays", file];
+        words.extend(options.split(' '));
+        let table = object(folder.path(), &words);
+        let row = table["rays"][column][0].as_array().expect(column);
+        row.iter().filter_map(|number| number.as_f64()).collect::<Vec<f64>>()
+    };
+    let within = numbers("radial.csv", "--within 20 --samples 50 --weights", "sample_weight");
+    assert_eq!(within.len(), 50);
+    assert!((within.iter().sum::<f64>() - 18.0).abs() < 1e-9, "{within:?}");
+    let between = numbers("radial.csv", "--between 6 30 --samples 12 --weights", "sample_weight");
+    assert_eq!(between.len(), 12);
+    assert!((between.iter().sum::<f64>() - 24.0).abs() < 1e-5, "{between:?}");
+    let radii = numbers("bent.csv", "--between 6 30 --samples 6", "sample_r");
+    assert!(radii.len() == 12 && radii.iter().all(|r| (6.0..30.0).contains(r)), "{radii:?}");
+    let polar = numbers("bent.csv", "--samples 6 --momentum", "sample_p_theta");
+    assert!(polar.len() == 6 && (polar[0] - 3.0).abs() < 1e-9, "{polar:?}");
+    let radial = numbers("bent.csv", "--samples 6 --momentum", "sample_p_r");
+    assert!(radial[0] > 0.0 && radial[5] < 0.0, "{radial:?}");
 }
 
 #[test]

@@ -294,6 +294,29 @@ fn impossible(camera: &CameraConfig, time: f64, error: &Error) -> Invalid {
 mod tests {
     use super::*;
 
+    /// A camera of each name is one of that motion, and of no other.
+    #[test]
+    fn exact_motions_are_those_of_their_names() {
+        let hole = Kerr::new(0.8).unwrap();
+        let place = Inclination::from_degrees(70.0).unwrap();
+        let named = [
+            ("static", Motion::Static),
+            ("zamo", Motion::Zamo),
+            ("keplerian", Motion::Keplerian),
+            ("free-fall", Motion::FreeFall),
+        ];
+        for (name, _) in named {
+            let pose = "radius = 12.0\ntheta_deg = 70.0\nfield_of_view_deg = 40.0";
+            let config: CameraConfig =
+                toml::from_str(&format!("motion = \"{name}\"\n{pose}")).unwrap();
+            let found = config.camera(&hole, 0.0).unwrap();
+            for (other, motion) in named {
+                let camera = Camera::new(&hole, place, 12.0, motion).unwrap();
+                assert_eq!(found == camera, name == other, "{name} as {other}");
+            }
+        }
+    }
+
     /// Steffen's conditions: through the knots, monotone, straight where they are on a line.
     #[test]
     fn exact_monotone_cubic() {

@@ -187,3 +187,35 @@ pub(super) fn even_times(key: &str, frames: usize, [from, to]: [f64; 2]) -> Resu
     let step = (to - from) / (frames.max(2) - 1) as f64;
     Ok((0..frames).map(|k| from + step * k as f64).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::settings::{Hole, Kind};
+    use kerrlight_vlbi::Complex64;
+    use kerrlight_vlbi::array::Station;
+    use kerrlight_vlbi::observation::{Basis, Measured, Row};
+    use kerrlight_vlbi::operator::Pulse;
+
+    /// A minute is 60 s/(G M/c³), with 20.4605 s of Sgr A*; pixels are points unless the settings say what they are.
+    #[test]
+    fn exact_times_and_pixels_of_measured_visibilities() {
+        let hole = Hole::sgr_a_star(0.0);
+        let settings = FitFile::new(hole, 30.0, [2.0, 10.0], Kind::LinearGrid);
+        let mut file = settings.with_visibilities(0.0, 2.4);
+        if let Some(DataFiles::Visibilities { first_time, .. }) = &mut file.data {
+            *first_time = 5.0;
+        }
+        let mut observation = Observation::empty(Basis::Stokes);
+        observation.stations = ["A", "B"].map(Station::named).to_vec();
+        let i = Measured { visibility: Complex64::new(1.0, 0.0), noise_sigma: 0.1 };
+        let row = |time_h| Row::total_intensity(time_h, [0, 1], [1e9, 0.0], i);
+        observation.rows = vec![row(4.0), row(4.0 + 1.0 / 60.0)];
+        let data = FitData::of_visibilities(&file, observation.clone(), "a test").unwrap();
+        assert_eq!((data.times.len(), data.times[0], data.pulse), (2, 5.0, Pulse::Delta));
+        assert!((data.times[1] - 5.0 - 60.0 / 20.460_49).abs() < 1e-5, "{:?}", data.times);
+        file.screen.pulse = Some(PixelShape::Rectangle);
+        let data = FitData::of_visibilities(&file, observation, "a test").unwrap();
+        assert_eq!(data.pulse, Pulse::Rectangle);
+    }
+}

@@ -274,6 +274,20 @@ fn pixels(screen: &Screen, chosen: &[usize]) -> Result<(Vec<f64>, Vec<f64>)> {
 mod tests {
     use super::*;
 
+    /// Along the equator only r counts, along the axis r and z.
+    #[test]
+    fn exact_opacity_of_the_medium() {
+        let kappa = opacity(Absorption { coefficient: 0.3, radius: 4.0, height: 2.0 });
+        for (place, exponent) in [
+            ([0.0; 3], 0.0),
+            ([4.0, 0.0, 0.0], -0.5),
+            ([0.0, -4.0, 0.0], -0.5),
+            ([0.0, 0.0, 2.0], -0.625),
+        ] {
+            assert!((kappa(place) - 0.3 * f64::exp(exponent)).abs() < 1e-15, "{place:?}");
+        }
+    }
+
     /// The part of pixels in a ring about the middle is that of its area.
     #[test]
     fn exact_a_few_pixels_are_of_all_parts() {

@@ -111,3 +111,29 @@ pub(super) fn add_systematic(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::settings::LossKind;
+    use kerrlight_vlbi::Complex64;
+    use kerrlight_vlbi::observation::{Basis, Measured, Row};
+
+    /// 0.24 of 5 Jy and 0.5 Jy in quadrature are 1.3 Jy: of what is fitted.
+    #[test]
+    fn exact_systematic_errors() {
+        let products = [Complex64::new(3.0, 4.0); 4];
+        let i = Measured { visibility: products[0], noise_sigma: 0.5 };
+        let row = Row::total_intensity(4.0, [0, 1], [1e9, 0.0], i);
+        let sigmas = |kind| {
+            let mut observation = Observation::empty(Basis::Circular);
+            observation.rows = vec![Row { products, noise_sigma: [0.5; 4], ..row }];
+            add_systematic("systematic", 0.24, &mut observation, &[Loss::new(kind)]).unwrap();
+            observation.rows[0].noise_sigma
+        };
+        let of_i = sigmas(LossKind::Visibilities);
+        assert!((of_i[0] - 1.3).abs() < 1e-14 && of_i[1..] == [0.5; 3], "{of_i:?}");
+        let of_all = sigmas(LossKind::PolarizedVisibilities);
+        assert!(of_all.iter().all(|sigma| (sigma - 1.3).abs() < 1e-14), "{of_all:?}");
+    }
+}

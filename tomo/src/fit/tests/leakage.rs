@@ -1,6 +1,6 @@
 //! A polarised flare seen through leaking feeds.
 
-use super::{beside, changed, simulated, slope};
+use super::{Pulse, beside, changed, simulated, slope};
 use crate::fit::settings::FitFile;
 use crate::fit::setup::{self, Instrument};
 
@@ -24,6 +24,7 @@ fn file(set: &[&str]) -> FitFile {
 fn exact_gradients_with_respect_to_emission() {
     let file = file(&["simulation.observation.scans=3", "screen.pixels=12"]);
     let (instrument, measured) = simulated(&file);
+    assert_eq!(measured.pulse, Pulse::Triangle, "unlike that of measured data");
     let motion = setup::motion(&file, measured.times.clone()).unwrap();
     let model = instrument.forward::<f64>(&motion).unwrap();
     measured.restore_leakage(measured.true_leakage.as_ref().unwrap());
@@ -63,5 +64,6 @@ fn exact_refusals() {
         "loss=[{data=\"polarized-visibilities\",weight=1.0},{data=\"image\",weight=1.0,sigma=1.0}]";
     assert!(refused(&[both], false).contains("images are not allowed"));
     let drawn = ["representation={kind=\"grid\",grid.nodes=8,activation=\"linear\"}"];
-    assert!(!refused(&drawn, false).is_empty());
+    let message = refused(&drawn, false);
+    assert!(message.contains("representation.kind = \"linear-grid\""), "{message}");
 }
