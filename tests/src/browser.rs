@@ -1,5 +1,6 @@
 //! Chromium without a screen, told what to do over its debugging pipe: JSON messages that end in a zero byte.
 
+use crate::support::skipped;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -48,7 +49,7 @@ impl Browser {
     /// A browser of this size that shows `address`; none, said aloud, where there is no browser.
     pub fn open(address: &str, size: [u32; 2]) -> Option<Self> {
         let Some(program) = program() else {
-            eprintln!("SKIPPED, nothing was tested: no chromium in PATH (apt install chromium)");
+            skipped("there is no chromium in PATH (apt install chromium)");
             return None;
         };
         let profile = tempfile::tempdir().unwrap();

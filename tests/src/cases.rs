@@ -1,7 +1,7 @@
 //! Cases of a comparison as commands of their own, run by an engine: each once, none lost, the same bytes.
 
 use crate::support::{
-    binary, fail, json, kerrlight, kill, message, object, root, start, succeed, until,
+    binary, fail, json, kerrlight, kill, message, object, root, skipped, start, succeed, until,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -103,7 +103,7 @@ fn exact_xargs_and_gnu_parallel_run_each_case_once() {
     if version.is_ok_and(|output| output.stdout.starts_with(b"GNU parallel")) {
         runs_each_case_once(folder.path(), "parallel -j 4");
     } else {
-        eprintln!("GNU PARALLEL IS NOT TESTED: there is none; apt-get install parallel");
+        skipped("there is no GNU parallel (apt install parallel)");
     }
 }
 
@@ -122,7 +122,7 @@ fn exact_many_cases_are_listed_counted_and_collected() {
     for id in &ids[1..2000] {
         std::fs::create_dir(run(id)).unwrap();
         for name in ["results.json", "inputs.json", "report.html"] {
-            std::fs::copy(run(ids[0]).join(name), run(id).join(name)).unwrap();
+            std::fs::hard_link(run(ids[0]).join(name), run(id).join(name)).unwrap();
         }
     }
     std::fs::write(at.join("out/cases").join(format!("{}.failed", ids[2000])), "why").unwrap();
@@ -183,7 +183,7 @@ impl Slurm {
         let output = slurm.script("start.sh");
         let said = message(&output);
         if output.status.code() == Some(77) {
-            eprintln!("SLURM IS NOT TESTED: {said}");
+            skipped(format_args!("Slurm: {said}"));
             return None;
         }
         assert!(output.status.success(), "{said}");
@@ -255,8 +255,7 @@ fn exact_snakemake_runs_each_case_once() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     if shell(at, "snakemake --version").output().is_ok_and(|output| !output.status.success()) {
-        eprintln!("SNAKEMAKE IS NOT TESTED: there is none; pip install snakemake");
-        return;
+        return skipped("there is no Snakemake (pip install snakemake)");
     }
     experiment(at, 4, 2000);
     let snakefile = root().join("cluster/Snakefile");

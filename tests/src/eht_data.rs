@@ -2,7 +2,7 @@
 //! tables of the same data. They lie outside the repository: in `../shared/data/eht` beside it, or
 //! where KERRLIGHT_EHT_DATA says.
 
-use crate::support::root;
+use crate::support::{root, skipped};
 use kerrlight_vlbi::files::{self, EhtTable};
 use kerrlight_vlbi::observation::{Averaging, Measured, Observation};
 use kerrlight_vlbi::products::{ClosureCount, ClosureKind};
@@ -19,7 +19,7 @@ fn folder() -> PathBuf {
 pub fn data(name: &str) -> Option<PathBuf> {
     let path = folder().join(name);
     if !path.is_file() {
-        eprintln!("SKIPPED: there is no {}", path.display());
+        skipped(format_args!("there is no {}", path.display()));
     }
     path.is_file().then_some(path)
 }
@@ -28,7 +28,7 @@ pub fn data(name: &str) -> Option<PathBuf> {
 pub fn all(kinds: &[&str]) -> Vec<PathBuf> {
     let folder = folder();
     let Ok(entries) = std::fs::read_dir(&folder) else {
-        eprintln!("SKIPPED: no public EHT data in {}", folder.display());
+        skipped(format_args!("there are no public EHT data in {}", folder.display()));
         return Vec::new();
     };
     let is_one =

@@ -5,6 +5,8 @@ use kerrlight_render::picture::Rendered;
 use kerrlight_render::scene::{Scene, apply_override};
 use kerrlight_render::volume::VolumeArrays;
 use serde_json::Value;
+use std::fmt::Display;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::OnceLock;
@@ -176,6 +178,15 @@ pub fn start(folder: &Path, arguments: &[&str]) -> Child {
     let mut command = Command::new(binary());
     command.current_dir(folder).args(arguments).stdout(Stdio::null()).stderr(Stdio::piped());
     command.spawn().expect("the binary runs")
+}
+
+/// Says that something is not tested, past the harness, which keeps what passing tests print; with KERRLIGHT_TEST_ALL it
+/// fails.
+pub fn skipped(why: impl Display) {
+    // What cannot be said is no failure of what was to be tested.
+    let _ = writeln!(std::io::stderr(), "SKIPPED: {why}");
+    let all = std::env::var_os("KERRLIGHT_TEST_ALL").is_some_and(|value| !value.is_empty());
+    assert!(!all, "KERRLIGHT_TEST_ALL: {why}");
 }
 
 /// Waits until something is so.

@@ -2,7 +2,7 @@
 
 use crate::eht_data;
 use crate::fit::results;
-use crate::support::{scene_path, sets, succeed};
+use crate::support::{scene_path, sets, skipped, succeed};
 use serde_json::Value;
 use std::path::Path;
 
@@ -70,7 +70,7 @@ fn regress_measured_data_that_are_not_explained() {
         .into_iter()
         .find(|(path, _)| path.to_string_lossy().contains("097_hi_hops_netcal-LMTcal-besttime"))
     else {
-        return;
+        return skipped("there is no public table of Sgr A* with its text");
     };
     let folder = tempfile::tempdir().unwrap();
     let fit = scene_path("fits/sgra_visibilities.toml");

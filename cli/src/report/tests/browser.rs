@@ -6,6 +6,8 @@ use crate::report::{Report, View3d};
 use kerrlight_render::dynamics::{self, AngularVelocity, Turned, pull_back};
 use kerrlight_render::points::{Coordinates, CoordinatesMut};
 use kerrlight_render::volume::{Shown, Volume, vti};
+use std::fmt::Display;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -15,7 +17,20 @@ fn browser() -> Option<PathBuf> {
     let names = ["chromium", "chromium-browser", "google-chrome"];
     let folders = std::env::var_os("PATH")?;
     let all = std::env::split_paths(&folders).flat_map(|f| names.map(|name| f.join(name)));
-    all.into_iter().find(|path| path.is_file())
+    let found = all.into_iter().find(|path| path.is_file());
+    if found.is_none() {
+        skipped("there is no chromium in PATH (apt install chromium)");
+    }
+    found
+}
+
+/// Says that something is not tested, past the harness, which keeps what passing tests print; with KERRLIGHT_TEST_ALL it
+/// fails.
+fn skipped(why: impl Display) {
+    // What cannot be said is no failure of what was to be tested.
+    let _ = writeln!(std::io::stderr(), "SKIPPED: {why}");
+    let all = std::env::var_os("KERRLIGHT_TEST_ALL").is_some_and(|value| !value.is_empty());
+    assert!(!all, "KERRLIGHT_TEST_ALL: {why}");
 }
 
 /// Runs the browser on the page of a folder and gives back what it printed.
@@ -83,10 +98,7 @@ fn code_page_runs_in_a_browser() {
     if let Some(place) = std::env::var_os("KERRLIGHT_REPORT") {
         write(&report, Path::new(&place));
     }
-    let Some(browser) = browser() else {
-        eprintln!("no chromium in PATH: the page was made, but no browser has looked at it");
-        return;
-    };
+    let Some(browser) = browser() else { return };
     let found = dump(&browser, folder.path(), "time=0.5&azimuth=70&volume=truth");
     assert!(["ready: webgl2", "ready: fallback"].contains(&status(&found)), "{}", status(&found));
     assert!(found.contains("<output id=\"time-text\">0.5 orbits at 3.5 M</output>"));
@@ -117,10 +129,7 @@ fn carried(volume: &Volume, time: f64) -> Volume {
 /// Matter that the viewer turns to a time looks as what the fit's own dynamics carry there.
 #[test]
 fn code_viewer_moves_matter_as_the_fit_does() {
-    let Some(browser) = browser() else {
-        eprintln!("no chromium in PATH: nobody has looked how the viewer moves matter");
-        return;
-    };
+    let Some(browser) = browser() else { return };
     let folder = tempfile::tempdir().unwrap();
     let recovered = spots(64, 0.5, 1.0);
     let truth = Some(carried(&recovered, 0.4));
