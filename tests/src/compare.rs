@@ -65,7 +65,10 @@ fn check_comparison(at: &Path, first: &Value) {
     assert_eq!(cases(first).len(), 4);
     for case in cases(first) {
         assert_eq!(case["status"], "done");
-        assert!(case["results"]["psnr_db"].as_f64().unwrap() > 20.0);
+        // Of an empty volume the error is 1, and it correlates with nothing; its PSNR is high. So few steps find little.
+        let [error, correlation] =
+            ["nrmse", "correlation"].map(|key| case["results"][key].as_f64().unwrap());
+        assert!(error < 1.0 && correlation > 0.05, "{error} {correlation}");
         assert!(case["results"]["peak_memory_mib"].as_f64().unwrap() > 1.0);
         assert_eq!(case["settings"]["training"]["steps"], 30);
         assert!(at.join("out").join(case["folder"].as_str().unwrap()).join("report.html").exists());

@@ -83,7 +83,7 @@ fn exact_a_search_without_phases_claims_no_more_than_it_has_found() {
             geometry["open"][name] == true || (found - truth).abs() < 3.0 * sigma,
             "{geometry}"
         );
-        assert!((found - truth).abs() < 25.0, "{geometry}");
+        assert!((found - truth).abs() < 15.0, "{geometry}");
     }
 }
 

@@ -259,7 +259,9 @@ fn samples_by_estimate(ray: RaySamples<'_>, path: &Path) -> f64 {
         let theta = (ray.theta[j] - expected.theta()).abs();
         radius.max(theta).max((ray.azimuth[j] - expected.azimuth).abs())
     };
-    (1..ray.radius.len() - 1).map(miss).fold(0.0, f64::max) / ray.error
+    // No number is no small miss.
+    let larger = |most: f64, miss: f64| if miss.is_nan() { f64::INFINITY } else { most.max(miss) };
+    (1..ray.radius.len() - 1).map(miss).fold(0.0, larger) / ray.error
 }
 
 /// Estimates bound 99 of 100 misses, near the critical curve too, and are no more than a hundred

@@ -40,7 +40,9 @@ fn device() -> Option<Arc<GpuTracer>> {
 fn judge(class: &Class, errors: Errors, allowed: [f64; 2]) {
     let (name, Errors { rays, flagged, wrong, of }) = (class.name, errors);
     println!("{name}: {rays} rays, {flagged} flagged, {wrong} wrong");
+    assert!(rays > 0 && !of.is_empty(), "{name}: nothing was compared");
     for (what, mut errors) in of {
+        assert!(errors.iter().all(|x| x.is_finite()), "{name}: {what}");
         let [half, most, all] = [0.5, 0.99, 1.0].map(|share| quantile(&mut errors, share));
         println!("    {what:8} {half:8.1e} {most:8.1e} {all:8.1e}");
         assert!(half <= allowed[0] && most <= allowed[1], "{name}: {what}");

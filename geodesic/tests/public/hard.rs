@@ -84,10 +84,13 @@ fn exact_derivatives_are_numbers_everywhere() {
 #[test]
 fn exact_footprints_are_numbers_everywhere() {
     let (alpha, beta) = screen();
+    let (mut rays, mut arrived) = (0, 0);
     for (spin, degrees) in SPINS.iter().flat_map(|a| DEGREES.iter().map(move |i| (*a, *i))) {
         let hole = Kerr::new(spin).unwrap();
         for observer in observers(degrees) {
             let beams = footprint::of_screen(&hole, &observer, &alpha, &beta, 1e-10, 2).unwrap();
+            rays += beams.sky.len();
+            arrived += beams.sky.iter().flatten().count();
             for (ray, sky) in beams.sky.iter().enumerate() {
                 let place = format!("a {spin} i {degrees} ({}, {})", alpha[ray], beta[ray]);
                 if let Some(sky) = sky {
@@ -103,6 +106,8 @@ fn exact_footprints_are_numbers_everywhere() {
             }
         }
     }
+    // Seven in ten escape.
+    assert!(2 * arrived > rays, "{arrived} of {rays}");
 }
 
 /// Samples of one ray with their errors; everything that has an outcome is a number.
@@ -160,13 +165,16 @@ fn exact_crossings_are_those_before_the_end() {
     let (hole, inclination) = (Kerr::new(1.0).unwrap(), 1.8968141346913256);
     let observer = Observer::at_infinity(Inclination::from_radians(inclination).unwrap());
     let (alpha, beta) = (-2.111207338568873, -0.977817764618162);
+    let mut resolved = 0;
     for integrator in METHODS {
         let rays = sampled(integrator, (&hole, &observer), [alpha, beta]);
         if !rays.outcome[0].is_unresolved() {
+            resolved += 1;
             assert_eq!((rays.outcome[0], rays.crossing_count[0]), (Outcome::Escaped, 32));
             assert!((rays.mino_total[0] / 47.3264759353452 - 1.0).abs() < 1e-6);
         }
     }
+    assert!(resolved > 1, "{resolved} of 3");
 }
 
 /// λ ≈ 2a around extremal holes: every number is one, and fate and radii are those of 28 digits.
@@ -174,6 +182,7 @@ fn exact_crossings_are_those_before_the_end() {
 fn exact_rays_on_the_straight_part_of_an_extremal_critical_curve_are_numbers() {
     let betas = [-0.5528916854514749, 0.8994698741176206, 1.3246097831865098, 1.7547873481341332];
     let distances = [0.0, -4e-16, 5e-16, -3e-14, 1.6e-14, 3.3775e-13, 9e-13];
+    let (mut resolved, mut returned) = (0, 0);
     for (beta, distance) in betas.iter().flat_map(|b| distances.iter().map(move |d| (*b, *d))) {
         let spin = if beta > 1.0 { -1.0 } else { 1.0 };
         let hole = Kerr::new(spin).unwrap();
@@ -188,6 +197,7 @@ fn exact_rays_on_the_straight_part_of_an_extremal_critical_curve_are_numbers() {
             let rays = sampled(integrator, (&hole, &at_infinity(90.0)), [alpha, beta]);
             let context = format!("{integrator:?} ({alpha}, {beta})");
             if !rays.outcome[0].is_unresolved() {
+                resolved += 1;
                 assert_eq!(rays.outcome[0], truth.outcome(), "{context}");
                 for k in rays.samples.of(0) {
                     let at = truth.at(Double::from(rays.samples.mino_time[k]));
@@ -197,15 +207,18 @@ fn exact_rays_on_the_straight_part_of_an_extremal_critical_curve_are_numbers() {
             }
             let rays = sampled(integrator, (&hole, &at_radius(90.0, 200.0)), [alpha, beta]);
             if rays.outcome[0] == Outcome::Escaped {
+                returned += 1;
                 returns(&rays, 200.0, &context);
             }
         }
     }
+    assert!(resolved > 60 && returned > 30, "{resolved} resolved, {returned} returned, of 84");
 }
 
 /// The way out to a far observer takes less Mino time than that of a near-critical turning point is known to.
 #[test]
 fn exact_near_critical_rays_return_to_far_observers() {
+    let mut returned = 0;
     for (spin, degrees) in [(0.0, 17.0), (0.5, 1.0), (-0.7, 60.0), (0.998, 90.0)] {
         let hole = Kerr::new(spin).unwrap();
         let screen = at_infinity(degrees);
@@ -223,12 +236,14 @@ fn exact_near_critical_rays_return_to_far_observers() {
                     let rays = sampled(integrator, (&hole, &far), [outside * x, outside * y]);
                     let context = format!("{integrator:?} a = {spin}, {radius}, {k}");
                     if rays.outcome[0] == Outcome::Escaped {
+                        returned += 1;
                         returns(&rays, radius, &context);
                     }
                 }
             }
         }
     }
+    assert!(returned > 120, "{returned} of 240");
     let error = Observer::at_radius(inclination(60.0), 1e300).unwrap_err().to_string();
     assert_eq!(error, "observer radius = 1e300 is not allowed: above 2 and at most 1e30 (M)");
 }

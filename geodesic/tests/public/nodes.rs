@@ -27,7 +27,7 @@ fn misses(spin: f64, degrees: f64, radius: f64) -> [f64; 5] {
     let mut nodes = Nodes::default();
     nodes.trace(&hole, &observer, &alpha, &beta, None, &request(20.0)).unwrap();
     let tracer = Tracer::new(1e-13).unwrap();
-    let (mut path, mut worst) = (Path::new(), [0.0f64; 5]);
+    let (mut path, mut worst, mut compared) = (Path::new(), [0.0f64; 5], 0);
     for k in 0..alpha.len() {
         let ray = observer.ray(&hole, alpha[k], beta[k]).unwrap();
         tracer.trace(&hole, &ray, Quantities::ALL, &mut path);
@@ -35,6 +35,7 @@ fn misses(spin: f64, degrees: f64, radius: f64) -> [f64; 5] {
         if found.error > 1e-10 {
             continue;
         }
+        compared += usize::from(!found.radius.is_empty());
         assert!(found.radius.iter().all(|r| *r < 20.0 * (1.0 + 1e-12)));
         for (j, time) in found.mino_time.iter().enumerate() {
             let point = path.at(*time);
@@ -46,9 +47,11 @@ fn misses(spin: f64, degrees: f64, radius: f64) -> [f64; 5] {
                 (found.radial_velocity[j] - point.inverse_radius_rate).abs()
                     + (found.polar_velocity[j] - point.velocity[2]).abs(),
             ];
+            assert!(each.iter().all(|x| x.is_finite()), "{each:?}");
             worst.iter_mut().zip(each).for_each(|(worst, x)| *worst = worst.max(x));
         }
     }
+    assert!(compared > alpha.len() / 2, "{compared} of {} rays", alpha.len());
     worst
 }
 
@@ -95,6 +98,7 @@ fn exact_nodes_end_where_they_are_told_to() {
     let (alpha, beta) = screen();
     let (mut all, mut cut) = (Nodes::default(), Nodes::default());
     all.trace(&hole, &observer, &alpha, &beta, None, &request(20.0)).unwrap();
+    let mut compared = 0;
     for share in [0.1, 0.45, 0.5, 0.8, 1.0] {
         let end = |k| all.ray(k).mino_time.last().copied().unwrap_or(0.0) * share;
         let ends: Vec<f64> = (0..alpha.len()).map(end).collect();
@@ -110,6 +114,7 @@ fn exact_nodes_end_where_they_are_told_to() {
             if ray.radius.is_empty() {
                 continue;
             }
+            compared += 1;
             let start = whole.mino_time[0] - ray.mino_time[0];
             assert!(start.is_finite() && sum(&ray) <= end * (1.0 + 1e-12));
             if share == 1.0 {
@@ -118,13 +123,15 @@ fn exact_nodes_end_where_they_are_told_to() {
             }
         }
     }
+    assert!(compared > 5 * alpha.len() / 2, "{compared} of {} rays", 5 * alpha.len());
 }
 
 #[test]
 fn code_ends_of_rays_are_those_of_the_tracer() {
     let tracer = Tracer::new(1e-13).unwrap();
     let (alpha, beta) = screen();
-    let (mut path, mut found, mut captured) = (Path::new(), Crossings::default(), 0);
+    let (mut path, mut found) = (Path::new(), Crossings::default());
+    let (mut compared, mut captured) = (0, 0);
     for (spin, degrees, radius) in
         [(0.0, 0.0, f64::INFINITY), (0.9, 60.0, 1000.0), (-0.5, 90.0, 30.0), (1.0, 17.0, 1e6)]
     {
@@ -138,6 +145,7 @@ fn code_ends_of_rays_are_those_of_the_tracer() {
             if ends.error > 1e-9 {
                 continue;
             }
+            compared += 1;
             assert_eq!(ends.escapes, path.outcome() == Outcome::Escaped);
             captured += u32::from(!ends.escapes);
             let total = match path.turning_point() {
@@ -149,5 +157,5 @@ fn code_ends_of_rays_are_those_of_the_tracer() {
             assert_eq!(ends.crossings as usize, crossings, "{} {}", alpha[k], beta[k]);
         }
     }
-    assert!(captured > 100);
+    assert!(captured > 100 && compared > 2 * alpha.len(), "{captured} of {compared}");
 }

@@ -112,6 +112,7 @@ fn code_twenty_steps_are_those_of_the_processor() {
         let pairs = losses.iter().zip(&found).map(|(a, b)| (b / a - 1.0).abs());
         let by_step: Vec<String> = pairs.clone().map(|apart| format!("{apart:.0e}")).collect();
         println!("losses of each step differ by {}", by_step.join(" "));
+        assert!(pairs.clone().all(f64::is_finite) && found.len() == losses.len(), "{found:?}");
         let most = pairs.fold(0.0, f64::max);
         let moved = apart(&state.now.parameters, &ours.now.parameters);
         let batch = fit.training.batch;
