@@ -31,7 +31,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn paper_sagittarius_a() {
+    fn exact_sagittarius_a() {
         // GM/c³ of 4.154e6 and 4e6 solar masses; the shadow's diameter 2√27 GM/(c²D).
         assert!((gravitational_time(4.154e6) - 20.460).abs() < 1e-3);
         assert!((gravitational_time(4.0e6) - 19.702).abs() < 1e-3);

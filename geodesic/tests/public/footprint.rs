@@ -97,7 +97,7 @@ fn deflection(w0: f64) -> (f64, f64) {
 /// Without spin a patch of screen is stretched by |dα̂/db| along the plane of the ray, and by
 /// |sin α̂|/b across it.
 #[test]
-fn paper_footprint_of_the_schwarzschild_deflection() {
+fn exact_footprint_of_the_schwarzschild_deflection() {
     let hole = Kerr::new(0.0).unwrap();
     for (degrees, tilt) in [(60.0, 0.3), (0.0, 2.0), (90.0, -1.2)] {
         let observer = at_infinity(degrees);

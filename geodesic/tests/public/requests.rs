@@ -203,7 +203,7 @@ fn exact_null_momenta() {
 /// The photon flies towards the observer: between the turning point and the observer r grows along
 /// its flight, p_r > 0; before it p_r < 0. At the observer p_θ = β, sign included (Bardeen 1973).
 #[test]
-fn paper_signs_of_momenta() {
+fn exact_signs_of_momenta() {
     for (beta, degrees) in [(3.0, 60.0), (-3.0, 60.0), (3.0, 90.0), (-3.0, 120.0)] {
         let request = everything(Placement::MinoTime(6));
         let table = trace(0.9, &at_radius(degrees, 100.0), [7.0, beta], &request);

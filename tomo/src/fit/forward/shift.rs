@@ -186,7 +186,7 @@ mod tests {
 
     /// Extremes at a = 0, r = 6: √2/3 and √2.
     #[test]
-    fn paper_redshift_extremes_of_an_orbit_seen_edge_on() {
+    fn exact_redshift_extremes_of_an_orbit_seen_edge_on() {
         let velocity = AngularVelocity::Keplerian { drag: 0.0 };
         // Photons that leave along ±φ have k_φ = ±r/√(1 − 2/r).
         let momentum = 6.0 / (1.0f64 - 2.0 / 6.0).sqrt();

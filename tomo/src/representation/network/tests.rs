@@ -71,7 +71,7 @@ fn exact_other_sizes_conform() {
 }
 
 #[test]
-fn paper_sizes() {
+fn exact_sizes() {
     let of = |settings| Network::new(settings).unwrap();
     let parameters = |network: &Network| Representation::<f32>::parameters(network);
     assert_eq!(parameters(&of(NetworkSettings::bhnerf())), 55_169);

@@ -360,7 +360,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn paper_aips_memo_117_baselines() {
+    fn exact_aips_memo_117_baselines() {
         assert_eq!(decode_baseline(260.0), (1, [1, 4]));
         assert_eq!(decode_baseline(f64::from(258.01f32)), (2, [1, 2]));
         assert_eq!(decode_baseline(65536.0 + 2048.0 * 300.0 + 301.0), (1, [300, 301]));

@@ -284,7 +284,7 @@ fn exact_channels_are_rows_of_their_own() {
 
 /// Two IFs of two channels, frequencies by the FQ table: memo 117's axes, sidebands of both kinds.
 #[test]
-fn paper_aips_memo_117_frequencies() {
+fn exact_aips_memo_117_frequencies() {
     let mut bytes = foreign();
     let columns = [
         ("FRQSEL", "", ColumnData::Integers(1, vec![1])),
