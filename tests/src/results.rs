@@ -55,6 +55,7 @@ fn exact_critical_curve_as_json() {
     let numbers = |name: &str| -> Vec<f64> {
         found["points"][name].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
     };
+    assert_eq!([numbers("alpha").len(), numbers("beta").len()], [5, 5]);
     for (alpha, beta) in numbers("alpha").iter().zip(numbers("beta")) {
         assert!((alpha.hypot(beta) - 27f64.sqrt()).abs() < 1e-13, "{alpha} {beta}");
     }
