@@ -8,17 +8,21 @@ use crate::earth::SourcePosition;
 use crate::noise::{GainErrors, add_thermal_noise, apply_gains, apply_leakage};
 use crate::schedule::tests::{SCHEDULE, SETUP};
 use crate::schedule::{Schedule, Setup, observe};
+use core::f64::consts::PI;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// A scan of the EHT with random visibilities of 1 Jy, their I, Q and U, and the leakage that was put on them.
+/// A scan of the EHT with random visibilities of about 1 Jy and any phase, their I, Q and U, and the leakage that was put on them.
 pub fn scan(leakage: f64, gains: bool) -> (Observation, Vec<Complex64>, SharedLeakage) {
     let schedule = Schedule { start_h: 12.0, stop_h: 13.0, scans: 1, ..SCHEDULE };
     let setup = Setup { frequency_hz: 230e9, bandwidth_hz: 2e9, ..SETUP };
     let array = built_in("EHT2017").unwrap();
     let mut data = observe(&array, SourcePosition::SGR_A, &schedule, &setup).unwrap();
     let mut random = Pcg64Mcg::seed_from_u64(8);
-    let mut draw = |size: f64| Complex64::new(1.0, 0.0) * size * random.random_range(0.5..1.5);
+    let mut draw = |size: f64| {
+        let part: f64 = random.random_range(0.5..1.5);
+        Complex64::from_polar(size * part, random.random_range(-PI..PI))
+    };
     let rows = data.rows.len();
     assert!(rows >= 10);
     let truth: Vec<Complex64> =
