@@ -64,7 +64,8 @@ impl Shot {
         let raster = Raster::new(&self.scene, files.decoded);
         let raster = raster.with_context(|| self.source.name.clone())?;
         let rendered = raster.render(progress)?;
-        Ok(self.shown(rendered, raster.camera(), &raster, &files.identity))
+        let own = (self.scene.clone(), self.text.clone());
+        Ok(shown_at(&own, rendered, raster.camera(), &raster, &files.identity))
     }
 
     /// Pictures at `times` (of observation, M) that share the first one's unit of intensity.
@@ -73,9 +74,8 @@ impl Shot {
     /// As for [`Self::render`].
     pub fn film(&self, times: &[f64], progress: &Progress<'_>) -> anyhow::Result<Vec<Shown>> {
         self.afford(times.len())?;
-        for time in times {
-            at_time(&self.source.name, &self.text, *time)?;
-        }
+        let of = |time: &f64| at_time(&self.source.name, &self.text, *time);
+        let mut scenes = times.iter().map(of).collect::<anyhow::Result<Vec<_>>>()?.into_iter();
         let files = assets::load(&self.scene, &self.source.folder, &[], Reach::default())?;
         let film = Raster::new(&self.scene, files.decoded);
         let mut film = film.with_context(|| self.source.name.clone())?;
@@ -88,7 +88,8 @@ impl Shot {
             for frame in frames {
                 let camera = film.camera_of(&frame)?;
                 let rendered = film.rendered(frame, factor.unwrap_or(1.0))?;
-                shown.push(self.shown(rendered, camera, &film, &files.identity));
+                let scene = scenes.next().context("a frame has no time")?;
+                shown.push(shown_at(&scene, rendered, camera, &film, &files.identity));
             }
         }
         Ok(shown)
@@ -101,18 +102,18 @@ impl Shot {
         let what = || format!("{frames} picture(s) of {width} x {rows} pixels");
         Ok(memory::afford(what, memory::table(pixels, 40.0))?)
     }
+}
 
-    fn shown(
-        &self,
-        rendered: Rendered,
-        camera: CameraMatrices,
-        raster: &Raster,
-        files: &str,
-    ) -> Shown {
-        let attributes =
-            report::attributes(&self.scene, &self.text, files, raster, &rendered.summary);
-        Shown { rendered, attributes, camera, look: PreviewOptions::default().look(&self.scene) }
-    }
+/// A picture with the scene and the text that it can be rendered of again.
+fn shown_at(
+    (scene, text): &(Scene, String),
+    rendered: Rendered,
+    camera: CameraMatrices,
+    raster: &Raster,
+    files: &str,
+) -> Shown {
+    let attributes = report::attributes(scene, text, files, raster, &rendered.summary);
+    Shown { rendered, attributes, camera, look: PreviewOptions::default().look(scene) }
 }
 
 impl Shown {

@@ -94,7 +94,12 @@ fn common_white(sequence: &Sequence, look: Look) -> anyhow::Result<f32> {
     let mut white = 0.0f32;
     for k in 0..sequence.len() {
         let picture = sequence.read(k)?;
-        let lit = picture.channels.iter().any(|c| c.values.iter().any(|v| *v > 0.0));
+        let shown: &[&str] = match look {
+            Look::Intensity(..) => &["intensity"],
+            Look::Color => &["R", "G", "B"],
+        };
+        let seen = picture.channels.iter().filter(|c| shown.contains(&c.name.as_str()));
+        let lit = seen.flat_map(|c| &c.values).any(|v| *v > 0.0);
         // A dark frame has no exposure of its own.
         if lit {
             white = white.max(preview::white(&picture, look).context("cannot draw the frames")?);

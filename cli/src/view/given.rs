@@ -51,6 +51,8 @@ pub fn of(subject: &Subject, volumes: &Volumes) -> anyhow::Result<Value> {
 /// Names of what is left out, as scene files have them.
 fn left_out(subject: &Subject, falls: bool) -> Vec<String> {
     let Scene { mesh, volume, spot, effects, .. } = &subject.scene;
+    let moves = subject.scene.camera.as_ref().map(|camera| camera.motion);
+    let on_path = moves == Some(CameraMotion::Path);
     let parts = [
         (!mesh.is_empty(), "[[mesh]]".to_owned()),
         (falls, "[[volume]] number 0, whose matter falls".to_owned()),
@@ -58,6 +60,7 @@ fn left_out(subject: &Subject, falls: bool) -> Vec<String> {
         (spot.len() > SPOTS, format!("[[spot]] but the first {SPOTS} of {}", spot.len())),
         (effects.half_orbits.is_some(), "effects.half_orbits: all images are there".to_owned()),
         (effects.polarization, "effects.polarization: light is that without it".to_owned()),
+        (on_path, "camera.motion = \"path\": the camera is at rest where it is".to_owned()),
     ];
     parts.into_iter().filter_map(|(is, name)| is.then_some(name)).collect()
 }

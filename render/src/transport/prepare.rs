@@ -175,11 +175,12 @@ impl PreparedScene {
         }
     }
 
-    /// Returns whether a disc or gas reaches farther out than a screen at a finite radius.
+    /// Returns whether a disc, gas or spots reach farther out than a screen at a finite radius.
     fn shines_beyond_observer(&self) -> bool {
         let disc = self.disc.as_ref().map(|disc| disc.edges()[1]);
         let media = self.media.nodes(&self.optics).into_iter().map(|nodes| nodes.request.radius);
-        let reach = media.chain(disc).fold(0.0, f64::max);
+        let spots = (!self.spots.is_empty()).then(|| self.spots.probes(&self.optics).radius);
+        let reach = media.chain(disc).chain(spots).fold(0.0, f64::max);
         self.optics.view.observer().is_some_and(|observer| reach * observer.inverse_radius() > 1.0)
     }
 

@@ -240,7 +240,9 @@ fn look(pixel: vec2<f32>) -> Seen {
         return straight(at);
     }
     var seen = curved(at);
-    seen.light *= boost(blueshift(at), 3.0);
+    let shift = boost(blueshift(at), 3.0);
+    seen.light *= shift;
+    seen.sky *= shift;
     return seen;
 }
 
