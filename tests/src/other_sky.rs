@@ -196,7 +196,7 @@ fn code_drawn_geometries_look_alike_through_both_forward_models() {
     simulation.observation.as_mut().expect("an observation").scans = 4;
     simulation.drawn = true;
     file.motion.velocity = Velocity::Keplerian { drag: None };
-    (file.motion.reference_time, file.screen.pixels) = (20.0, 36);
+    (file.motion.reference_time, file.screen.pixels) = (20.0, 48);
     file.screen.ring_rays = Some(16);
     file.hole.spin = PriorSettings::Uniform([0.5, 0.9]).into();
     file.observer.inclination_deg = PriorSettings::Uniform([40.0, 60.0]).into();
@@ -224,7 +224,7 @@ fn code_drawn_geometries_look_alike_through_both_forward_models() {
         let mean = |of: fn(usize) -> usize| {
             image.iter().enumerate().map(|(k, x)| of(k) as f64 * x).sum::<f64>() / flux
         };
-        (flux, [mean(|k| k / 36), mean(|k| k % 36)])
+        (flux, [mean(|k| k / 48), mean(|k| k % 48)])
     };
     for frame in 0..4 {
         let [(own, at), (by, there)] =

@@ -113,7 +113,8 @@ fn exact_what_is_not_known_is_asked_for() {
     };
     assert!(fail(|o| o.position = None).contains("right ascension"));
     assert!(fail(|o| o.mjd = None).contains("MJD"));
-    assert!(fail(|o| o.stations[1].position = None).contains("positions"));
+    let unknown = |o: &mut Observation| o.stations.iter_mut().for_each(|s| s.position = None);
+    assert!(fail(unknown).contains("positions"));
     assert!(fail(|o| o.rows.clear()).contains("no visibilities"));
 }
 
