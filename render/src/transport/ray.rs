@@ -130,7 +130,11 @@ impl PreparedScene {
         for (x, y) in alpha.iter().zip(beta) {
             let form = ClosedForm::new(hole, &view.ray(hole, *x, *y)?);
             let mut crossings = form.crossings().map(|crossing| crossing.mino_time);
-            let times = [(); 3].map(|()| crossings.next().unwrap_or(f64::INFINITY));
+            let times = match view.observer() {
+                Some(_) => [(); 3].map(|()| crossings.next().unwrap_or(f64::INFINITY)),
+                // A camera's ray may start outwards, where the closed form ends at another radius.
+                None => [1, 2, 3].map(|k| form.crossing_time(k)),
+            };
             cuts.push([0, 1].map(|k| 0.5 * (times[k] + times[k + 1])));
         }
         Ok(())
@@ -255,9 +259,22 @@ impl<'a> Sum<'a> {
         Accumulator { record, ..Accumulator::default() }
     }
 
+    /// Returns the Mino times that keep images of ray number `k` apart, infinite behind the last crossing.
+    fn cuts(&self, k: usize, ray: &TracedRay) -> Option<[f64; 2]> {
+        let cuts = self.sources.cuts.get(k)?;
+        if self.scene.optics.view.observer().is_some() {
+            return Some(*cuts);
+        }
+        let of = |order: usize| match (ray.crossing_count as usize) < order + 2 {
+            true => f64::INFINITY,
+            false => cuts[order],
+        };
+        Some([of(0), of(1)])
+    }
+
     /// Returns the record of ray number `k`: as long as nothing shines, the surface that ends it.
     fn record(&self, k: usize, ray: &TracedRay, crossings: &[PlaneCrossing]) -> Box<Record> {
-        let cuts = self.sources.cuts.get(k).copied().unwrap_or([f64::INFINITY; 2]);
+        let cuts = self.cuts(k, ray).unwrap_or([f64::INFINITY; 2]);
         Box::new(Record { cuts, origin: self.end(ray, crossings), ..Record::default() })
     }
 
@@ -290,7 +307,7 @@ impl<'a> Sum<'a> {
     {
         let ((x, y), scene) = (self.place(k), self.scene);
         let polarized = scene.optics.polarized(x, y, ray.lambda);
-        let cuts = self.sources.cuts.get(k).copied();
+        let cuts = self.cuts(k, ray);
         MediaRay { number: k, ray, crossings, polarized, times: self.block.times, cuts }
     }
 

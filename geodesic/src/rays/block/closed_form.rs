@@ -156,7 +156,11 @@ impl BlockTracer {
             add_rates(ray, ends, plane);
         }
         let path = if request.paths { visitor.needs_path(ray) } else { PathUse::None };
-        Inspected { eta: ray.eta, until: self.until(ray, request.half_orbits), path }
+        Inspected {
+            eta: ray.eta,
+            until: self.until(ray, request.half_orbits, ends.crossings as usize),
+            path,
+        }
     }
 
     /// Finds the rays whose path is needed beside the closed form, or instead of it.

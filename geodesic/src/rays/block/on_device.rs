@@ -71,7 +71,7 @@ impl BlockTracer {
         let (mut until, mut path) = (f64::INFINITY, PathUse::None);
         if paths || half_orbits.is_some() {
             let ray = self.view.ray(&self.hole, job.alpha[k], job.beta[k])?;
-            until = self.until(&ray, half_orbits);
+            until = self.until(&ray, half_orbits, end.crossings as usize);
             path = if paths { visitor.needs_path(&ray) } else { path };
             followed.extend((path != PathUse::None).then_some(k));
         }

@@ -114,7 +114,8 @@ impl BlockTracer {
             }));
         }
         let exit = request.exit.then(|| path.at(path.mino_total()).direction);
-        let until = self.until(ray, request.half_orbits);
+        let crossing_count = path.equatorial_crossings().len();
+        let until = self.until(ray, request.half_orbits, crossing_count);
         let (whole, _) = MinoPath::seen_by(&self.view, path, ray);
         let off_plane = visitor.first_surface(PathOfRay { ray, path, tolerance });
         let off_plane = off_plane.filter(|time| *time <= until);
@@ -123,7 +124,7 @@ impl BlockTracer {
             lambda: ray.lambda,
             eta: ray.eta,
             outcome: path.outcome(),
-            crossing_count: path.equatorial_crossings().len() as u32,
+            crossing_count: crossing_count as u32,
             crossings: first..plane.len(),
             mino_total: whole.total(),
             until,

@@ -171,10 +171,16 @@ impl BlockTracer {
         self.view.observer().filter(within).filter(|_| self.closed_form)
     }
 
-    /// The Mino time half-way between the last crossing that counts and the next.
-    pub(super) fn until(&self, ray: &Ray, half_orbits: Option<u32>) -> f64 {
+    /// The Mino time half-way between the last crossing that counts and the next, of a ray with so many `crossings`.
+    pub(super) fn until(&self, ray: &Ray, half_orbits: Option<u32>, crossings: usize) -> f64 {
         let Some(n) = half_orbits else { return f64::INFINITY };
         let form = ClosedForm::new(&self.hole, ray);
+        if self.view.observer().is_none() {
+            // A camera's ray may start outwards, where the closed form ends at another radius: times of crossings hold anyway.
+            let has_next = crossings > n as usize + 1;
+            let middle = 0.5 * (form.crossing_time(n + 1) + form.crossing_time(n + 2));
+            return if has_next { middle } else { f64::INFINITY };
+        }
         let mut times = form.crossings().skip(n as usize).map(|crossing| crossing.mino_time);
         match (times.next(), times.next()) {
             (Some(last), Some(next)) => 0.5 * (last + next),
