@@ -178,7 +178,7 @@ impl SpotModel {
     }
 
     /// Returns the time since when it is sheared.
-    pub(super) fn sheared_since(&self) -> Option<f64> {
+    pub(crate) fn sheared_since(&self) -> Option<f64> {
         self.sheared_since
     }
 

@@ -83,7 +83,7 @@ impl<'a> SpotLight<'a> {
         let horizon = self.seen.optics.hole.horizon();
         self.seen.along.path.intervals_within(lo.max(horizon), hi, intervals);
         for &[from, to] in intervals.iter() {
-            let to = to.min(self.seen.end);
+            let to = self.lit_until(from, to.min(self.seen.end));
             if from < to {
                 self.add_interval(from, to, light);
             }
@@ -93,6 +93,29 @@ impl<'a> SpotLight<'a> {
             let origin = Origin { source, mino_time: point.mino_time };
             light.mark(light.intensity - before, Place::of_point(&point), origin);
         }
+    }
+
+    /// The end of a part of the path on which the spot shines already: light that left before it was sheared is none. Sums over
+    /// pieces that hold that moment would be off by its share of them.
+    fn lit_until(&self, from: f64, to: f64) -> f64 {
+        let Some(since) = self.spot.sheared_since() else { return to };
+        let path = self.seen.along.path;
+        let is_dark = |mino_time: f64| {
+            self.seen.optics.emission_time(self.observed, &path.at(mino_time)) < since
+        };
+        if from >= to || !is_dark(to) {
+            return to;
+        }
+        // The backward ray meets ever earlier times.
+        let (mut lit, mut dark) = (from, to);
+        while dark - lit > 1e-12 * to {
+            let middle = 0.5 * (lit + dark);
+            if middle <= lit || middle >= dark {
+                break;
+            }
+            if is_dark(middle) { dark = middle } else { lit = middle }
+        }
+        lit
     }
 
     fn can_shine(&self, from: f64, to: f64) -> bool {
