@@ -147,6 +147,34 @@ fn exact_layers_add_up() {
     }
 }
 
+/// Cameras inside the photon shell look outwards as well: every crossing of a plunging disc that nothing dims is an image.
+#[test]
+fn exact_images_of_a_camera_that_looks_outwards() {
+    for (spin, radius) in [(0.0, 2.6), (0.9, 3.3)] {
+        let text = format!(
+            "hole = {{ spin = {spin} }}
+            observer = {{ time = 0.0 }}
+            camera = {{ motion = \"zamo\", radius = {radius}, theta_deg = 70.0, phi_deg = 0.0, yaw_deg = 180.0, field_of_view_deg = 150.0 }}
+            screen = {{ width = 24, height = 24, rings = \"regular-grid\", channels = [\"default\", \"n0\", \"n1\"] }}
+            tracer = {{ integrator = \"elliptic\", tolerance = 1e-8 }}
+            disc = {{ outer_edge = 1000.0, peak_intensity = 1.0, opaque = false, plunging = {{ intensity = 1.0, exponent = 0.0 }} }}"
+        );
+        let seen = picture(&scene(&text, &[]), None);
+        let [first, second] = ["n0", "n1"].map(|layer| color(&seen, layer)[1]);
+        let crossings = &seen.channel("crossings").unwrap();
+        let mut twice = 0;
+        for (k, count) in crossings.iter().enumerate() {
+            assert_eq!(
+                (first[k] > 0.0, second[k] > 0.0),
+                (*count >= 1.0, *count >= 2.0),
+                "{k}: {count}"
+            );
+            twice += usize::from(*count >= 2.0);
+        }
+        assert!(twice > 20, "{twice}");
+    }
+}
+
 /// Sums of images are pictures whose rays end after as many half-orbits, of every kind of source.
 #[test]
 fn code_images_are_those_of_half_orbits() {
