@@ -114,7 +114,7 @@ fn chi2_of(name: &str, tested: &Tested) -> String {
     let chi2 = tested.statistics.chi2().map_or("–".to_owned(), short);
     let expected = match tested.errors {
         Errors::Assumed => format!("{range} expected with the assumed σ"),
-        Errors::Shared => format!("{mean:.2} at most expected with errors of what varies"),
+        Errors::Shared => format!("{mean:.2} at most expected, σ includes the assumed variability"),
         _ => format!("{range} expected"),
     };
     format!("χ² {chi2} per data point of {name} ({expected})")

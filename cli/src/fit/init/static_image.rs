@@ -113,7 +113,7 @@ fn losses(has_closures: bool) -> String {
     let one = |kind: &&str| {
         let weak = match *kind {
             "amplitudes" => "",
-            _ => "least_snr = 3.0 #! weaker ones are not Gaussian\n",
+            _ => "least_snr = 3.0 #! closure quantities of weaker baselines are not Gaussian\n",
         };
         format!("[[loss]]\ndata = {kind:?}\nweight = 1.0\n{weak}")
     };

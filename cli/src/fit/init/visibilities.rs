@@ -44,7 +44,7 @@ pub fn of_visibilities(
     };
     let mut losses = "[[loss]]\ndata = \"amplitudes\"\nweight = 1.0".to_owned();
     if has_closures(observation, AVERAGE_S, source.is_some_and(|source| source.uv_min.is_some())) {
-        losses += "\n[[loss]]\ndata = \"closure-phases\"\nweight = 1.0\nleast_snr = 3.0 #! weaker ones are not Gaussian";
+        losses += "\n[[loss]]\ndata = \"closure-phases\"\nweight = 1.0\nleast_snr = 3.0 #! closure quantities of weaker baselines are not Gaussian";
     }
     let of_source = source.into_iter().flat_map(|source| [source.uv_min, source.blur]);
     let of_source: Vec<&str> = of_source.flatten().collect();

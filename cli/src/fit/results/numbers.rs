@@ -242,7 +242,7 @@ pub fn last_line(headline: &str, results: &Results) -> String {
             // The error of an empty volume is the truth itself, a relative error of 1.
             let empty = psnr + 20.0 * nrmse.log10();
             format!(
-                "{headline} PSNR beside the truth: {psnr:.2} dB (an empty volume: {empty:.2} dB)."
+                "{headline} PSNR with respect to the truth: {psnr:.2} dB (an empty volume: {empty:.2} dB)."
             )
         }
         _ => headline,

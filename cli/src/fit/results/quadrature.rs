@@ -37,7 +37,7 @@ pub fn sentence(off: f64, nodes: Sampling) -> Option<String> {
     let Sampling::Gauss { order, split } = nodes else { return None };
     (off > LIMIT).then(|| {
         format!(
-            "Sums along rays are off by {off:.1} of the errors of the data: take region.nodes = {{ gauss = {{ order = {order}, \
+            "Sums along rays are accurate to {off:.1} σ of the data alone: take region.nodes = {{ gauss = {{ order = {order}, \
              split = {} }} }}.",
             2 * split
         )
