@@ -181,11 +181,7 @@ fn starters_of_images_ask_for_what_is_missing(path: &Path) {
             ["fit", "images.toml", "-o", &name, "--set", &set, "--set", "loss.0.sigma=2e-7"];
         let told = succeed(path, &[&words[..], &few].concat());
         let error = results(&path.join(&name))["quadrature_error"].as_f64().unwrap();
-        assert_eq!(
-            told.contains("Sums along rays are accurate to"),
-            error > 0.3,
-            "{error}: {told}"
-        );
+        assert_eq!(told.contains("Sums along rays are off by"), error > 0.3, "{error}: {told}");
         error
     });
     assert!(errors[0] > 2.0 * errors[1] && errors[1] > 2.0 * errors[2], "{errors:?}");

@@ -37,7 +37,7 @@ pub fn sentence(off: f64, nodes: Sampling) -> Option<String> {
     let Sampling::Gauss { order, split } = nodes else { return None };
     (off > LIMIT).then(|| {
         format!(
-            "Sums along rays are accurate to {off:.1} σ of the data alone: take region.nodes = {{ gauss = {{ order = {order}, \
+            "Sums along rays are off by {off:.1} σ of the data: take region.nodes = {{ gauss = {{ order = {order}, \
              split = {} }} }}.",
             2 * split
         )
@@ -53,6 +53,6 @@ mod tests {
         let nodes = Sampling::Gauss { order: 12, split: 2 };
         assert_eq!(sentence(0.29, nodes), None);
         let said = sentence(1.44, nodes).unwrap();
-        assert!(said.contains("1.4 of the errors") && said.contains("split = 4"), "{said}");
+        assert!(said.contains("1.4 σ of the data") && said.contains("split = 4"), "{said}");
     }
 }
