@@ -196,8 +196,8 @@ fn add_up(
     let truth = truth.map(|truth| true_volume(&prepared.settings, truth, 0.0)).transpose()?;
     // With the prior that held-out frames have chosen, which is that of the draws.
     let file = held_out::settled(&prepared.settings, folder)?;
-    let found = summary::Summary::new(&file, geometry.as_deref(), all, truth)?;
-    let found = found.of_fit(Results::read(folder)?.explains());
+    let explains = Results::read(folder)?.explains();
+    let found = summary::Summary::new(&file, geometry.as_deref(), all, truth, explains)?;
     page::write(&found, prepared, path)?;
     let numbers = found.numbers();
     output::Output::new(&path.join(NUMBERS), "")?.write(sealed(numbers.clone()).as_bytes())?;

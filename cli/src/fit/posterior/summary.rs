@@ -76,12 +76,14 @@ pub const RANKED: [&str; 3] = ["random_nodes", "bright_nodes", "feature_radius"]
 pub const WITHIN: &str = "_drawn_within_";
 
 impl Summary {
-    /// Summarises draws of a fit, with the geometry that its run has found, and the truth where there is one.
+    /// Summarises draws of a fit, with the geometry that its run has found, the truth where there is one, and whether the fit
+    /// explains its data.
     pub fn new(
         file: &FitFile,
         geometry: Option<&GeometryResults>,
         draws: &[Kept],
         truth: Option<Volume>,
+        is_explained: bool,
     ) -> anyhow::Result<Self> {
         let volumes: Vec<Volume> = draws.iter().map(|draw| draw.volume.clone()).collect();
         let ensemble = Ensemble::of(&volumes)?;
@@ -103,18 +105,12 @@ impl Summary {
             ranks,
             samples: draws.len(),
             factor,
-            is_explained: true,
+            is_explained,
             certain,
             predicted: predictive::checks(draws),
             open,
             open_part,
         })
-    }
-
-    /// Says whether the fit explains its data.
-    #[must_use]
-    pub fn of_fit(self, is_explained: bool) -> Self {
-        Self { is_explained, ..self }
     }
 
     /// Numbers for a script.
