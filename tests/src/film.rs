@@ -145,6 +145,11 @@ fn exact_second_run_goes_on() {
     assert!(gif.starts_with(b"GIF89a"));
     let other = [&MOVIE[..], &["--set", "hole.spin=0.5"][..]].concat();
     fail_with(folder.path(), &other, &["scene_resolved", "another folder"]);
+    fail_with(
+        folder.path(),
+        &[&MOVIE[..], &["--half"]].concat(),
+        &["frame_options", "another folder"],
+    );
     let fewer = ["movie", "spot.toml", "--frames", "2", "--duration", "60min", "-o", "film"];
     assert!(fail(folder.path(), &fewer).contains("frame_0002.exr"));
     assert!(fail(folder.path(), &MOVIE[..4]).contains("--output"));

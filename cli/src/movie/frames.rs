@@ -33,6 +33,8 @@ pub struct Sequence {
     files: String,
     /// The device that traces rays, if it is not this processor.
     device: String,
+    /// Form of the files.
+    style: FrameStyle,
 }
 
 /// Origin of a film.
@@ -45,6 +47,16 @@ pub struct Origin<'a> {
     pub files: &'a str,
     /// The device that traces rays; nothing for this processor.
     pub device: &'a str,
+    /// Form of the files.
+    pub style: FrameStyle,
+}
+
+/// Form of a film's files.
+#[derive(Clone, Copy)]
+pub struct FrameStyle {
+    pub exr: ExrOptions,
+    /// Frames a second, told in the header.
+    pub per_second: u16,
 }
 
 /// A frame to be.
@@ -62,7 +74,7 @@ impl Sequence {
         times: &[f64],
         part: &RangeInclusive<u32>,
     ) -> anyhow::Result<Self> {
-        let Origin { name, text, files, device } = of;
+        let Origin { name, text, files, device, style } = of;
         let plan = |time: &f64| -> anyhow::Result<Plan> {
             let (scene, text) = at_time(name, text, *time)?;
             Ok(Plan { scene, text })
@@ -76,7 +88,8 @@ impl Sequence {
         let folder = folder.to_owned();
         let (fluxes, unresolved) = (vec![None; plans.len()], vec![0; plans.len()]);
         let part = *part.start() as usize..*part.end() as usize + 1;
-        Ok(Sequence { folder, plans, part, done, fluxes, unresolved, factor: None, files, device })
+        let (factor, style) = (None, *style);
+        Ok(Sequence { folder, plans, part, done, fluxes, unresolved, factor, files, device, style })
     }
 
     /// Looks which frames are there. Frames with other settings, or beyond the last, are errors:
@@ -204,13 +217,10 @@ impl Sequence {
         Ok(decoded.with_context(|| path.display().to_string())?.0)
     }
 
-    /// Writes a batch of frames in some style, so many a second. What is scaled to Jy is scaled by the first frame's
-    /// factor.
+    /// Writes a batch of frames. What is scaled to Jy is scaled by the first frame's factor.
     pub fn write(
         &mut self,
         film: &Raster,
-        options: &ExrOptions,
-        per_second: u16,
         batch: &[usize],
         frames: Vec<Frame>,
     ) -> anyhow::Result<()> {
@@ -220,8 +230,8 @@ impl Sequence {
         let factor = self.factor.context("the film has no unit of intensity")?;
         let this: &Sequence = self;
         let written = batch.par_iter().zip(frames).map(|(k, frame)| -> anyhow::Result<_> {
-            let style = options.style(film.camera_of(&frame)?);
-            let style = Style { frames_per_second: Some(per_second), ..style };
+            let style = this.style.exr.style(film.camera_of(&frame)?);
+            let style = Style { frames_per_second: Some(this.style.per_second), ..style };
             let Rendered { picture, summary } = film.rendered(frame, factor)?;
             let Plan { scene, text } = &this.plans[*k];
             let mut attributes = report::attributes(scene, text, "", film, &summary);
@@ -251,6 +261,7 @@ impl Sequence {
             entry("frame", k.to_string()),
             entry("frames", self.plans.len().to_string()),
             entry("frame_time_m", scene.observer.time.to_string()),
+            entry("frame_options", self.style.exr.to_string()),
         ]);
         settings.extend(minutes.map(|minutes| entry("frame_time_min", minutes.to_string())));
         if !self.files.is_empty() {

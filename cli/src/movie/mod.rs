@@ -15,7 +15,7 @@ use crate::render::report;
 use crate::render::source::Source;
 use anyhow::{Context, bail};
 use clap::Args;
-use frames::{Origin, Sequence};
+use frames::{FrameStyle, Origin, Sequence};
 use kerrlight_common::memory;
 use kerrlight_geodesic::RayDevice;
 use kerrlight_render::picture::Raster;
@@ -94,7 +94,8 @@ impl Movie {
         }
         afford(&film, &scene)?;
         let device = film.device().map_or("", RayDevice::name);
-        let of = Origin { name: &source.name, text: &text, files: &files.identity, device };
+        let style = FrameStyle { exr: self.exr, per_second: self.viewing.fps };
+        let of = Origin { name: &source.name, text: &text, files: &files.identity, device, style };
         let mut sequence = Sequence::new(&self.output, &of, &times, &self.frames.part)?;
         for input in iter::once(&self.scene).chain(&files.paths) {
             sequence.spare(input)?;
@@ -107,8 +108,7 @@ impl Movie {
             devices::announce(device, &film.beside_device());
         }
         let start = Instant::now();
-        let rendering =
-            Rendering::new(&mut film, &mut sequence, &self.output, &self.exr, self.viewing.fps);
+        let rendering = Rendering::new(&mut film, &mut sequence, &self.output);
         let rendered = rendering.run().with_context(|| source.name.clone())?;
         self.viewing.write(&sequence, self.look.look(&scene), gif.as_ref())?;
         Ok(self.answer(&sequence, rendered, start.elapsed().as_secs_f64(), &outputs))

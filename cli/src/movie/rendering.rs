@@ -3,7 +3,6 @@
 use super::frames::Sequence;
 use crate::interrupt::{Interrupted, SignalGuard};
 use crate::progress;
-use crate::render::exr_options::ExrOptions;
 use indicatif::ProgressBar;
 use kerrlight_geodesic::RayDevice;
 use kerrlight_render::Error;
@@ -16,24 +15,15 @@ pub struct Rendering<'a> {
     film: &'a mut Raster,
     sequence: &'a mut Sequence,
     folder: &'a Path,
-    options: &'a ExrOptions,
-    /// Frames a second.
-    per_second: u16,
     bar: ProgressBar,
 }
 
 impl<'a> Rendering<'a> {
-    /// Takes the frames in `folder`, written in some style, so many a second.
-    pub fn new(
-        film: &'a mut Raster,
-        sequence: &'a mut Sequence,
-        folder: &'a Path,
-        options: &'a ExrOptions,
-        per_second: u16,
-    ) -> Self {
+    /// Takes the frames in `folder`.
+    pub fn new(film: &'a mut Raster, sequence: &'a mut Sequence, folder: &'a Path) -> Self {
         let batches = sequence.missing().len().div_ceil(film.batch());
         let bar = progress::bar((batches * sequence.height()) as u64);
-        Self { film, sequence, folder, options, per_second, bar }
+        Self { film, sequence, folder, bar }
     }
 
     /// Renders what is missing and counts it.
@@ -62,7 +52,7 @@ impl<'a> Rendering<'a> {
         let keeper = SignalGuard::brief(self.there());
         let times: Vec<f64> = batch.iter().map(|k| self.sequence.time(*k)).collect();
         let frames = self.frames(&times, &keeper)?;
-        self.sequence.write(self.film, self.options, self.per_second, batch, frames)
+        self.sequence.write(self.film, batch, frames)
     }
 
     fn frames(&mut self, times: &[f64], keeper: &SignalGuard) -> anyhow::Result<Vec<Frame>> {
