@@ -179,6 +179,7 @@ mod tests {
     use kerrlight_vlbi::array::Station;
     use kerrlight_vlbi::earth::SourcePosition;
     use kerrlight_vlbi::observation::{Basis, Measured as Datum};
+    use kerrlight_vlbi::operator::ImageGrid;
     use kerrlight_vlbi::products::{ClosureKind, ClosureSet};
 
     /// Three stations at two times, with gains of this prior.
@@ -193,7 +194,8 @@ mod tests {
             }
         }
         let gains = Some(GainPriors { free_phases: false, amplitude_sigma: vec![sigma; 3] });
-        FitData { gains, ..FitData::of_frames(seen, &[], None).unwrap() }
+        let sky = ImageGrid::new(8, 8, 1e-9).unwrap();
+        FitData { gains, ..FitData::of_frames(sky, seen, &[], None).unwrap() }
     }
 
     /// Two bands of one night: as many closure phases as in both, none across, and gains of a file with its own priors.

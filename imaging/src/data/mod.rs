@@ -31,9 +31,9 @@ pub fn total_intensity(
     let observation = reduction(file, variability).of(observation, &file.loss, name)?;
     let instrument =
         file.instrument.clone().map(|known| InstrumentSettings { leakage: None, ..known });
-    let measured = FitData::of_frames(observation, &file.loss, instrument.as_ref())?;
-    let (sky, has_intrinsic_variability) = (Some(file.image.grid()?), variability.is_some());
-    Ok(FitData { sky, has_intrinsic_variability, ..measured })
+    let sky = file.image.grid()?;
+    let measured = FitData::of_frames(sky, observation, &file.loss, instrument.as_ref())?;
+    Ok(FitData { has_intrinsic_variability: variability.is_some(), ..measured })
 }
 
 /// The data of the polarisation of a static image, with all products of the feeds; none if no polarisation is asked for.
@@ -57,10 +57,11 @@ pub fn polarized(
     }
     polarized_errors(&mut observation, data.variability, polarization);
     let instrument = file.instrument.clone().map(|instrument| with_phases(instrument, file));
-    let measured = FitData::of_frames(observation, &losses, instrument.as_ref())?;
+    let sky = file.image.grid()?;
+    let measured = FitData::of_frames(sky, observation, &losses, instrument.as_ref())?;
     let has_intrinsic_variability =
         data.variability.is_some() || polarization.variability.is_some();
-    Ok(Some(FitData { sky: Some(file.image.grid()?), has_intrinsic_variability, ..measured }))
+    Ok(Some(FitData { has_intrinsic_variability, ..measured }))
 }
 
 fn reduction(file: &StaticImageFile, variability: Option<Variability>) -> Reduction {

@@ -12,8 +12,10 @@ use crate::fit::settings::{
     refuse,
 };
 use kerrlight_common::frames::Frames;
+use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::noise::{ScatteringKernel, unscatter};
 use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::operator::ImageGrid;
 
 /// Advice where there are no data.
 pub(super) const FILE: &str = "a table [data.visibilities] or [data.movie] with `path = \"FILE\"` (`kerrlight fit --init FILE` writes \
@@ -77,29 +79,51 @@ impl FitData {
         let reduction = Reduction { average_s, uv_min, systematic, scattering, variability };
         let observation = reduction.of(observation, &file.loss, name)?;
         let per_m = hours_per_m(file)?;
-        let mut all = Self::of_frames(observation, &file.loss, file.instrument.as_ref())?;
+        let sky = sky(file)?;
+        let mut all = Self::of_frames(sky, observation, &file.loss, file.instrument.as_ref())?;
         let first = all.times[0];
         all.times.iter_mut().for_each(|time| *time = first_time + (*time - first) / per_m);
-        let (sky, has_intrinsic_variability) = (Some(sky(file)?), variability.is_some());
         let pulse = file.screen.pulse.unwrap_or(PixelShape::Delta).pulse();
-        Ok(FitData { sky, has_intrinsic_variability, pulse, ..all })
+        Ok(FitData { has_intrinsic_variability: variability.is_some(), pulse, ..all })
     }
 
-    /// Visibilities as they are, with the gains and the leakage that a fit solves for. Times of frames are hours of UTC.
+    /// Visibilities of a sky as they are, with the gains and the leakage that a fit solves for. Times of frames are hours of
+    /// UTC.
     ///
     /// # Errors
-    /// If losses do not tell gains, a station has no prior, or leakage is asked of data without circular feeds.
+    /// If the sky is a point to all baselines, losses do not tell gains, a station has no prior, or leakage is asked of data
+    /// without circular feeds.
     pub fn of_frames(
+        sky: ImageGrid,
         mut observation: Observation,
         losses: &[Loss],
         instrument: Option<&InstrumentSettings>,
     ) -> Result<Self> {
+        check_resolved(sky, &observation)?;
         let (times, of_rows) = frames_of(&mut observation);
         let gains = gains::priors(instrument, losses, &observation)?;
         let leakage = leakage::unknown(instrument, &observation)?;
         let visibilities = Some((observation, of_rows));
-        Ok(FitData { times, visibilities, gains, leakage, ..FitData::empty() })
+        let sky = Some(sky);
+        Ok(FitData { times, visibilities, sky, gains, leakage, ..FitData::empty() })
     }
+}
+
+/// Refuses a field across which no baseline sees the phase turn: to these data the source is a point whatever its shape.
+fn check_resolved(sky: ImageGrid, observation: &Observation) -> Result<()> {
+    const LEAST_TURNS: f64 = 0.05;
+    let field_rad = sky.pixel_rad * sky.width.max(sky.height) as f64;
+    let longest = observation.rows.iter().map(|row| row.uv[0].hypot(row.uv[1])).fold(0.0, f64::max);
+    if field_rad * longest < LEAST_TURNS {
+        refuse!(
+            "the field is {:.2e} microarcseconds wide, and the longest baseline {longest:.2e} wavelengths: phases turn by {:.1e} \
+             of a circle across it, so that nothing of its shape is in the data; look at the mass (solar masses), the distance \
+             (kpc) or the field, and whether (u, v) are wavelengths",
+            field_rad / MICROARCSECOND,
+            field_rad * longest,
+        );
+    }
+    Ok(())
 }
 
 /// Reduction of measured visibilities before a model is compared with them.
@@ -217,5 +241,25 @@ mod tests {
         file.screen.pulse = Some(PixelShape::Rectangle);
         let data = FitData::of_visibilities(&file, observation, "a test").unwrap();
         assert_eq!(data.pulse, Pulse::Rectangle);
+    }
+
+    /// A mass without its 10⁶, or (u, v) in Gλ: 120 µas are 6e-10 rad.
+    #[test]
+    fn exact_a_field_that_no_baseline_resolves_is_refused() {
+        let sky = ImageGrid::new(8, 8, 120.0 * MICROARCSECOND).unwrap();
+        let i = Measured { visibility: Complex64::new(1.0, 0.0), noise_sigma: 0.1 };
+        let data = |longest: f64| {
+            let mut observation = Observation::empty(Basis::Stokes);
+            observation.stations = ["A", "B"].map(Station::named).to_vec();
+            observation.rows =
+                vec![Row::total_intensity(4.0, [0, 1], [0.6 * longest, 0.8 * longest], i)];
+            FitData::of_frames(sky, observation, &[], None).map(|_| ()).map_err(|e| e.to_string())
+        };
+        assert_eq!(data(8e9), Ok(()));
+        let refused = data(8.0).unwrap_err();
+        assert!(
+            refused.contains("1.20e2 microarcseconds wide, and the longest baseline 8.00e0"),
+            "{refused}"
+        );
     }
 }
