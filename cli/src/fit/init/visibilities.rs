@@ -1,17 +1,14 @@
 //! Starter file for a volume from visibilities, and what every starter file says of them.
 
-use super::sources::{called, is_simulated, known};
+use super::sources::{Source, called, is_simulated, known};
 use super::template::{complete, digits, plain_words};
 use anyhow::bail;
-use kerrlight_common::units::gravitational_angle;
+use kerrlight_common::units::{gravitational_angle, gravitational_time};
 use kerrlight_tomo::fit::setup;
 use kerrlight_vlbi::data_terms::ClosureTerm;
 use kerrlight_vlbi::gains::prior_table;
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::products::ClosureKind;
-
-/// Seconds of an average.
-const AVERAGE_S: f64 = 300.0;
 
 pub fn of_visibilities(
     observation: &Observation,
@@ -20,6 +17,7 @@ pub fn of_visibilities(
 ) -> anyhow::Result<String> {
     let flux = short_baselines(observation)?;
     let source = known(observation);
+    let average_s = average(source.as_ref());
     let name = &called(observation, source.as_ref());
     let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
     let (mass, inclination, field) = match source {
@@ -43,7 +41,7 @@ pub fn of_visibilities(
         ),
     };
     let mut losses = "[[loss]]\ndata = \"amplitudes\"\nweight = 1.0".to_owned();
-    if has_closures(observation, AVERAGE_S, source.is_some_and(|source| source.uv_min.is_some())) {
+    if has_closures(observation, average_s, source.is_some_and(|source| source.uv_min.is_some())) {
         losses += "\n[[loss]]\ndata = \"closure-phases\"\nweight = 1.0\nleast_snr = 3.0 #! closure quantities of weaker baselines are not Gaussian";
     }
     let of_source = source.into_iter().flat_map(|source| [source.uv_min, source.blur]);
@@ -59,13 +57,20 @@ pub fn of_visibilities(
         ("jy", digits(per_pixel)),
         ("flux", digits(flux)),
         ("losses", losses),
-        ("average", format!("{AVERAGE_S:?}")),
+        ("average", format!("{average_s:?}")),
         ("source", of_source.join("\n")),
         ("gains", gains(observation)),
         ("read", read(observation, file, name, source.is_some()) + unfitted(observation)),
         ("path", path.to_owned()),
     ];
     complete(include_str!("visibilities.toml"), &fields)
+}
+
+/// Seconds of an average, in which gas that orbits at 6 M turns by 11° at most: 3 M.
+fn average(source: Option<&Source>) -> f64 {
+    let still_s = source.map_or(f64::INFINITY, |of| 3.0 * gravitational_time(of.mass_msun));
+    // Scans last some minutes: longer averages hold no more.
+    [300.0, 120.0, 60.0, 30.0, 10.0].into_iter().find(|s| *s <= still_s).unwrap_or(10.0)
 }
 
 /// Returns whether closure phases are left of the rows that the template's fit keeps.
