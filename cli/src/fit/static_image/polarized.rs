@@ -8,7 +8,7 @@ use anyhow::Context;
 use kerrlight_imaging::settings::{StaticImageFile, StaticPolarization};
 use kerrlight_imaging::{LinearPolarization, PolarizedSurvey};
 use kerrlight_tomo::fit::FrameTerm;
-use kerrlight_tomo::fit::setup::FitData;
+use kerrlight_tomo::fit::setup::{FitData, told_end};
 use kerrlight_tomo::fit::verdict::{Errors, Statistics, Tested};
 use serde::Serialize;
 
@@ -180,16 +180,21 @@ impl Polarized {
         let per_cent = |(value, error): (f64, Option<f64>)| {
             with_error(100.0 * value, error.map(|error| 100.0 * error), 1)
         };
+        // A direction of what may be zero is none.
+        let is_seen = beta.1.is_none_or(|error| beta.0 >= 2.0 * error);
+        let argument = match is_seen {
+            true => format!("the argument {}°", with_error(angle.0, angle.1, 0)),
+            false => "no measured argument: it is less than two errors from 0".to_owned(),
+        };
         format!(
             "Seen with a beam of {} µas, {} % of the light is linearly polarised, {} % where polarised light is brightest ({}° east \
-             of north of the centre), and {} % of all light together; β₂ has the modulus {} and the argument {}°.",
+             of north of the centre), and {} % of all light together; β₂ has the modulus {} and {argument}.",
             self.settings.beam_uas,
             per_cent(mean),
             per_cent(brightest),
             with_error(direction.0, direction.1, 0),
             per_cent(net),
-            with_error(beta.0, beta.1, 3),
-            with_error(angle.0, angle.1, 0)
+            with_error(beta.0, beta.1, 3)
         )
     }
 
@@ -199,11 +204,12 @@ impl Polarized {
         let mut text = vec![format!(
             "Linear polarisation was found after total intensity, which was held: a fraction and a position angle in every pixel, \
              from {} {}. {} % of Stokes I from each station were added to errors of RL and LR for leakage. Slopes of the \
-             fraction are penalised in proportion to light (weight {smoothness}, times {}).",
+             fraction are penalised in proportion to light (weight {smoothness}, times {}{}).",
             self.count,
             self.settings.data.label(),
             100.0 * leakage_left,
-            self.survey.found.strength
+            self.survey.found.strength,
+            told_end(self.survey.held.iter().map(|held| held.value), self.survey.found.strength)
         )];
         if let Some(law) = variability {
             text.push(format!(

@@ -9,6 +9,7 @@ use crate::report::Part;
 use kerrlight_imaging::settings::{RingSettings, StartImage};
 use kerrlight_imaging::{Calibration, Envelope, Profile, ShapeFit, Survey, best_shape};
 use kerrlight_tomo::fit::settings::LossKind;
+use kerrlight_tomo::fit::setup::told_end;
 
 impl Found<'_> {
     /// The ring in a sentence, where one is looked for.
@@ -187,9 +188,11 @@ impl Found<'_> {
             ));
         }
         if !self.survey.held.is_empty() {
+            let tried = self.survey.held.iter().map(|held| held.value);
             text.push(format!(
-                "The factor is the largest of {} that predicts frames which were not fitted as well as the best, within a standard error.",
-                self.survey.held.len()
+                "The factor is the largest of {} that predicts frames which were not fitted as well as the best, within a standard error{}.",
+                self.survey.held.len(),
+                told_end(tried, self.survey.strength)
             ));
         }
         match &self.gains {

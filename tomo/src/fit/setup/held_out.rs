@@ -40,6 +40,16 @@ pub fn best(all: &[Held]) -> Option<&Held> {
     all.iter().min_by(|a, b| a.mean().total_cmp(&b.mean()))
 }
 
+/// Says so where the chosen value is the first or the last of those that were tried; nothing of one between them.
+pub fn told_end(tried: impl Iterator<Item = f64>, chosen: f64) -> &'static str {
+    let [least, most] =
+        tried.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
+    match [least, most].contains(&chosen) {
+        true => "; it is the first or the last of the list, a better one may lie beyond",
+        false => "",
+    }
+}
+
 /// Told which value and which part is being solved, both from 0; says whether to go on.
 pub type HeldWatch<'a> = dyn FnMut(usize, usize) -> bool + 'a;
 

@@ -48,7 +48,7 @@ pub use geometry::{
     FoundGeometry, GeometryPosterior, RaySampling, Resolution, SearchWatch, Trial, find_geometry,
     in_geometry, known_geometry, rays_of_data, through, true_geometry,
 };
-pub use held_out::{Held, HeldWatch, best as best_held, check_folds, hold_out};
+pub use held_out::{Held, HeldWatch, best as best_held, check_folds, hold_out, told_end};
 pub use imported::Reduction;
 pub use instrument::Instrument;
 pub use leakage::LeakageUnknown;

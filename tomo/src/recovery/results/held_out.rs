@@ -60,13 +60,7 @@ impl HeldOutResults {
     pub fn sentence(&self) -> Option<String> {
         let chosen = self.chosen?;
         let least = self.values.iter().map(|of| of.loss).fold(f64::INFINITY, f64::min);
-        let ends = self.values.iter().fold([f64::INFINITY, 0.0f64], |[low, high], of| {
-            [low.min(of.value), high.max(of.value)]
-        });
-        let end = match ends.contains(&chosen) {
-            true => "; it is the first or the last of the list, a better one may lie beyond",
-            false => "",
-        };
+        let end = setup::told_end(self.values.iter().map(|of| of.value), chosen);
         Some(format!(
             "{} = {chosen} was chosen from {} values: the frames that were held out have χ² {least:.3} per data \
              point with it{end}.",
