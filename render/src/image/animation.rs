@@ -65,12 +65,13 @@ impl Palette {
 pub struct Gif<'a> {
     encoder: gif::Encoder<&'a mut Vec<u8>>,
     palette: Palette,
-    /// Hundredths of a second.
-    delay: u16,
+    per_second: u32,
+    /// Frames so far.
+    count: u32,
 }
 
 impl<'a> Gif<'a> {
-    /// An animation that repeats for ever. GIF counts in hundredths of a second.
+    /// An animation that repeats for ever. GIF counts in hundredths of a second: frames start at the nearest ones.
     ///
     /// # Errors
     /// If the size is none of a GIF.
@@ -88,8 +89,7 @@ impl<'a> Gif<'a> {
             gif::Encoder::new(bytes, width, height, &colors).map_err(AnimationError::from)?;
         encoder.set_repeat(gif::Repeat::Infinite).map_err(AnimationError::from)?;
         // Browsers take a tenth of a second for anything below two hundredths.
-        let delay = (100.0 / f64::from(per_second.max(1))).round().max(2.0) as u16;
-        Ok(Gif { encoder, palette, delay })
+        Ok(Gif { encoder, palette, per_second: u32::from(per_second).clamp(1, 50), count: 0 })
     }
 
     /// Appends a frame.
@@ -100,10 +100,11 @@ impl<'a> Gif<'a> {
         let pixels: Vec<u8> = frame.pixels().map(|p| self.palette.index(p.0)).collect();
         // The size was checked when the animation began.
         let (width, height) = (frame.width() as u16, frame.height() as u16);
-        let frame = gif::Frame {
-            delay: self.delay,
-            ..gif::Frame::from_indexed_pixels(width, height, pixels, None)
-        };
+        let start = |count: u32| (100.0 * f64::from(count) / f64::from(self.per_second)).round();
+        let delay = (start(self.count + 1) - start(self.count)) as u16;
+        self.count += 1;
+        let frame =
+            gif::Frame { delay, ..gif::Frame::from_indexed_pixels(width, height, pixels, None) };
         Ok(self.encoder.write_frame(&frame).map_err(AnimationError::from)?)
     }
 }
@@ -121,7 +122,7 @@ mod tests {
     fn exact_gif_frames_with_one_palette() {
         let frames = frames();
         let mut bytes = Vec::new();
-        let mut film = Gif::new(&mut bytes, [8, 5], Palette::of(&frames), 20).unwrap();
+        let mut film = Gif::new(&mut bytes, [8, 5], Palette::of(&frames), 30).unwrap();
         for frame in &frames {
             film.push(frame).unwrap();
         }
@@ -129,9 +130,9 @@ mod tests {
         let mut options = gif::DecodeOptions::new();
         options.set_color_output(gif::ColorOutput::RGBA);
         let mut reader = options.read_info(bytes.as_slice()).unwrap();
-        for frame in &frames {
+        for (frame, delay) in frames.iter().zip([3, 4, 3]) {
             let read = reader.read_next_frame().unwrap().unwrap();
-            assert_eq!((read.delay, read.palette.is_none()), (5, true));
+            assert_eq!((read.delay, read.palette.is_none()), (delay, true));
             for (a, b) in read.buffer.chunks(4).zip(frame.pixels()) {
                 assert_eq!(a[..3], b.0);
             }
