@@ -211,8 +211,8 @@ pub fn best_shape<'a>(shapes: impl Iterator<Item = &'a ShapeFit>) -> Option<&'a 
 
 /// A width of this logarithm in a picture: nothing is narrower than its pixels tell.
 fn drawn(ln: f64, pixel: f64) -> f64 {
-    // Line searches may try any length: its exponential stays finite.
-    ln.clamp(-5.0, 9.0).exp().hypot(pixel)
+    // Line searches may try any length: its square and those of ratios stay finite, whatever the unit of the field.
+    ln.clamp(-100.0, 100.0).exp().hypot(pixel)
 }
 
 /// Fits all shapes; none if `go_on` said no.
@@ -316,21 +316,26 @@ fn best(
         fitting.solved(&begin, go_on)
     };
     let all: Option<Vec<_>> = shape.starts(size).into_par_iter().map(solved).collect();
-    let found = all?.into_iter().min_by(|a, b| a.loss.total_cmp(&b.loss))?;
+    let key = |loss: f64| if loss.is_nan() { f64::INFINITY } else { loss };
+    let found = all?.into_iter().min_by(|a, b| key(a.loss).total_cmp(&key(b.loss)))?;
     let here = fitting.image(&found.parameters);
     let chi2 = problem.chi2(&here);
     let is_still = file.data.visibilities.variability.is_none();
     let mut kinds = chi2.iter().zip(problem.counts());
     let explains = is_still && kinds.all(|(chi2, count)| is_chance(*chi2, count));
     let (total, count) = independent(problem, file, &chi2);
+    let shares = shape.shares(&found.parameters[1..], size, grid);
+    let criterion = total + found.parameters.len() as f64 * count.max(1.0).ln();
+    // One that a step has put beyond the field explains nothing.
+    let is_seen = criterion.is_finite() && shares.iter().any(|share| *share > 0.0);
     Some(ShapeFit {
         shape,
         sizes: shape.sizes(&found.parameters[1..], size, grid.pixel_rad / MICROARCSECOND),
-        shares: shape.shares(&found.parameters[1..], size, grid),
+        shares,
         flux_jy: here.iter().sum(),
         chi2,
-        criterion: total + found.parameters.len() as f64 * count.max(1.0).ln(),
-        explains,
+        criterion: if is_seen { criterion } else { f64::INFINITY },
+        explains: explains && is_seen,
         parameters: found.parameters,
     })
 }
@@ -351,6 +356,18 @@ fn independent(problem: &ImageProblem<'_>, file: &StaticImageFile, chi2: &[f64])
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A Gaussian of 20 mas in a field of 100 mas keeps its width, whatever number of µas that is.
+    #[test]
+    fn exact_widths_have_no_unit() {
+        let shares = |field_uas: f64| {
+            let grid = ImageGrid::new(24, 24, field_uas * MICROARCSECOND).unwrap();
+            Shape::Gaussian.shares(&[(0.2 * field_uas).ln(), 0.0, 0.0], 0.32 * field_uas, grid)
+        };
+        for (large, small) in shares(1e5).iter().zip(shares(100.0)) {
+            assert!((large - small).abs() < 1e-12);
+        }
+    }
 
     /// Beyond the largest ratio of axes a Gaussian stays the one of that ratio: an ellipse, not a strip across the field.
     #[test]

@@ -53,12 +53,13 @@ pub fn survey(
     let of_best = best_shape(shapes.iter()).map(|best| best.envelope(grid));
     let expected = file.envelope.map(|settings| expected(settings, of_best)).transpose()?;
     let envelope = expected.map(|(envelope, weight)| (envelope.shares(grid), weight));
-    let of_shapes = shapes.iter().map(|fit| start::shape(&fit.shares));
+    let of_shapes = shapes.iter().filter(|fit| fit.criterion.is_finite());
+    let of_shapes = of_shapes.map(|fit| start::shape(&fit.shares));
     let begin = file.image.starts.iter().map(|start| start::image(*start, grid)).chain(of_shapes);
     let (priors, begin) = (file.priors()?, begin.collect());
     let search = Search { file, grid, priors, envelope, expected, begin, terms: &terms, watch };
     let frames: Vec<usize> = (0..measured.times.len()).collect();
-    let middle = file.strength.as_ref().map_or(1.0, |s| s.values[s.values.len() / 2]);
+    let middle = file.strength.as_ref().map_or(1.0, middle);
     let Some(starts) = search.starts(middle, &frames) else { return Ok(None) };
     let Some(held) = search.hold_out(least(&starts), measured) else { return Ok(None) };
     let allowed = allowed(&held);
@@ -72,6 +73,9 @@ pub fn survey(
     };
     let Some(starts) = starts else { return Ok(None) };
     let best = least(&starts);
+    if !starts[best].solution.loss.is_finite() {
+        return Err(Error::Failed("no start has come to an image with a finite loss".to_owned()));
+    }
     let others: Vec<f64> = allowed.iter().copied().filter(|value| *value != strength).collect();
     let of = |value: &f64| search.solved(Stage::Strengths, best, *value, &frames, search.flux());
     let Some(strengths) = others.par_iter().map(of).collect() else { return Ok(None) };
@@ -124,10 +128,18 @@ fn expected(
     Ok((envelope.ok_or_else(missing)?, weight))
 }
 
-/// The start with the least loss.
+/// The strength in the middle of those to choose from.
+fn middle(settings: &StrengthSettings) -> f64 {
+    let mut values = settings.values.clone();
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// The start with the least loss; NaN, of a start that went astray, is none.
 fn least(starts: &[Candidate]) -> usize {
     let losses = starts.iter().enumerate().map(|(k, start)| (k, start.solution.loss));
-    losses.min_by(|(_, a), (_, b)| a.total_cmp(b)).map_or(0, |(k, _)| k)
+    let finite = losses.filter(|(_, loss)| loss.is_finite());
+    finite.min_by(|(_, a), (_, b)| a.total_cmp(b)).map_or(0, |(k, _)| k)
 }
 
 /// Strengths that predict held-out frames as well as the best within a standard error of the difference, rising.

@@ -93,11 +93,10 @@ impl LightCurve {
         self
     }
 
-    /// Means of so many samples at a time; a rest that is fewer is left out. Those without a parameter have no part in
-    /// its mean.
+    /// Means of so many samples at a time; the last has the rest. Those without a parameter have no part in its mean.
     #[must_use]
     pub fn averaged(self, count: usize) -> Self {
-        Self { samples: self.samples.chunks_exact(count.max(1)).map(mean).collect() }
+        Self { samples: self.samples.chunks(count.max(1)).map(mean).collect() }
     }
 
     /// Means over so many seconds: a sample begins a new one where it is as much as that later than the first of the last.
@@ -187,15 +186,23 @@ fn mixed(x: Flux, a: f64, y: Flux, b: f64) -> Flux {
     Flux { jy: a * x.jy + b * y.jy, sigma_jy: x.sigma_jy.zip(y.sigma_jy).map(sigma) }
 }
 
+/// The mean of some samples, by 1/σ² where all have errors.
 fn mean(samples: &[Sample]) -> Sample {
     let count = samples.len() as f64;
     let of = |k: usize| -> Option<Flux> {
         let all: Vec<Flux> = samples.iter().filter_map(|sample| sample.stokes[k]).collect();
-        let count = all.len() as f64;
         let sigmas: Option<Vec<f64>> = all.iter().map(|flux| flux.sigma_jy).collect();
-        let sigma = |sigmas: Vec<f64>| sigmas.iter().map(|s| s * s).sum::<f64>().sqrt() / count;
-        let jy = all.iter().map(|flux| flux.jy).sum::<f64>() / count;
-        (count > 0.0).then(|| Flux { jy, sigma_jy: sigmas.map(sigma) })
+        let errors = sigmas.as_ref().filter(|sigmas| sigmas.iter().all(|sigma| *sigma > 0.0));
+        let weights: Vec<f64> = match errors {
+            Some(sigmas) => sigmas.iter().map(|sigma| sigma.powi(-2)).collect(),
+            None => vec![1.0; all.len()],
+        };
+        let sum: f64 = weights.iter().sum();
+        let jy = all.iter().zip(&weights).map(|(flux, w)| w * flux.jy).sum::<f64>() / sum;
+        let of_mean = |sigmas: Vec<f64>| {
+            sigmas.iter().zip(&weights).map(|(s, w)| (s * w).powi(2)).sum::<f64>().sqrt() / sum
+        };
+        (!all.is_empty()).then(|| Flux { jy, sigma_jy: sigmas.map(of_mean) })
     };
     let same = samples.iter().all(|sample| sample.by == samples[0].by);
     Sample {
@@ -304,7 +311,8 @@ mod tests {
         let all = (0..9).map(|k| sample(9.0 + 0.01 * f64::from(k), 0.3, f64::from(k)));
         let curve = LightCurve { samples: all.collect() };
         let means = curve.averaged(4);
-        assert_eq!(means.samples.len(), 2);
+        assert_eq!(means.samples.len(), 3);
+        assert_eq!(means.samples[2].stokes[2].unwrap().sigma_jy, Some(0.02));
         assert!((means.samples[1].stokes[2].unwrap().jy - 5.5).abs() < 1e-14);
         assert!((means.samples[1].time_h - 9.055).abs() < 1e-12);
         assert!((means.samples[0].stokes[1].unwrap().sigma_jy.unwrap() - 0.01).abs() < 1e-15);
@@ -313,6 +321,14 @@ mod tests {
         some[1].stokes[2] = None;
         let mean = LightCurve { samples: some.to_vec() }.averaged(3).samples.remove(0);
         assert_eq!(mean.stokes[2].unwrap().jy, 2.0);
+        // A sample whose error is 100 times as large has a weight of 1e-4.
+        let flux = |jy: f64, sigma: f64| Some(Flux { jy, sigma_jy: Some(sigma) });
+        let mut pair = [sample(9.0, 0.3, 0.0), sample(9.0, 0.3, 0.0)];
+        (pair[0].stokes[0], pair[1].stokes[0]) = (flux(1.0, 0.01), flux(3.0, 1.0));
+        let mean = LightCurve { samples: pair.to_vec() }.averaged(2).samples.remove(0);
+        let i = mean.stokes[0].unwrap();
+        assert!((i.jy - (1.0 + 3e-4) / 1.0001).abs() < 1e-14);
+        assert!((i.sigma_jy.unwrap() - 0.01 / 1.0001f64.sqrt()).abs() < 1e-16);
         let scans = [9.0, 9.003, 9.006, 9.5, 9.503].map(|t| sample(t, 0.3, t));
         let scans = LightCurve { samples: scans.to_vec() }.averaged_over(21.6);
         let times: Vec<f64> = scans.samples.iter().map(|sample| sample.time_h).collect();

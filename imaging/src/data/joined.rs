@@ -166,7 +166,11 @@ fn contradiction(a: &Observation, b: &Observation) -> Option<String> {
         let all: Option<Vec<f64>> = o.rows.iter().map(|row| o.frequency_of(row)).collect();
         all.map(|all| all.iter().sum::<f64>() / all.len() as f64)
     };
-    let (here, there) = (mean(a)?, mean(b)?);
+    let (here, there) = match (mean(a), mean(b)) {
+        (Some(here), Some(there)) => (here, there),
+        (None, None) => return None,
+        _ => return Some("the frequency of one of them is not known".to_owned()),
+    };
     ((there / here).ln().abs() > SAME_FREQUENCY)
         .then(|| format!("they are of {:.1} and {:.1} GHz", here * 1e-9, there * 1e-9))
 }
@@ -223,6 +227,12 @@ mod tests {
             assert!(of.iter().all(|file| *file == of[0]), "{of:?}");
         }
         assert_eq!(station_of_file(&seen.stations[4].name), ("B", 1));
+        // A band that is not told may be another.
+        let mut unknown = of(229e9, 0.2);
+        unknown.visibilities.as_mut().unwrap().0.frequency_hz = None;
+        let parts = vec![("lo".to_owned(), of(227e9, 0.1)), ("hi".to_owned(), unknown)];
+        let refused = joined(parts, "", None).err().unwrap().to_string();
+        assert!(refused.contains("the frequency of one of them is not known"), "{refused}");
         // Four frames at two instants are too few for two parts.
         let parts = vec![("lo".to_owned(), of(227e9, 0.1)), ("hi".to_owned(), of(229e9, 0.2))];
         let strength = StrengthSettings { values: vec![1.0, 2.0], folds: 2 };

@@ -5,6 +5,7 @@ use crate::Complex64;
 use crate::Error;
 use crate::gains::{GainTable, StationGain};
 use core::fmt::Write;
+use std::collections::HashSet;
 
 /// Names of the columns, in the order in which they are written.
 pub const COLUMNS: [&str; 7] = [
@@ -16,7 +17,7 @@ pub const COLUMNS: [&str; 7] = [
     "phase_deg",
     "phase_error_deg",
 ];
-/// Those that a table may lack: phases are then 0, and errors are not known.
+/// Those that a table may lack: phases are then 0 and were not solved for, and errors are not known.
 const OPTIONAL: [&str; 3] = ["amplitude_error", "phase_deg", "phase_error_deg"];
 /// Columns without those of phases.
 const AMPLITUDES: usize = 5;
@@ -48,7 +49,7 @@ pub fn to_csv(table: &GainTable) -> String {
 /// If no line names the columns, a line has too few of them or no number where one belongs, an amplitude or a span is not
 /// positive, or there are no gains: with line, column and value.
 pub fn parse(text: &str) -> Result<GainTable, Error> {
-    let (mut places, mut gains) = (None, Vec::new());
+    let (mut places, mut gains, mut known) = (None, Vec::new(), HashSet::new());
     for (index, line) in text.lines().enumerate() {
         if line.trim().is_empty() || line.starts_with('#') {
             continue;
@@ -61,7 +62,14 @@ pub fn parse(text: &str) -> Result<GainTable, Error> {
                 let message = format!("{} columns, but {names} names", cells.len());
                 return Err(located(message).into());
             }
-            Some((places, _)) => gains.push(gain(&cells, places).map_err(located)?),
+            Some((places, _)) => {
+                let gain = gain(&cells, places).map_err(located)?;
+                if !known.insert((gain.time_h.to_bits(), gain.station.clone())) {
+                    let (station, time_h) = (&gain.station, gain.time_h);
+                    return Err(located(format!("{station} is there twice at {time_h} h")).into());
+                }
+                gains.push(gain);
+            }
         }
     }
     if gains.is_empty() {
@@ -105,10 +113,13 @@ fn gain(cells: &[&str], places: &Places) -> Result<StationGain, String> {
     if amplitude <= 0.0 {
         return Err(format!("column amplitude: {amplitude} is not allowed: above 0"));
     }
-    let phase = if places[5].is_some() { value(5)? } else { 0.0 };
+    let (phase, of_phase) = match places[5] {
+        Some(_) => (value(5)?, error(6)?.to_radians()),
+        None => (0.0, 0.0),
+    };
     let gain = Complex64::from_polar(amplitude, phase.to_radians());
     // The column has the error of |g|, the table that of ln|g|.
-    let errors = [error(4)? / amplitude, error(6)?.to_radians()];
+    let errors = [error(4)? / amplitude, of_phase];
     Ok(StationGain { time_h, span_s, station: cell(2)?.to_owned(), gain, errors })
 }
 
@@ -150,7 +161,7 @@ mod tests {
         let text = to_csv(&table);
         assert!(!text.contains("phase"), "{text}");
         let read = parse(&text).unwrap();
-        assert!(read.gains.iter().all(|gain| gain.gain.arg() == 0.0 && gain.errors[1].is_nan()));
+        assert!(!read.has_phases());
         table.gains[1].errors[1] = f64::NAN;
         assert!(to_csv(&table).contains("phase_deg"));
     }
@@ -166,6 +177,7 @@ mod tests {
             (format!("{head}1.0,-5,AA,1,0\n"), "line 2: column span_s: -5 s is not allowed"),
             (format!("{head}1.0,60,AA,1,0,7\n"), "line 2: 6 columns, but 5 names"),
             (format!("span_s,{head}60,1.0,60,AA,1,0\n"), "line 1: column `span_s` appears twice"),
+            (format!("{head}1.0,60,AA,1,0\n1.0,60,AA,2,0\n"), "line 3: AA is there twice at 1 h"),
             (head.to_owned(), "no gains"),
         ] {
             let error = parse(&text).unwrap_err().to_string();

@@ -294,6 +294,10 @@ pub fn parse_times(text: &str) -> Result<Vec<f64>, Error> {
             let found = TimeColumn::find(&names).or_else(only).ok_or_else(why)?;
             found.check_unit(&names, &units).map_err(located)?;
             column = Some(found);
+            // A column alone may have no name.
+            if let [Ok(time)] = cells.iter().map(|cell| cell.parse()).collect::<Vec<_>>()[..] {
+                times.push(time);
+            }
             continue;
         };
         let cell = cells.get(at).copied().unwrap_or_default();
@@ -362,6 +366,7 @@ mod tests {
         let shared = parse("t,Q,U,sigma\n1,0.1,0.2,0.01\n").unwrap();
         assert_eq!(shared.samples[0].stokes[1].unwrap().sigma_jy, Some(0.01));
         assert_eq!(parse_times("# hours\ntime_utc_h\n9.3\n9.4\n").unwrap(), [9.3, 9.4]);
+        assert_eq!(parse_times("9.3\n9.4\n").unwrap(), [9.3, 9.4]);
     }
 
     /// Headings of other programs: units in brackets, blanks between columns, names in a comment, days.

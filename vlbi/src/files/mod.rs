@@ -183,16 +183,29 @@ impl Names {
     }
 }
 
-/// Sets right ascension (hours) or declination (degrees) of the source; the other one stays, and is 0 before it is known.
+/// Sets right ascension (hours) or declination (degrees) of the source; the other one stays, and is NaN before it is known:
+/// [`check_located`] refuses that.
 fn locate(
     observation: &mut Observation,
     ra_hours: Option<f64>,
     dec_deg: Option<f64>,
 ) -> Result<(), String> {
-    let [ra, dec] = observation.position.map_or([0.0; 2], |p| [p.ra_hours, p.dec_deg]);
-    let place = SourcePosition::new(ra_hours.unwrap_or(ra), dec_deg.unwrap_or(dec));
-    observation.position = Some(place.map_err(|error| error.to_string())?);
+    SourcePosition::new(ra_hours.unwrap_or(0.0), dec_deg.unwrap_or(0.0))
+        .map_err(|error| error.to_string())?;
+    let unknown = SourcePosition { ra_hours: f64::NAN, dec_deg: f64::NAN };
+    let SourcePosition { ra_hours: ra, dec_deg: dec } = observation.position.unwrap_or(unknown);
+    let (ra_hours, dec_deg) = (ra_hours.unwrap_or(ra), dec_deg.unwrap_or(dec));
+    observation.position = Some(SourcePosition { ra_hours, dec_deg });
     Ok(())
+}
+
+/// Refuses half of a position.
+fn check_located(observation: &Observation) -> Result<(), FileError> {
+    let is_half = |p: SourcePosition| p.ra_hours.is_nan() || p.dec_deg.is_nan();
+    match observation.position.is_some_and(is_half) {
+        true => Err(FileError::whole("one of right ascension and declination is missing")),
+        false => Ok(()),
+    }
 }
 
 /// Returns the largest number of rows that a text may hold: as many as lines, which are 16 bytes at least.

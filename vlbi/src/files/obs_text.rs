@@ -1,7 +1,10 @@
 //! eht-imaging's text format of observations: a heading with source, date, frequency and
 //! stations, then 20 columns, amplitudes in Jy and phases in degrees.
 
-use super::{FileError, MOST_HOURS, MOST_WAVELENGTHS, Names, locate, number, number_within, sigma};
+use super::{
+    FileError, MOST_HOURS, MOST_WAVELENGTHS, Names, check_located, locate, number, number_within,
+    sigma,
+};
 use crate::Complex64;
 use crate::Error;
 use crate::array;
@@ -46,6 +49,7 @@ pub fn parse(text: &str) -> Result<Observation, Error> {
     if observation.rows.is_empty() {
         return Err(FileError::whole("no visibilities").into());
     }
+    check_located(&observation)?;
     let complete = observation.position.is_some()
         && observation.mjd.is_some()
         && observation.frequency_hz.is_some();
@@ -313,6 +317,7 @@ mod tests {
             fail(&good.replace("# MJD: 57850", "# MJD: soon")).starts_with("line 4: MJD `soon`")
         );
         assert!(fail(&good.replace("# MJD: 57850\n", "")).contains("lacks"));
+        assert!(fail(&good.replace("# DEC:", "# DECL:")).contains("declination is missing"));
         assert!(fail(&good.replace("230 GHz", "230 MHz")).contains("RF in `MHz` is not allowed"));
         let row = good.lines().last().unwrap();
         let cells: Vec<&str> = row.split_whitespace().collect();

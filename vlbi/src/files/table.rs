@@ -2,7 +2,8 @@
 //! by a line of names: kerrlight's CSV, and the csv and txt of the EHT's public releases.
 
 use super::{
-    FileError, MOST_HOURS, MOST_WAVELENGTHS, Names, cells, comments, number, number_within, sigma,
+    FileError, MOST_HOURS, MOST_WAVELENGTHS, Names, cells, check_located, comments, number,
+    number_within, sigma,
 };
 use crate::Complex64;
 use crate::Error;
@@ -105,6 +106,7 @@ pub fn parse(text: &str) -> Result<Observation, Error> {
     if observation.rows.is_empty() {
         return Err(FileError::whole("no visibilities").into());
     }
+    check_located(&observation)?;
     if left_out > 0 {
         observation.history.push(format!("{left_out} lines without a visibility (nan) left out"));
     }
@@ -242,6 +244,7 @@ mod tests {
         let fail = |from: &str, to: &str| parse(&text.replace(from, to)).unwrap_err().to_string();
         assert!(fail("# ra_h: 17.76", "# ra_h: 27").contains("line 1: right ascension = 27"));
         assert!(fail("# mjd: 57850", "# mjd: x").contains("mjd `x`"));
+        assert!(fail("# ra_h", "# ra").contains("right ascension and declination is missing"));
         assert!(fail("# channel: 1 ", "# passed: 1 ").contains("channel 1 is not in the comments"));
         assert!(fail("# station: BB", "# station: AA").contains("AA is listed twice"));
     }

@@ -75,6 +75,15 @@ impl Simulation {
         }
     }
 
+    /// Number of kinds of data.
+    pub(crate) fn kinds(&self) -> usize {
+        let Self { movie, observation, light_curve, .. } = self;
+        [movie.is_some(), observation.is_some(), light_curve.is_some()]
+            .into_iter()
+            .filter(|is| *is)
+            .count()
+    }
+
     /// Tables that take the place of those of the fit.
     fn changes(&mut self) -> Table {
         let Self { hole, observer, region, effects, motion, polarization, .. } = self;

@@ -31,6 +31,9 @@ impl FitData {
             (Some(_), Some(_)) => {
                 refuse!("simulation and data exclude each other: give one of them")
             }
+            (None, Some(simulation)) if simulation.kinds() > 1 => refuse!(
+                "simulation.movie, simulation.observation and simulation.light_curve exclude each other: give one of them"
+            ),
             (None, None) => {
                 refuse!("there is neither a simulation nor data (to read): {SPOT}; or {FILE}")
             }

@@ -10,7 +10,7 @@ use kerrlight_vlbi::array::Array;
 use kerrlight_vlbi::earth::{Frame, Ut1};
 use kerrlight_vlbi::gains::GainTable;
 use kerrlight_vlbi::noise::{add_thermal_noise, apply_gains, apply_leakage};
-use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::observation::{Basis, Observation};
 use kerrlight_vlbi::polarimetry::LeakageTable;
 use kerrlight_vlbi::schedule::{self, Clock, Schedule, Setup};
 use kerrlight_vlbi::source::Source;
@@ -93,7 +93,7 @@ pub(super) fn spoil(
     Ok(Spoiled { gains, leakage })
 }
 
-/// Adds a part of each amplitude to its error in quadrature; to that of each product where all are fitted.
+/// Adds a part of the amplitude of Stokes I to its error in quadrature; of each product to its own where all are fitted.
 pub(super) fn add_systematic(
     name: &str,
     part: f64,
@@ -103,11 +103,20 @@ pub(super) fn add_systematic(
     if !(part >= 0.0 && part.is_finite()) {
         return Err(FitError::range(name, part, "0 or above").into());
     }
-    let products = if is_polarized(losses) { 4 } else { 1 };
+    let (basis, is_polarized) = (observation.basis, is_polarized(losses));
     for row in &mut observation.rows {
-        for (sigma, product) in row.noise_sigma.iter_mut().zip(row.products).take(products) {
-            *sigma = sigma.hypot(part * product.norm());
+        if is_polarized {
+            for (sigma, product) in row.noise_sigma.iter_mut().zip(row.products) {
+                *sigma = sigma.hypot(part * product.norm());
+            }
+            continue;
         }
+        let Some(i) = row.stokes_i(basis) else { continue };
+        // The mean of both hands has 1/√2 of the error of each.
+        let hands = if basis == Basis::Circular { 2 } else { 1 };
+        let hands: Vec<usize> = (0..hands).filter(|k| row.measured(*k).is_some()).collect();
+        let of_hand = part * i.visibility.norm() * (hands.len() as f64).sqrt();
+        hands.iter().for_each(|k| row.noise_sigma[*k] = row.noise_sigma[*k].hypot(of_hand));
     }
     Ok(())
 }
@@ -117,23 +126,26 @@ mod tests {
     use super::*;
     use crate::fit::settings::LossKind;
     use kerrlight_vlbi::Complex64;
-    use kerrlight_vlbi::observation::{Basis, Measured, Row};
+    use kerrlight_vlbi::observation::{Measured, Row};
 
-    /// 0.24 of 5 Jy and 0.5 Jy in quadrature are 1.3 Jy: of what is fitted.
+    /// 0.24 of 5 Jy and 0.5 Jy in quadrature are 1.3 Jy: of what is fitted, of Stokes I from both hands too.
     #[test]
     fn exact_systematic_errors() {
         let products = [Complex64::new(3.0, 4.0); 4];
         let i = Measured { visibility: products[0], noise_sigma: 0.5 };
         let row = Row::total_intensity(4.0, [0, 1], [1e9, 0.0], i);
-        let sigmas = |kind| {
-            let mut observation = Observation::empty(Basis::Circular);
-            observation.rows = vec![Row { products, noise_sigma: [0.5; 4], ..row }];
+        let added = |kind, basis, noise_sigma| {
+            let mut observation = Observation::empty(basis);
+            observation.rows = vec![Row { products, noise_sigma, ..row }];
             add_systematic("systematic", 0.24, &mut observation, &[Loss::new(kind)]).unwrap();
-            observation.rows[0].noise_sigma
+            observation.rows[0]
         };
-        let of_i = sigmas(LossKind::Visibilities);
-        assert!((of_i[0] - 1.3).abs() < 1e-14 && of_i[1..] == [0.5; 3], "{of_i:?}");
-        let of_all = sigmas(LossKind::PolarizedVisibilities);
+        let half = 0.5f64.sqrt();
+        for (basis, sigma) in [(Basis::Stokes, 0.5), (Basis::Circular, half)] {
+            let row = added(LossKind::Visibilities, basis, [sigma; 4]);
+            assert!((row.stokes_i(basis).unwrap().noise_sigma - 1.3).abs() < 1e-14, "{row:?}");
+        }
+        let of_all = added(LossKind::PolarizedVisibilities, Basis::Circular, [0.5; 4]).noise_sigma;
         assert!(of_all.iter().all(|sigma| (sigma - 1.3).abs() < 1e-14), "{of_all:?}");
     }
 }

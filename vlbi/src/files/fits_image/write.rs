@@ -36,9 +36,9 @@ fn unit(name: &str, image: &[f64], grid: ImageGrid, seen: &Observation, first: b
         let (ra, dec) = (15.0 * at.ra_hours, at.dec_deg);
         cards.number("CRVAL1", ra).number("CRVAL2", dec).number("OBSRA", ra).number("OBSDEC", dec);
     }
-    let frequency = seen.rows.first().and_then(|row| seen.frequency_of(row));
-    if let Some(hz) = frequency {
-        cards.number("FREQ", hz);
+    let hertz: Option<Vec<f64>> = seen.rows.iter().map(|row| seen.frequency_of(row)).collect();
+    if let Some(hertz) = hertz.filter(|hertz| !hertz.is_empty()) {
+        cards.number("FREQ", hertz.iter().sum::<f64>() / hertz.len() as f64);
     }
     if let Some(mjd) = seen.mjd {
         cards.number("MJD", mjd.into());

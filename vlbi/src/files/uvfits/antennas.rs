@@ -5,7 +5,11 @@ use super::super::{FileError, Names};
 use super::mounts::{self, Mount};
 use crate::array::{Station, check_position};
 use crate::polarimetry::published_rotation;
+use kerrlight_geodesic::vector::distance;
 use std::collections::HashMap;
+
+/// Places of one station in two subarrays are no farther apart, m.
+const SAME_PLACE_M: f64 = 1000.0;
 
 /// Stations of all subarrays; those of the same name count once.
 pub struct AntennaTables {
@@ -39,6 +43,18 @@ impl AntennaTables {
                 check_position(&station.name, station.position.unwrap_or_default())
                     .map_err(|error| fail(row, &error.to_string()))?;
                 remarks.extend(unknown_mount(&table, row, &station.name));
+                // A subarray may list it again, at the place where it stands.
+                let twice = names.known(&station.name).filter(|k| {
+                    let places = [&names.stations[usize::from(*k)], &station].map(|s| s.position);
+                    let is_here = numbers.iter().any(|((of, _), at)| *of == subarray && at == k);
+                    is_here || matches!(places, [Some(a), Some(b)] if distance(a, b) > SAME_PLACE_M)
+                });
+                if twice.is_some() {
+                    return Err(fail(
+                        row,
+                        &format!("{} is the name of two antennas", station.name),
+                    ));
+                }
                 let k = names.number(&station.name).map_err(|message| fail(row, &message))?;
                 names.stations[usize::from(k)] = station;
                 if numbers.insert((subarray, number as i64), k).is_some() {

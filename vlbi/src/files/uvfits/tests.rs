@@ -205,6 +205,21 @@ fn foreign() -> Vec<u8> {
     bytes
 }
 
+/// A name that two antennas share would make one station of them.
+#[test]
+fn exact_a_name_is_of_one_antenna() {
+    let mut renamed = write(&small()).unwrap();
+    let find = |bytes: &[u8], from: usize, name: &[u8]| {
+        from + bytes[from..].windows(name.len()).position(|window| window == name).unwrap()
+    };
+    let header = find(&renamed, 0, b"AIPS AN");
+    let names = find(&renamed, header, b"END     ");
+    let [first, second] = [b"AA", b"BB"].map(|name| find(&renamed, names, name));
+    renamed.copy_within(first..first + 2, second);
+    let error = read(&renamed).unwrap_err().to_string();
+    assert!(error.contains("row 2: AA is the name of two antennas"), "{error}");
+}
+
 #[test]
 fn exact_files_of_others() {
     let observation = read(&foreign()).unwrap();
