@@ -102,6 +102,7 @@ impl Convert {
             .try_for_each(|table| output.must_differ_from(table))?;
         self.check_numbers()?;
         let mut observation = interferometry::read(&self.input)?;
+        interferometry::note_cautions(&self.input.display().to_string(), &observation);
         self.complete(&mut observation)?;
         let flags = Flags {
             stations: self.flag_station.clone(),

@@ -208,6 +208,7 @@ fn visibilities<R>(
     let (name, all) = (path.display().to_string(), observation.rows.len());
     let without = all - observation.stokes_i().count();
     interferometry::warn_of_repeats(&name, &observation);
+    interferometry::note_cautions(&name, &observation);
     let measured = of(observation, &name)?;
     if without > 0 {
         eprintln!(

@@ -31,6 +31,14 @@ pub fn warn_of_repeats(name: &str, observation: &Observation) {
     }
 }
 
+/// Tells what a file says of its own calibration and errors.
+pub fn note_cautions(name: &str, observation: &Observation) {
+    let all: Vec<&str> = observation.cautions().collect();
+    if !all.is_empty() {
+        eprintln!("note: {name} says: {}", all.join("; "));
+    }
+}
+
 /// Formats in which visibilities are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Written {

@@ -197,6 +197,15 @@ impl Observation {
         row.stations.map(|k| self.stations[usize::from(k)].name.as_str())
     }
 
+    /// Lines of the history which say that the data are not calibrated, or have no errors or frequencies of their own.
+    pub fn cautions(&self) -> impl Iterator<Item = &str> {
+        let is_caution = |line: &&str| {
+            let starts = ["no weights:", "no AIPS FQ table:"];
+            line.ends_with("CAL: 0") || starts.iter().any(|start| line.starts_with(start))
+        };
+        self.history.iter().map(String::as_str).filter(is_caution)
+    }
+
     /// Rows of total intensity with their Stokes I.
     pub fn stokes_i(&self) -> impl Iterator<Item = (&Row, Measured)> {
         self.rows.iter().filter_map(|row| Some((row, row.stokes_i(self.basis)?)))

@@ -20,8 +20,9 @@ pub use advice::explained;
 use annotate::annotate;
 use anyhow::{Context, bail};
 pub use guess::{Guess, guess};
+use kerrlight_vlbi::array::Station;
 use kerrlight_vlbi::files;
-use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::observation::{Observation, Row};
 use movie::{of_movie, read_movie};
 use quick_look::QuickLook;
 use sources::{called, known};
@@ -82,7 +83,7 @@ fn head(path: &Path, plain: &str) -> String {
     )
 }
 
-/// The plain settings of one image of several files, for annotation: guessed from the first.
+/// The plain settings of one image of several files, for annotation.
 fn of_files(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Result<String> {
     let mut observations = Vec::new();
     for path in data {
@@ -104,19 +105,43 @@ fn of_files(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Resu
     };
     let paths = data.iter().map(|path| seen_from(toml, path).map(toml::Value::String));
     let paths = toml::Value::Array(paths.collect::<anyhow::Result<_>>()?).to_string();
-    let text = static_image::of_visibilities(first, source, name, &paths, &file(&data[0]))?;
-    let others = observations.iter().zip(data).skip(1);
-    let said: String = others
-        .map(|(seen, path)| {
-            let name = &called(seen, known(seen).as_ref());
-            format!(
-                "{}{}\n",
-                guess::READ,
-                visibilities::read(seen, &file(path), name, known(seen).is_some())
-            )
-        })
-        .collect();
-    Ok(text.replacen('\n', &format!("\n{said}"), 1))
+    // Leakage is solved for unless the names of all files say that it was taken out.
+    let raw = data.iter().map(file).min_by_key(|name| name.to_ascii_lowercase().contains("dterm"));
+    let all = together(&observations);
+    let text = static_image::of_visibilities(&all, source, name, &paths, &raw.unwrap_or_default())?;
+    let read = observations.iter().zip(data).map(|(seen, path)| {
+        let of = known(seen);
+        let said = visibilities::read(seen, &file(path), &called(seen, of.as_ref()), of.is_some());
+        format!("{}{said}\n", guess::READ)
+    });
+    // What its first line says of them all is told of each.
+    let rest = text.split_once('\n').map_or(&*text, |(_, rest)| rest);
+    Ok(read.collect::<String>() + rest)
+}
+
+/// Rows of all observations in one, for guesses alone: of total intensity, unless all are polarised and of one basis.
+fn together(all: &[Observation]) -> Observation {
+    let is_alike = all.iter().all(|seen| seen.is_polarized() && seen.basis == all[0].basis);
+    let part = |seen: &Observation| if is_alike { seen.clone() } else { seen.total_intensity() };
+    let mut union = Observation { rows: Vec::new(), channels: Vec::new(), ..part(&all[0]) };
+    for seen in all.iter().map(part) {
+        let place = |station: &Station| {
+            let known = union.stations.iter().position(|other| other.name == station.name);
+            known.unwrap_or_else(|| {
+                union.stations.push(station.clone());
+                union.stations.len() - 1
+            }) as u16
+        };
+        let places: Vec<u16> = seen.stations.iter().map(place).collect();
+        let days = seen.mjd.zip(union.mjd).map_or(0, |(day, first)| day - first);
+        union.rows.extend(seen.rows.iter().map(|row| Row {
+            time_h: row.time_h + 24.0 * f64::from(days),
+            stations: row.stations.map(|k| places[usize::from(k)]),
+            channel: 0,
+            ..*row
+        }));
+    }
+    union
 }
 
 /// The plain settings of a fit of this file, or of these of one image, for annotation.

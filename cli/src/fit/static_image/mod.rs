@@ -292,7 +292,7 @@ impl Found<'_> {
     /// The verdict and the ring in a line.
     fn worth(&self) -> String {
         let polarized = self.polarized.as_ref().map(Polarized::sentence);
-        let all = self.ring_sentence().into_iter().chain(polarized);
+        let all = self.unfinished().into_iter().chain(self.ring_sentence()).chain(polarized);
         self.judged.worth() + &all.map(|sentence| format!("\n{sentence}")).collect::<String>()
     }
 }

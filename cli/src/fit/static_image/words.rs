@@ -6,8 +6,8 @@ use super::polarized::Polarized;
 use crate::fit::closures;
 use crate::fit::results::medium;
 use crate::report::Part;
-use kerrlight_imaging::settings::{RingSettings, StartImage};
-use kerrlight_imaging::{Calibration, Envelope, Profile, ShapeFit, Survey, best_shape};
+use kerrlight_imaging::settings::{RingSettings, StartImage, StrengthSettings};
+use kerrlight_imaging::{Calibration, Candidate, Envelope, Profile, ShapeFit, Survey, best_shape};
 use kerrlight_tomo::fit::settings::LossKind;
 use kerrlight_tomo::fit::setup::told_end;
 
@@ -36,14 +36,9 @@ fn ring(survey: &Survey, shapes: &[ShapeFit], between: &RingSettings) -> String 
         false => format!(" {with} of {all} images that the data allow have one."),
     };
     format!(
-        "The image has a ring of {} µas, {} µas wide, {bright}.{others}{}",
+        "The image has a ring of {} µas, {} µas wide, {bright}.{others}",
         with_error(diameter.0, diameter.1, 1),
         with_error(width.0, width.1, 1),
-        match survey.found().solution.has_converged {
-            true => "",
-            false =>
-                " The optimiser did not come to a minimum (image.iterations): errors may be larger.",
-        }
     )
 }
 
@@ -187,20 +182,30 @@ impl Found<'_> {
                 self.survey.strength
             ));
         }
-        if !self.survey.held.is_empty() {
-            let tried = self.survey.held.iter().map(|held| held.value);
-            text.push(format!(
-                "The factor is the largest of {} that predicts frames which were not fitted as well as the best, within a standard error{}.",
-                self.survey.held.len(),
-                told_end(tried, self.survey.strength)
-            ));
-        }
+        text.extend(self.factor());
         match &self.gains {
             Some(gains) => text.extend(gains.sentences()),
             None => text.push("No gains are solved for.".to_owned()),
         }
         text.extend(self.polarized.iter().flat_map(Polarized::model));
         text
+    }
+
+    /// Describes how the factor on the penalties was chosen, where there is a list.
+    fn factor(&self) -> Option<String> {
+        let StrengthSettings { values, folds } = self.file.strength.as_ref()?;
+        if self.survey.held.is_empty() {
+            return Some(format!(
+                "Frames that were not fitted choose no factor: too few fits of {} came to a minimum, and the middle factor is taken.",
+                values.len() * folds
+            ));
+        }
+        let tried = self.survey.held.iter().map(|held| held.value);
+        Some(format!(
+            "The factor is the largest of {} that predicts frames which were not fitted as well as the best, within a standard error{}.",
+            self.survey.held.len(),
+            told_end(tried, self.survey.strength)
+        ))
     }
 
     fn errors(&self) -> Vec<String> {
@@ -227,6 +232,7 @@ impl Found<'_> {
 
     fn concluded(&self) -> Vec<String> {
         let mut text = vec![self.judged.headline()];
+        text.extend(self.unfinished());
         for (name, chi2) in &self.beside {
             text.push(format!("χ² {chi2:.2} per data point of {name}, which were not fitted."));
         }
@@ -234,6 +240,25 @@ impl Found<'_> {
         text.push(shapes_beside(&self.shapes));
         text.extend(self.polarized.as_ref().map(Polarized::sentence));
         text
+    }
+
+    /// Says so where the optimiser has come to no minimum.
+    pub fn unfinished(&self) -> Option<String> {
+        let stopped = |image: &&Candidate| !image.solution.has_converged;
+        let (draws, of) = (&self.survey.draws, self.file.image.iterations);
+        let count = draws.iter().filter(stopped).count();
+        if !self.survey.found().solution.has_converged {
+            return Some(format!(
+                "The optimiser did not come to a minimum in image.iterations = {of}: the image, its numbers and their errors \
+                 are unfinished."
+            ));
+        }
+        (count > 0).then(|| {
+            format!(
+                "{count} of {} draws did not come to a minimum in image.iterations = {of}: errors may be wrong.",
+                draws.len()
+            )
+        })
     }
 
     fn not_concluded(&self) -> Vec<String> {
@@ -254,12 +279,6 @@ impl Found<'_> {
             );
         }
         text.extend(self.polarized.iter().flat_map(Polarized::not_concluded));
-        if !self.survey.found().solution.has_converged {
-            text.push(
-                "That this is the minimum: where the optimiser ended the loss still has a slope (image.iterations)."
-                    .to_owned(),
-            );
-        }
         text
     }
 }
