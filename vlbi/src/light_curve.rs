@@ -48,7 +48,7 @@ const BY_CHANCE: f64 = 3.0;
 /// Baselines shorter than this many metres are within a site.
 const SITE_M: f64 = 10e3;
 /// The same in wavelengths, where no one tells where the stations are: 10 km at 1.3 mm.
-const SITE_WAVELENGTHS: f64 = 8e6;
+pub const SITE_WAVELENGTHS: f64 = 8e6;
 
 impl LightCurve {
     /// Returns the light curve of the baselines within a site (ALMA–APEX, JCMT–SMA) for a source that they do not resolve: the

@@ -6,14 +6,15 @@ use crate::paths;
 use anyhow::{Context, bail};
 use kerrlight_common::frames::Frames;
 use kerrlight_common::numpy;
+use kerrlight_common::units::{MICROARCSECOND, gravitational_time};
 use kerrlight_imaging::data as imaging;
 use kerrlight_imaging::settings::{StaticImageFile, StrengthSettings};
 use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::settings::{DataFiles, FitFile, Simulation};
-use kerrlight_tomo::fit::setup::{Drawn, FitData, Instrument};
+use kerrlight_tomo::fit::setup::{self, Drawn, FitData, Instrument};
 use kerrlight_validation::sky::{Screen, Sky};
 use kerrlight_vlbi::files;
-use kerrlight_vlbi::files::images::{WithSize, npy_frames, npz_frames};
+use kerrlight_vlbi::files::images::{OwnTimes, WithSize, npy_frames, npz_facts, npz_frames};
 use kerrlight_vlbi::light_curve::LightCurve;
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::simulate::Movie;
@@ -117,7 +118,12 @@ fn images(file: &FitFile, path: &Path) -> anyhow::Result<WithSize> {
     let name = || path.display().to_string();
     let kind = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     match kind.as_str() {
-        "npz" => npz_frames(output::read_through(path)?).with_context(name),
+        "npz" => {
+            let (field, times) =
+                npz_facts(BufReader::new(output::open(path)?)).with_context(name)?;
+            check_facts(file, path, field, &times)?;
+            npz_frames(output::read_through(path)?).with_context(name)
+        }
         // In Fortran order no image lies in one piece: such an array is read as a whole.
         "npy" if is_in_c_order(path)? => npy_frames(output::read_through(path)?).with_context(name),
         _ => {
@@ -165,15 +171,59 @@ fn one(file: &FitFile, path: &Path, [width, height]: [usize; 2]) -> anyhow::Resu
 
 /// The movie of a file, which may know its field.
 fn movie(file: &FitFile, path: &Path) -> anyhow::Result<Movie> {
-    // Only pixels and their number are used: any field serves where none is given.
-    let field = file.screen.field_uas.unwrap_or(1.0);
     let files = [path.to_owned()];
-    let (movie, _) = movie_files::read(&files, Some(field)).or_else(|first| {
-        // FITS files and pictures of kerrlight know their field; of all others the first error is the one.
-        let knows = path.extension().is_some_and(|e| e != "csv" && e != "npz" && e != "npy");
-        movie_files::read(&files, None).map_err(|second| if knows { second } else { first })
-    })?;
+    let (movie, times) = match movie_files::read(&files, None) {
+        Ok(known) => known,
+        Err(first) => {
+            // Only pixels and their number are used: any field serves where none is given. FITS files and texts of images
+            // have one: of these the first error is the one.
+            let field = file.screen.field_uas.unwrap_or(1.0);
+            let knows = path.extension().is_some_and(|e| e == "fits" || e == "fit");
+            let given = movie_files::read(&files, Some(field));
+            return Ok(given.map_err(|second| if knows { first } else { second })?.0.i);
+        }
+    };
+    let grid = movie.i.grid;
+    let field_uas = grid.pixel_rad * grid.width as f64 / MICROARCSECOND;
+    check_facts(file, path, Some(field_uas), &times)?;
     Ok(movie.i)
+}
+
+/// Fields and times of a file may differ from those of the fit by this part.
+const SAME: f64 = 0.01;
+
+/// Refuses images whose file tells another field on the sky, or other times, than the fit.
+fn check_facts(
+    file: &FitFile,
+    path: &Path,
+    field_uas: Option<f64>,
+    times: &OwnTimes,
+) -> anyhow::Result<()> {
+    let differ = |own: f64, fit: f64| (own - fit).abs() > SAME * own.abs().max(fit.abs());
+    let path = path.display();
+    if let (Some(own), Ok(sky)) = (field_uas, setup::sky(file)) {
+        let fit = sky.pixel_rad * sky.width as f64 / MICROARCSECOND;
+        if differ(own, fit) {
+            bail!(
+                "{path} says that its field is {own:.4} µas wide, and the fit's is {fit:.4} µas: screen.width at the mass and \
+                 the distance of the hole, or screen.field_uas"
+            );
+        }
+    }
+    let (OwnTimes::Utc(hours) | OwnTimes::Since(hours)) = times else { return Ok(()) };
+    let ([first, .., last], Some(mass), Some([from, to])) =
+        (&hours[..], file.hole.mass_msun, file.span_of_images())
+    else {
+        return Ok(());
+    };
+    let (own, fit) = (last - first, (to - from) * gravitational_time(mass) / 3600.0);
+    if differ(own, fit) {
+        bail!(
+            "{path} says that its images are over {own:.4} hours, and the fit's are over {fit:.4}: data.movie.from and to, M, \
+             at the mass of the hole"
+        );
+    }
+    Ok(())
 }
 
 /// The data of a static image, and those of its polarisation, where that is asked for.

@@ -91,7 +91,7 @@ fn product_counts(observation: &Observation) -> [(&'static str, usize); 4] {
         Basis::Circular => ["RR", "LL", "RL", "LR"],
         Basis::Stokes => ["I", "Q", "U", "V"],
     };
-    let count = |k: usize| observation.rows.iter().filter(|row| row.product(k).is_some()).count();
+    let count = |k: usize| observation.rows.iter().filter(|row| row.measured(k).is_some()).count();
     std::array::from_fn(|k| (names[k], count(k)))
 }
 

@@ -33,7 +33,8 @@ pub fn total_intensity(
         file.instrument.clone().map(|known| InstrumentSettings { leakage: None, ..known });
     let sky = file.image.grid()?;
     let measured = FitData::of_frames(sky, observation, &file.loss, instrument.as_ref())?;
-    Ok(FitData { has_intrinsic_variability: variability.is_some(), ..measured })
+    let average_s = file.data.visibilities.average_s;
+    Ok(FitData { average_s, has_intrinsic_variability: variability.is_some(), ..measured })
 }
 
 /// The data of the polarisation of a static image, with all products of the feeds; none if no polarisation is asked for.
@@ -61,7 +62,7 @@ pub fn polarized(
     let measured = FitData::of_frames(sky, observation, &losses, instrument.as_ref())?;
     let has_intrinsic_variability =
         data.variability.is_some() || polarization.variability.is_some();
-    Ok(Some(FitData { has_intrinsic_variability, ..measured }))
+    Ok(Some(FitData { average_s: data.average_s, has_intrinsic_variability, ..measured }))
 }
 
 fn reduction(file: &StaticImageFile, variability: Option<Variability>) -> Reduction {

@@ -132,8 +132,31 @@ pub fn npz_movie(bytes: &[u8]) -> std::result::Result<Pixels, Error> {
     let mut archive = Archive::open(bytes)?;
     let names = archive.names()?;
     let name = image_of(&names)?.to_owned();
+    let (field_uas, times) = facts(&mut archive, &names, &name)?;
+    let none = || NumpyError::content(format!("holds no {name}"));
+    let pixels = npy(&archive.member(&name)?.ok_or_else(none)?);
+    let pixels = pixels.map_err(|error| NumpyError::member(format!("{name}.npy"), error))?;
+    Ok(Pixels { times, field_uas, ..pixels })
+}
+
+/// Width of the field in µas and times of an archive, as [`npz_movie`] finds them, without its images.
+///
+/// # Errors
+/// As those of [`npz_movie`].
+pub fn npz_facts(file: impl Read + Seek) -> std::result::Result<(Option<f64>, OwnTimes), Error> {
+    let mut archive = Archive::of(file)?;
+    let names = archive.names()?;
+    let name = image_of(&names)?.to_owned();
+    facts(&mut archive, &names, &name)
+}
+
+fn facts<R: Read + Seek>(
+    archive: &mut Archive<R>,
+    names: &[String],
+    image: &str,
+) -> std::result::Result<(Option<f64>, OwnTimes), Error> {
     let mut member = |wanted: &str| -> std::result::Result<_, Error> {
-        if wanted == name || !names.iter().any(|name| name == wanted) {
+        if wanted == image || !names.iter().any(|name| name == wanted) {
             return Ok(None);
         }
         let bytes = archive.member(wanted)?;
@@ -151,11 +174,8 @@ pub fn npz_movie(bytes: &[u8]) -> std::result::Result<Pixels, Error> {
             return Err(NumpyError::content(message).into());
         }
     };
-    let none = || NumpyError::content(format!("holds no {name}"));
-    let pixels = npy(&archive.member(&name)?.ok_or_else(none)?);
-    let pixels = pixels.map_err(|error| NumpyError::member(format!("{name}.npy"), error))?;
     let times = times.map(OwnTimes::Utc).or(hours.map(OwnTimes::Since)).unwrap_or_default();
-    Ok(Pixels { times, field_uas, ..pixels })
+    Ok((field_uas, times))
 }
 
 /// Images with their width and height.

@@ -68,6 +68,16 @@ impl Intervals {
     }
 }
 
+impl Averaging {
+    /// The interval of the clock that a time (hours of UTC) is in: its middle, hours, and half of its length, seconds.
+    pub fn interval_at(&self, time_h: f64) -> (f64, f64) {
+        let seconds = self.seconds.max(SHORTEST_S);
+        let early = ROUNDING_S.min(0.5 * seconds);
+        let number = ((time_h * 3600.0 + early) / seconds).floor();
+        (((number + 0.5) * seconds - early) / 3600.0, 0.5 * seconds)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::{Basis, Measured};
@@ -85,6 +95,18 @@ mod tests {
         observation.rows =
             seconds.iter().flat_map(|t| [row(*t, [0, 1]), row(*t + 5.0, [0, 2])]).collect();
         observation
+    }
+
+    /// All times of an interval are nearer to its middle than its half length, and those of the next one are not.
+    #[test]
+    fn exact_intervals_hold_their_times() {
+        let averaging = Averaging::over(300.0);
+        let intervals = Intervals::of(&[], averaging);
+        for seconds in [3600.0, 3600.5, 3700.0, 3899.0, 3899.995, 3900.0, 3950.0, 4199.9] {
+            let (middle_h, half_s) = averaging.interval_at(seconds / 3600.0);
+            assert!((seconds - 3600.0 * middle_h).abs() <= half_s + 1e-9, "{seconds}");
+            assert_eq!(intervals.at(seconds / 3600.0), intervals.at(middle_h), "{seconds}");
+        }
     }
 
     #[test]

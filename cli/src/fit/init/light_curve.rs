@@ -99,7 +99,14 @@ pub fn of_light_curve(
             }
             .to_owned(),
         ),
-        ("background", if polarized { background(scatter) } else { String::new() }),
+        (
+            "background",
+            if polarized {
+                background(scatter / (fitted.parameters.len() as f64).sqrt())
+            } else {
+                String::new()
+            },
+        ),
         ("stokes", format!("[{}]", names.join(", "))),
         ("upper", "10.0".to_owned()),
         ("angles", format!("[{}]", if polarized { turned.join(", ") } else { "0.0".to_owned() })),
@@ -115,7 +122,7 @@ fn mass(source: Option<&Source>) -> String {
     }
 }
 
-/// Backgrounds about as bright as what varies in the data, Jy.
+/// Backgrounds about as bright as what varies in each of Q and U of the data, Jy.
 fn background(scatter: f64) -> String {
     let constant = digits(scatter);
     let variations = [0.2, 0.5, 1.0].map(|part| digits(part * scatter)).join(", ");

@@ -7,8 +7,10 @@ use kerrlight_common::units::{gravitational_angle, gravitational_time};
 use kerrlight_tomo::fit::setup;
 use kerrlight_vlbi::data_terms::ClosureTerm;
 use kerrlight_vlbi::gains::prior_table;
+use kerrlight_vlbi::light_curve::SITE_WAVELENGTHS;
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::products::ClosureKind;
+use std::collections::BTreeSet;
 
 pub fn of_visibilities(
     observation: &Observation,
@@ -96,6 +98,8 @@ pub fn gains(observation: &Observation) -> String {
 /// Describes the file, in a line.
 pub fn read(observation: &Observation, file: &str, name: &str, is_known: bool) -> String {
     let rows: Vec<f64> = observation.stokes_i().map(|(row, _)| row.time_h).collect();
+    let stations: BTreeSet<u16> =
+        observation.stokes_i().flat_map(|(row, _)| row.stations).collect();
     let [first, last] = rows
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], time| [a.min(*time), b.max(*time)]);
@@ -106,7 +110,7 @@ pub fn read(observation: &Observation, file: &str, name: &str, is_known: bool) -
         observation.frequency_hz.map_or(String::new(), |hz| format!(" at {:.1} GHz", hz * 1e-9));
     format!(
         "{file}: {source}{day}, {first:.2} h to {last:.2} h UTC, {} stations, {} visibilities of Stokes I{frequency}",
-        observation.stations.len(),
+        stations.len(),
         rows.len()
     )
 }
@@ -119,7 +123,7 @@ fn unfitted(observation: &Observation) -> &'static str {
     }
 }
 
-/// Median amplitude of the shortest tenth of the baselines, Jy.
+/// Median amplitude of the baselines within a site, or else of those nearly as short as the shortest, Jy.
 pub fn short_baselines(observation: &Observation) -> anyhow::Result<f64> {
     let mut all: Vec<[f64; 2]> = observation
         .rows
@@ -130,9 +134,9 @@ pub fn short_baselines(observation: &Observation) -> anyhow::Result<f64> {
         })
         .filter(|pair| pair.iter().all(|x| x.is_finite()))
         .collect();
-    all.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    // The shortest resolve least; the median of a tenth does not hang on a single datum.
-    all.truncate(all.len().div_ceil(10));
+    // The shortest resolve least; their median does not hang on a single datum.
+    let shortest = all.iter().fold(f64::INFINITY, |least, [length, _]| least.min(*length));
+    all.retain(|[length, _]| *length <= SITE_WAVELENGTHS.max(1.5 * shortest));
     all.sort_by(|a, b| a[1].total_cmp(&b[1]));
     match all.get(all.len() / 2) {
         Some([_, flux]) if *flux > 0.0 => Ok(*flux),

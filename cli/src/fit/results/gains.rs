@@ -12,7 +12,7 @@ use kerrlight_tomo::fit::setup::FitData;
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::gains::{GainDistance, GainTable, StationGain};
-use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::observation::{Averaging, Observation};
 use serde::Serialize;
 
 /// The table of all gains.
@@ -174,7 +174,14 @@ impl Gains {
     fn written(table: GainTable, measured: &FitData, folder: &Folder) -> anyhow::Result<Self> {
         write_by_file(TABLE, measured, folder, |own_name| {
             let gains = table.gains.iter().filter_map(|gain| {
-                Some(StationGain { station: own_name(&gain.station)?, ..gain.clone() })
+                let gain = StationGain { station: own_name(&gain.station)?, ..gain.clone() };
+                if measured.average_s == 0.0 {
+                    return Some(gain);
+                }
+                // Rows that were averaged are told by the interval, not by its mean time.
+                let averaging = Averaging::over(measured.average_s);
+                let (time_h, span_s) = averaging.interval_at(gain.time_h);
+                Some(StationGain { time_h, span_s, ..gain })
             });
             files::gains_to_csv(&GainTable { gains: gains.collect() })
         })?;

@@ -196,6 +196,6 @@ fn worst_parts(judged: &DataVerdict, tested: &Tested) -> String {
     let group = worst(statistics.groups.iter())
         .map(|(stations, _, chi2)| format!("{} {}", judged.names(stations), short(chi2)));
     let frame = worst(statistics.frames.iter().enumerate())
-        .map(|(frame, _, chi2)| format!("frame {} {}", frame + 1, short(chi2)));
+        .map(|(frame, _, chi2)| format!("frame {frame} {}", short(chi2)));
     [station, group, frame].into_iter().flatten().collect::<Vec<_>>().join(", ")
 }

@@ -152,7 +152,7 @@ impl<'a> Kept<'a> {
         let objective = &fit.trainer.objective;
         let (model, names) = (&objective.model, objective.names().join(", "));
         let dark = match objective.observed().len() {
-            seen if seen < model.frames() => format!(" ({seen} of them with data)"),
+            seen if seen < model.frames() => format!(" ({seen} of them fitted)"),
             _ => String::new(),
         };
         format!(

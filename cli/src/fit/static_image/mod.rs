@@ -200,7 +200,9 @@ fn searched(
                 Stage::Strengths => "other strengths",
                 Stage::Draws => "draws of noise",
             });
-            bar.set_position(done.fetch_add(solved as u64, Ordering::Relaxed) + 1);
+            let solved = done.fetch_add(solved as u64, Ordering::Relaxed) + solved as u64;
+            bar.set_length(solved.max(all as u64));
+            bar.set_position(solved);
             session::reached(&bar);
         }
         !keeper.stopped()

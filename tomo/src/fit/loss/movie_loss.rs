@@ -49,8 +49,10 @@ impl<T: Float> Objective<T> {
     pub fn loss_of(&self, frames: &[usize], movie: &Frames<T>) -> Result<Loss, Error> {
         let mut none = vec![T::zero(); self.model.pixels()];
         let mut loss = Loss::default();
+        let observed = self.observed();
+        let count = frames.iter().filter(|frame| observed.binary_search(frame).is_ok()).count();
         for (term, weight) in self.terms() {
-            let scale = 1.0 / self.data_of(term, frames.len());
+            let scale = 1.0 / self.data_of(term, count);
             let mut chi2 = 0.0;
             for (frame, image) in frames.iter().zip(movie.images()) {
                 // χ² does not depend on the weight; 0 adds no gradient.

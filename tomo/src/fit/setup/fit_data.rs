@@ -21,6 +21,8 @@ pub struct FitData {
     pub movie: Option<Frames<f64>>,
     /// Visibilities, with the frame of each row.
     pub visibilities: Option<(Observation, Vec<usize>)>,
+    /// Length of the averages over time that visibilities are, s; 0 where each time is a frame.
+    pub average_s: f64,
     /// True if errors of visibilities are those of a source that varies: common to many data, so that χ² may be small.
     pub has_intrinsic_variability: bool,
     /// The light curve of an unresolved source.
@@ -48,6 +50,7 @@ impl FitData {
             files: Vec::new(),
             movie: None,
             visibilities: None,
+            average_s: 0.0,
             has_intrinsic_variability: false,
             curve: None,
             sky: None,

@@ -87,7 +87,8 @@ impl FitData {
         let first = all.times[0];
         all.times.iter_mut().for_each(|time| *time = first_time + (*time - first) / per_m);
         let pulse = file.screen.pulse.unwrap_or(PixelShape::Delta).pulse();
-        Ok(FitData { has_intrinsic_variability: variability.is_some(), pulse, ..all })
+        let has_intrinsic_variability = variability.is_some();
+        Ok(FitData { average_s, has_intrinsic_variability, pulse, ..all })
     }
 
     /// Visibilities of a sky as they are, with the gains and the leakage that a fit solves for. Times of frames are hours of

@@ -24,17 +24,22 @@ impl BandResults {
                 "The inclination is between {:.1}° and {:.1}° at 95 %, with a median of {:.1}°{truth}.",
                 inclination.low, inclination.high, inclination.median
             ),
-            orbit(self.emission_radius, self.period_min.interval, &self.radii),
+            orbit([self.emission_radius, self.radius.interval, self.period_min.interval], &self.radii),
             format!("At the reference time {}.", place_of(self.azimuth_deg)),
         ]);
         let factors = &self.rotation_factor.probabilities;
         // Of all geometries together: that of the best one alone may be improbable.
         let likeliest = factors.iter().max_by(|a, b| a[1].total_cmp(&b[1]));
-        if let Some([factor, _]) = likeliest.filter(|_| factors.len() > 1) {
-            all.push(format!(
-                "Most probably it turns {factor:.2} times as fast as the law of motion says, in the law's sense with a probability of {:.3}.",
-                self.forward()
-            ));
+        if let Some([factor, probability]) = likeliest.filter(|_| factors.len() > 1) {
+            let sense = self.forward();
+            all.push(match *probability {
+                p if p < TOLD => format!(
+                    "The data do not tell how it turns: {factor:.2} times as fast as the law of motion says has a probability of {p:.3}, the law's sense one of {sense:.3}."
+                ),
+                _ => format!(
+                    "Most probably it turns {factor:.2} times as fast as the law of motion says, in the law's sense with a probability of {sense:.3}."
+                ),
+            });
             all.extend(self.clockwise.map(|clockwise| {
                 format!(
                     "On the sky it turns clockwise with a probability of {clockwise:.3}, anticlockwise with {:.3}.",
@@ -72,6 +77,9 @@ fn flare(ln: f64) -> String {
 /// ln of 20, above which a Bayes factor is called strong (Kass & Raftery 1995).
 const SEEN: f64 = 3.0;
 
+/// Probability from which on one of several velocities is called the most probable.
+const TOLD: f64 = 0.6;
+
 /// Width from which on an interval of azimuths is the whole circle, degrees: 95 % of it.
 const ROUND: f64 = 0.95 * 360.0 - 5.0;
 
@@ -90,24 +98,26 @@ fn place_of(Interval { median, low, high }: Interval) -> String {
 /// Part of the radii that were asked for: a 95 % interval that is wider says no more than the prior.
 const OPEN: f64 = 0.75;
 
-/// Radius (M) and period (minutes) of an orbit, each as median and interval; a radius that may be almost any of those that were asked for
-/// is not constrained, nor is the period.
-fn orbit(
-    Interval { median: radius, low, high: outer }: Interval,
-    Interval { median: period, low: short, high: long }: Interval,
-    asked: &[[f64; 2]],
-) -> String {
-    let inner = low.max(0.0);
+/// Distance of the light from the axis (M), radius (M) and period (minutes) of the band that it is part of, each as median and
+/// interval; a radius that may be almost any of those that were asked for is not constrained, nor is the period.
+fn orbit([light, band, period]: [Interval; 3], asked: &[[f64; 2]]) -> String {
     let (Some([first, _]), Some([last, _])) = (asked.first(), asked.last()) else {
         return String::new();
     };
-    if outer - inner > OPEN * (last - first) && asked.len() > 1 {
-        return format!(
-            "Radius and period of the orbit are not constrained: {inner:.1} to {outer:.1} M and {short:.0} to {long:.0} minutes at 95 %."
-        );
+    let of_band = format!(
+        "{:.1} to {:.1} M and {:.0} to {:.0} minutes at 95 %",
+        band.low, band.high, period.low, period.high
+    );
+    if band.high - band.low > OPEN * (last - first) && asked.len() > 1 {
+        return format!("Radius and period of the orbit are not constrained: {of_band}.");
     }
     format!(
-        "The flare orbits at {radius:.1} M ({inner:.1} to {outer:.1} at 95 %), with a period of {period:.0} minutes ({short:.0} to {long:.0})."
+        "The flare orbits at {:.1} M ({:.1} to {:.1} at 95 %), in a band with a radius of {:.1} M and a period of {:.0} minutes ({of_band}).",
+        light.median,
+        light.low.max(0.0),
+        light.high,
+        band.median,
+        period.median
     )
 }
 
@@ -130,10 +140,14 @@ mod tests {
     #[test]
     fn exact_a_radius_as_wide_as_its_prior_is_not_constrained() {
         let asked: Vec<[f64; 2]> = (0..=20).map(|k| [4.0 + f64::from(k), 0.0]).collect();
-        let open = orbit(interval([11.0, 0.0, 22.0]), interval([60.0, 20.0, 150.0]), &asked);
-        assert!(open.contains("not constrained: 0.0 to 22.0 M and 20 to 150 minutes"), "{open}");
-        let known = orbit(interval([11.0, 9.0, 13.0]), interval([60.0, 50.0, 70.0]), &asked);
-        assert!(known.starts_with("The flare orbits at 11.0 M (9.0 to 13.0 at 95 %), with"));
+        let all = |low: f64, high: f64| {
+            [[11.0, low - 1.0, high + 2.0], [11.0, low, high], [60.0, 20.0, 150.0]].map(interval)
+        };
+        let open = orbit(all(4.0, 22.0), &asked);
+        assert!(open.contains("not constrained: 4.0 to 22.0 M and 20 to 150 minutes"), "{open}");
+        let known = orbit(all(9.0, 13.0), &asked);
+        assert!(known.starts_with("The flare orbits at 11.0 M (8.0 to 15.0 at 95 %), in a band"));
+        assert!(known.contains("60 minutes (9.0 to 13.0 M and 20 to 150 minutes"), "{known}");
     }
 
     #[test]
