@@ -67,6 +67,13 @@ impl Answer {
         Self::text(format!("{worth}\n{look_at}\n"))
     }
 
+    /// Files that were written, a line each, without standard output.
+    pub fn written<'a>(outputs: impl IntoIterator<Item = &'a Output>) -> Self {
+        let files = written(outputs);
+        let text: String = files.iter().map(|file| format!("{}\n", file.display())).collect();
+        Self::text(text).files(files)
+    }
+
     /// A table that goes to standard output itself.
     pub fn table(name: &'static str, groups: Vec<Vec<Column>>, rows: usize) -> Self {
         Answer { text: Body::Table { name, groups, rows }, ..Self::default() }

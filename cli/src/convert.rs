@@ -22,7 +22,7 @@ pub struct Convert {
     input: PathBuf,
     /// Output file; the name's ending tells the format, `-` is CSV on standard output
     #[arg(value_name = "OUTPUT.uvfits|.txt|.csv")]
-    output: PathBuf,
+    pub output: PathBuf,
     /// Write the light curve that baselines within a site (ALMA-APEX, JCMT-SMA) have measured: I, Q, U, V as CSV
     #[arg(long, conflicts_with_all = ["format", "stokes_i"])]
     light_curve: bool,
@@ -94,12 +94,9 @@ impl Convert {
 
     /// Converts.
     pub fn run(&self) -> anyhow::Result<Answer> {
-        let output = ObservationFile::new(&self.output, self.format, self.comments)?;
-        output.must_differ_from(&self.input)?;
-        self.gains
-            .iter()
-            .chain(&self.leakage)
-            .try_for_each(|table| output.must_differ_from(table))?;
+        let file = ObservationFile::new(&self.output, self.format, self.comments)?;
+        let mut inputs = std::iter::once(&self.input).chain(&self.gains).chain(&self.leakage);
+        inputs.try_for_each(|input| file.output.must_differ_from(input))?;
         self.check_numbers()?;
         let mut observation = interferometry::read(&self.input)?;
         interferometry::note_cautions(&self.input.display().to_string(), &observation);
@@ -139,8 +136,8 @@ impl Convert {
         if self.light_curve {
             return self.write_light_curve(&observation);
         }
-        output.warn_of_polarization(&observation, &self.input.display().to_string());
-        let rows = output.rows_of(&observation);
+        file.warn_of_polarization(&observation, &self.input.display().to_string());
+        let rows = file.rows_of(&observation);
         if rows == 0 {
             bail!(
                 "{}: no Stokes I, the only one that {} holds",
@@ -148,13 +145,13 @@ impl Convert {
                 self.output.display()
             );
         }
-        output.write(&observation).map_err(told)?;
+        file.write(&observation).map_err(told)?;
         let without = match observation.rows.len() - rows {
             0 => String::new(),
             count => format!(", {count} without Stokes I left out"),
         };
         eprintln!("{rows} rows, {flagged} flagged{without}");
-        Ok(output.answer().with("rows", rows).with("flagged", flagged))
+        Ok(Answer::written([&file.output]).with("rows", rows).with("flagged", flagged))
     }
 
     /// Takes the gains of a table out.
@@ -209,12 +206,7 @@ impl Convert {
         output.write((comments + &files::light_curve_to_csv(&curve)).as_bytes())?;
         let count = curve.samples.len();
         eprintln!("{count} samples");
-        Ok(interferometry::written(&output).with("samples", count))
-    }
-
-    /// Returns whether standard output carries the visibilities.
-    pub fn pipes(&self) -> bool {
-        output::is_pipe(&self.output)
+        Ok(Answer::written([&output]).with("samples", count))
     }
 
     /// Refuses hours over midnight that no clock shows; tells of intervals without visibilities.

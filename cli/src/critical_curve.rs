@@ -2,7 +2,7 @@
 
 use crate::answer::Answer;
 use crate::columns::{self, Column};
-use crate::output::{self, Output};
+use crate::output::Output;
 use anyhow::Context;
 use clap::Args;
 use kerrlight_geodesic::analytic::{CriticalCurve, CriticalPoint};
@@ -24,7 +24,7 @@ pub struct CriticalCurveTable {
     points: u32,
     /// Output table; `-` is standard output [default: -]
     #[arg(short, long, value_name = "FILE.csv")]
-    output: Option<PathBuf>,
+    pub output: Option<PathBuf>,
 }
 
 impl CriticalCurveTable {
@@ -54,10 +54,5 @@ impl CriticalCurveTable {
         };
         output.write(&columns::csv(&[table], points.len())?)?;
         Ok(Answer::default().with("count", points.len()).outputs([&output]))
-    }
-
-    /// Returns whether standard output carries the table because `-o -` says so.
-    pub fn pipes(&self) -> bool {
-        self.output.as_deref().is_some_and(output::is_pipe)
     }
 }

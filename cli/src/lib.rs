@@ -219,15 +219,16 @@ fn run(arguments: &Arguments, program: &Program) -> anyhow::Result<()> {
 impl Verb {
     /// Returns whether standard output carries a file, because a path is `-`.
     fn pipes(&self) -> bool {
-        match self {
-            Verb::Render(render) => render.pipes(),
-            Verb::Trace(trace) => trace.pipes(),
-            Verb::CriticalCurve(table) => table.pipes(),
-            Verb::Observe(observe) => observe.pipes(),
-            Verb::Uv(uv) => uv.pipes(),
-            Verb::Convert(convert) => convert.pipes(),
-            _ => false,
-        }
+        let outputs = match self {
+            Verb::Render(of) => [of.output.as_ref(), of.preview.as_ref()],
+            Verb::Trace(of) => [of.output.as_ref(), None],
+            Verb::CriticalCurve(of) => [of.output.as_ref(), None],
+            Verb::Observe(of) => [Some(&of.output), None],
+            Verb::Uv(of) => [of.output.as_ref(), None],
+            Verb::Convert(of) => [Some(&of.output), None],
+            _ => [None, None],
+        };
+        outputs.into_iter().flatten().any(|path| output::is_pipe(path))
     }
 
     fn run(&self, arguments: &Arguments, program: &Program) -> anyhow::Result<Answer> {

@@ -5,7 +5,6 @@ use crate::assets::Reach;
 use crate::interferometry::arguments::{self, Observing};
 use crate::interferometry::movie_files::{self, FrameTimes};
 use crate::interferometry::{ObservationFile, scene_movie};
-use crate::output;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use kerrlight_common::toml_file::shown;
@@ -79,7 +78,7 @@ pub struct Observe {
     comments: bool,
     /// Output visibilities; the name's ending tells the format, `-` is CSV on standard output
     #[arg(short, long, value_name = "FILE.uvfits|.txt|.csv")]
-    output: PathBuf,
+    pub output: PathBuf,
 }
 
 /// Bound of the fast transform's errors as a part of the flux.
@@ -96,14 +95,14 @@ enum Noise {
 impl Observe {
     /// Observes.
     pub fn run(&self) -> anyhow::Result<Answer> {
-        let output = ObservationFile::new(&self.output, None, self.comments)?;
+        let file = ObservationFile::new(&self.output, None, self.comments)?;
         let files = self.files()?;
-        files.iter().try_for_each(|file| output.must_differ_from(file))?;
+        files.iter().try_for_each(|input| file.output.must_differ_from(input))?;
         if let Some(FrameTimes::File(path)) = &self.frame_times {
-            output.must_differ_from(path)?;
+            file.output.must_differ_from(path)?;
         }
         // The name of a built-in array is no file and differs from every output.
-        output.must_differ_from(self.array.as_ref())?;
+        file.output.must_differ_from(self.array.as_ref())?;
         let seed = self.seed()?;
         let array = arguments::array_of(&self.array)?;
         let (schedule, setup) = (self.observing.schedule()?, self.observing.setup()?);
@@ -122,16 +121,12 @@ impl Observe {
         let transform = fill.with_context(|| self.shown())?;
         self.corruptions().apply(&mut observation, seed)?;
         observation.history = self.history(said, transform);
-        output.warn_of_polarization(&observation, &self.shown());
-        output.write(&observation)?;
+        file.warn_of_polarization(&observation, &self.shown());
+        file.write(&observation)?;
         let count = observation.rows.len();
         eprintln!("{count} visibilities; {}", observation.history.join("; "));
-        Ok(output.answer().with("visibilities", count).with("history", observation.history))
-    }
-
-    /// Returns whether standard output carries the visibilities.
-    pub fn pipes(&self) -> bool {
-        output::is_pipe(&self.output)
+        let answer = Answer::written([&file.output]).with("visibilities", count);
+        Ok(answer.with("history", observation.history))
     }
 
     /// All files of the input.

@@ -58,7 +58,7 @@ pub struct Trace {
     errors: bool,
     /// Output table, as .csv or .npz; `-` is CSV on standard output [default: -]
     #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    pub output: Option<PathBuf>,
 }
 
 /// The names of all integrators, as an argument.
@@ -142,11 +142,6 @@ impl Trace {
         output.write(&bytes)?;
         let answer = Answer::default().with("count", rows).outputs([&output]);
         Ok(answer.with("integrator", self.integrator.name()).with("tolerance", self.tolerance))
-    }
-
-    /// Returns whether standard output carries the table because `-o -` says so.
-    pub fn pipes(&self) -> bool {
-        self.output.as_deref().is_some_and(output::is_pipe)
     }
 
     /// Pieces of a ray on which its samples lie: one that turns round passes between two radii twice.

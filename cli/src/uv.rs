@@ -1,10 +1,10 @@
 //! `kerrlight uv`: which Fourier components an array measures.
 
-use crate::answer::{self, Answer};
+use crate::answer::Answer;
 use crate::columns::{self, Column};
 use crate::interferometry::arguments::{self, Observing};
 use crate::interferometry::plots::{self, PlotFile};
-use crate::output::{self, Output};
+use crate::output::Output;
 use clap::Args;
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::schedule;
@@ -19,7 +19,7 @@ pub struct Uv {
     observing: Observing,
     /// Output table; `-` is standard output [default, without --plot: -]
     #[arg(short, long, value_name = "FILE.csv")]
-    output: Option<PathBuf>,
+    pub output: Option<PathBuf>,
     /// Output picture, coloured by time
     #[arg(long, value_name = "FILE.png|.svg")]
     plot: Option<PathBuf>,
@@ -45,19 +45,11 @@ impl Uv {
         }
         eprintln!("{count} points; {}", self.observing.history(&self.array).join("; "));
         let outputs = output.iter().chain(plot.as_ref().map(|plot| &plot.output));
-        let files = answer::written(outputs);
-        let answer = match files[..] {
-            [] if !self.pipes() => Answer::table("points", table, count),
-            _ => {
-                Answer::text(files.iter().map(|f| format!("{}\n", f.display())).collect::<String>())
-            }
+        let answer = match (&output, &plot) {
+            (None, None) => Answer::table("points", table, count).outputs(outputs),
+            _ => Answer::written(outputs),
         };
-        Ok(answer.with("count", count).files(files))
-    }
-
-    /// Returns whether standard output carries the table because `-o -` says so.
-    pub fn pipes(&self) -> bool {
-        self.output.as_deref().is_some_and(output::is_pipe)
+        Ok(answer.with("count", count))
     }
 }
 

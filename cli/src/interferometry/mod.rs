@@ -6,7 +6,6 @@ pub mod movie_files;
 pub mod plots;
 pub mod scene_movie;
 
-use crate::answer::{self, Answer};
 use crate::output::{self, Output};
 use anyhow::{Context, bail};
 use clap::ValueEnum;
@@ -78,7 +77,7 @@ impl Written {
 
 /// A file of visibilities to be written.
 pub struct ObservationFile {
-    output: Output,
+    pub output: Output,
     format: Written,
     comments: bool,
 }
@@ -120,11 +119,6 @@ impl ObservationFile {
         }
     }
 
-    /// Refuses to take the place of a file that is read.
-    pub fn must_differ_from(&self, input: &Path) -> anyhow::Result<()> {
-        self.output.must_differ_from(input)
-    }
-
     /// Writes.
     pub fn write(&self, observation: &Observation) -> anyhow::Result<()> {
         let text = |text: String| text.into_bytes();
@@ -138,16 +132,4 @@ impl ObservationFile {
         let shown = self.output.shown().display();
         self.output.write(&bytes.with_context(|| format!("cannot write {shown}"))?)
     }
-
-    /// Describes the file once it is written.
-    pub fn answer(&self) -> Answer {
-        written(&self.output)
-    }
-}
-
-/// Describes a table that was written.
-pub fn written(output: &Output) -> Answer {
-    let files = answer::written([output]);
-    let text: String = files.iter().map(|file| format!("{}\n", file.display())).collect();
-    Answer::text(text).files(files)
 }

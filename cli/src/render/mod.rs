@@ -11,7 +11,7 @@ mod work;
 use crate::answer::{self, Answer};
 use crate::assets::{self, Reach};
 use crate::devices::{self, DeviceOption};
-use crate::output::{self, Output};
+use crate::output::Output;
 use anyhow::Context;
 use clap::Args;
 use exr_options::ExrOptions;
@@ -36,10 +36,10 @@ pub struct Render {
     /// Output EXR, `-` for standard output [default, without --preview either: EXR and PNG in the current folder,
     /// named after the scene]
     #[arg(short, long, value_name = "FILE.exr")]
-    output: Option<PathBuf>,
+    pub output: Option<PathBuf>,
     /// Output tone-mapped PNG, `-` for standard output
     #[arg(long, value_name = "FILE.png")]
-    preview: Option<PathBuf>,
+    pub preview: Option<PathBuf>,
     /// Change a value of the scene, e.g. hole.spin=0.5 or spot.0.phase_deg=90
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     overrides: Vec<String>,
@@ -130,12 +130,6 @@ impl Render {
             exr.differs(png.shown())?;
         }
         Ok(outputs)
-    }
-
-    /// Returns whether standard output carries one of the files.
-    pub fn pipes(&self) -> bool {
-        let all = [&self.output, &self.preview];
-        all.into_iter().flatten().any(|path| output::is_pipe(path))
     }
 
     /// Returns the reduction that keeps the channels of the PNG, if there is one.
