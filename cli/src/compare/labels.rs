@@ -154,19 +154,21 @@ pub fn result(results: &Value, value: &str) -> Option<f64> {
     results[value].as_f64().filter(|x| x.is_finite())
 }
 
-/// Every combination of levels of some factors, in the order of the experiment.
-pub fn combinations<'e>(levels: &'e [(String, Vec<String>)]) -> Vec<Vec<(&'e str, &'e str)>> {
-    levels.iter().fold(vec![Vec::new()], |all, (factor, levels)| {
-        let with = |before: &Vec<(&'e str, &'e str)>| -> Vec<Vec<(&'e str, &'e str)>> {
-            let one = |level: &'e String| {
-                let mut next = before.clone();
-                next.push((factor.as_str(), level.as_str()));
-                next
-            };
-            levels.iter().map(one).collect()
+/// Every combination of one of each, the last fastest.
+pub fn product<T: Clone>(each: impl Iterator<Item = Vec<T>>) -> Vec<Vec<T>> {
+    each.fold(vec![Vec::new()], |all, choices| {
+        let with = |before: &Vec<T>| -> Vec<Vec<T>> {
+            choices.iter().map(|one| [before.as_slice(), &[one.clone()]].concat()).collect()
         };
         all.iter().flat_map(with).collect()
     })
+}
+
+/// Every combination of levels of some factors, in the order of the experiment.
+pub fn combinations(levels: &[(String, Vec<String>)]) -> Vec<Vec<(&str, &str)>> {
+    product(levels.iter().map(|(factor, levels)| {
+        levels.iter().map(|level| (factor.as_str(), level.as_str())).collect()
+    }))
 }
 
 /// Returns the name of a combination: levels, with the factor's name before a number.

@@ -2,6 +2,7 @@
 //! the memory, and to check each of them would take minutes.
 
 use super::experiment::{Experiment, Factor, Level};
+use super::labels::product;
 use super::source::Source;
 use anyhow::{anyhow, bail};
 use clap::Args;
@@ -67,6 +68,7 @@ pub struct Recipe {
 }
 
 /// A combination of levels. Its cases differ in their seeds alone: their settings are right or wrong together.
+#[derive(Default)]
 pub struct Variant {
     /// The level of each factor, by number.
     pub chosen: Box<[u32]>,
@@ -102,40 +104,25 @@ impl Recipe {
         let mut levels: Vec<Vec<Level>> = experiment.factor.iter().map(Factor::levels).collect();
         levels.iter_mut().flatten().for_each(|level| level.set = source.anchored(&level.set));
         let words = levels.iter().map(|all| all.iter().map(|level| plain(&level.name)).collect());
-        let mut recipe = Recipe {
+        let mut seen: HashSet<(usize, u32)> = HashSet::new();
+        let variant = |chosen: Vec<u32>| {
+            let levels = chosen.iter().copied().enumerate();
+            // `count` and not `any`, which would stop before all levels are marked as seen.
+            let is_new = levels.filter(|level| seen.insert(*level)).count() > 0;
+            Variant { chosen: chosen.into(), is_new, ..Variant::default() }
+        };
+        let all = product(levels.iter().map(|of| (0..of.len() as u32).collect()));
+        let wanted =
+            all.into_iter().filter(|chosen| is_wanted(&experiment, &levels, chosen, &kept));
+        Ok(Recipe {
             words: words.collect(),
             source: source.clone(),
             choice: choice.clone(),
-            variants: combinations(&levels).into_iter().map(Variant::new).collect(),
+            variants: wanted.map(variant).collect(),
             levels,
             experiment,
             fits: Mutex::default(),
-        };
-        let mut variants = std::mem::take(&mut recipe.variants);
-        let mut seen: HashSet<(usize, u32)> = HashSet::new();
-        variants.retain_mut(|variant| {
-            let is_wanted = recipe.is_wanted(&variant.chosen, &kept);
-            let levels = variant.chosen.iter().copied().enumerate();
-            // `count` and not `any`, which would stop before all levels are marked as seen.
-            variant.is_new = is_wanted && levels.filter(|level| seen.insert(*level)).count() > 0;
-            is_wanted
-        });
-        recipe.variants = variants;
-        Ok(recipe)
-    }
-
-    /// Returns whether a combination is kept and not skipped.
-    fn is_wanted(&self, chosen: &[u32], kept: &Kept) -> bool {
-        let factors = &self.experiment.factor;
-        let of = |factor: &str| {
-            let at = factors.iter().position(|f| f.name == factor)?;
-            Some(self.levels[at][chosen[at] as usize].name.as_str())
-        };
-        let is_at = |(factor, level): (&String, &String)| of(factor) == Some(level);
-        let is_skipped = self.experiment.skip.iter().any(|skip| skip.iter().all(is_at));
-        let is_kept =
-            |(factor, levels): &(String, Vec<String>)| levels.iter().any(|l| is_at((factor, l)));
-        !is_skipped && kept.iter().all(is_kept)
+        })
     }
 
     /// Combinations whose levels have these words, an underscore behind each.
@@ -158,18 +145,6 @@ impl Recipe {
         let table = self.source.fit(path)?;
         fits.insert(path.to_owned(), table.clone());
         Ok(table)
-    }
-}
-
-impl Variant {
-    fn new(chosen: Box<[u32]>) -> Self {
-        Variant {
-            chosen,
-            is_new: false,
-            stamp: OnceLock::new(),
-            error: OnceLock::new(),
-            cost: OnceLock::new(),
-        }
     }
 }
 
@@ -217,14 +192,17 @@ fn kept(experiment: &Experiment, only: &[String]) -> anyhow::Result<Kept> {
     Ok(kept)
 }
 
-/// Every combination of levels by number, the last factor fastest.
-fn combinations(levels: &[Vec<Level>]) -> Vec<Box<[u32]>> {
-    levels.iter().fold(vec![Box::default()], |all, levels| {
-        let with = |before: &[u32]| -> Vec<Box<[u32]>> {
-            (0..levels.len() as u32).map(|k| [before, [k].as_slice()].concat().into()).collect()
-        };
-        all.iter().flat_map(|before| with(before)).collect()
-    })
+/// Returns whether a combination of levels by number is kept and not skipped.
+fn is_wanted(experiment: &Experiment, levels: &[Vec<Level>], chosen: &[u32], kept: &Kept) -> bool {
+    let of = |factor: &str| {
+        let at = experiment.factor.iter().position(|f| f.name == factor)?;
+        Some(levels[at][chosen[at] as usize].name.as_str())
+    };
+    let is_at = |(factor, level): (&String, &String)| of(factor) == Some(level);
+    let is_skipped = experiment.skip.iter().any(|skip| skip.iter().all(is_at));
+    let is_kept =
+        |(factor, levels): &(String, Vec<String>)| levels.iter().any(|l| is_at((factor, l)));
+    !is_skipped && kept.iter().all(is_kept)
 }
 
 /// A name as a file system likes it.
