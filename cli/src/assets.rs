@@ -1,7 +1,7 @@
 //! The files that a scene names.
 
 use crate::output::{self, Output};
-use crate::volume_files;
+use crate::{paths, volume_files};
 use anyhow::Context;
 use clap::Args;
 use kerrlight_render::emission::mesh::MeshFile;
@@ -75,9 +75,7 @@ pub fn load(
         let path = folder.join(&mesh.path);
         let name = || format!("`mesh.{k}.path` {}", path.display());
         let bytes = read(&path).with_context(|| format!("`mesh.{k}.path`"))?;
-        // The parent of a bare name is empty, and an empty path has no canonical form.
-        let beside = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        let beside = beside.unwrap_or(Path::new("."));
+        let beside = paths::folder_of(&path);
         let resources = |name: &str| {
             let found = reach.find(beside, name)?;
             found.map(|path| read(&path)).transpose().map_err(|error| crate::plain::reasons(&error))

@@ -5,6 +5,7 @@ use crate::assets::Reach;
 use crate::interferometry::arguments::{self, Observing};
 use crate::interferometry::movie_files::{self, FrameTimes};
 use crate::interferometry::{ObservationFile, scene_movie};
+use crate::paths;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use kerrlight_common::toml_file::shown;
@@ -155,9 +156,7 @@ impl Observe {
         files: &[PathBuf],
         scans_h: &[f64],
     ) -> anyhow::Result<(StokesMovie, Vec<f64>, String)> {
-        let is_scene =
-            |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
-        if !files.iter().any(is_scene) {
+        if !files.iter().any(|path| paths::ending(path) == "toml") {
             let (movie, own) = movie_files::read(files, self.fov_uas)?;
             let choice = self.frame_times.as_ref();
             let (times, said) = movie_files::times(movie.i.frames(), &own, choice, scans_h)

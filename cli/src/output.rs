@@ -8,7 +8,7 @@ use standard::pour;
 pub use standard::{exit, print};
 
 use crate::checksum::Sum;
-use crate::plain;
+use crate::{paths, plain};
 use anyhow::{Context, bail};
 use kerrlight_common::memory;
 use std::cell::RefCell;
@@ -55,12 +55,9 @@ impl Output {
             let allowed: Vec<String> = extensions.iter().map(|e| format!(".{e}")).collect();
             bail!("output {shown} must end in {}, not in {ending}", allowed.join(" or "));
         }
-        let folder = match path.parent() {
-            Some(parent) if parent != Path::new("") => parent.to_owned(),
-            _ => PathBuf::from("."),
-        };
+        let folder = paths::folder_of(path);
         if !folder.is_dir() {
-            bail!("output {shown}: there is no directory {}", plain::path(&folder));
+            bail!("output {shown}: there is no directory {}", plain::path(folder));
         }
         // Through a symbolic link to the file it names, and never over a protected file.
         let given = path.to_owned();
@@ -68,10 +65,7 @@ impl Output {
         if std::fs::metadata(&path).is_ok_and(|m| m.permissions().readonly() || !m.is_file()) {
             bail!("output {shown} exists and is not a writable file");
         }
-        let folder = match path.parent() {
-            Some(parent) if parent != Path::new("") => parent.to_owned(),
-            _ => folder,
-        };
+        let folder = paths::folder_of(&path).to_owned();
         let output = Output { given, path, folder, piped: false };
         // A read-only folder is better found out now than after the work.
         output.beside()?;

@@ -29,6 +29,16 @@ pub fn of_data(path: &Path, base_dir: &Path) -> anyhow::Result<PathBuf> {
     full.with_context(|| path.display().to_string())
 }
 
+/// Returns the folder that a file is named in, the current one for a bare name.
+pub fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."))
+}
+
+/// Returns the ending of a file's name in lower case, nothing without one.
+pub fn ending(path: &Path) -> String {
+    path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase()
+}
+
 /// An assignment `key.path=value` whose relative paths start from the current folder, as one for settings
 /// whose paths start from `folder` (from the root without one). Everything else stays as it is.
 pub fn from_here(assignment: &str, folder: Option<&Path>) -> anyhow::Result<String> {

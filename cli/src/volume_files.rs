@@ -1,14 +1,13 @@
 //! Volumes of emission in files: NPZ or NPY, by the name's ending.
 
-use crate::output;
+use crate::{output, paths};
 use anyhow::{Context, bail};
 use kerrlight_render::scene::VolumeSource;
 use kerrlight_render::volume::{VolumeArrays, VolumeFile};
 use std::path::Path;
 
 fn decode(path: &Path, bytes: &[u8]) -> anyhow::Result<VolumeArrays> {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    match extension.to_ascii_lowercase().as_str() {
+    match paths::ending(path).as_str() {
         "npy" => Ok(VolumeArrays::from_npy(bytes)?),
         "npz" => Ok(VolumeArrays::from_npz(bytes)?),
         _ => bail!("a volume ends in .npz or .npy"),

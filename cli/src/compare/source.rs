@@ -82,8 +82,7 @@ impl Source {
                 all.join(", ")
             );
         }
-        let folder = name.parent().filter(|folder| *folder != Path::new(""));
-        let folder = std::path::absolute(folder.unwrap_or(Path::new(".")))
+        let folder = std::path::absolute(paths::folder_of(name))
             .with_context(|| name.display().to_string())?;
         Ok((Self(Some(folder)), output::read_text(name)?))
     }

@@ -73,8 +73,7 @@ fn sky(
 /// A light curve of a table, or of the baselines within a site of a UVFITS file.
 fn light_curve(path: &Path) -> anyhow::Result<LightCurve> {
     let name = || path.display().to_string();
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    if !matches!(extension.to_ascii_lowercase().as_str(), "uvfits" | "fits") {
+    if !matches!(paths::ending(path).as_str(), "uvfits" | "fits") {
         return files::parse_light_curve(&output::read_text(path)?).with_context(name);
     }
     let observation = interferometry::read(path)?;
@@ -116,8 +115,7 @@ fn images(file: &FitFile, path: &Path) -> anyhow::Result<WithSize> {
         return sequence(file, &files);
     }
     let name = || path.display().to_string();
-    let kind = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    match kind.as_str() {
+    match paths::ending(path).as_str() {
         "npz" => {
             let (field, times) =
                 npz_facts(BufReader::new(output::open(path)?)).with_context(name)?;

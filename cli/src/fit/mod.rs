@@ -237,8 +237,7 @@ impl Fit {
                 given.unwrap_or_else(|| (BUILT_IN.to_owned(), PathBuf::from(".")))
             }
             (Some(path), _) => {
-                let folder = path.parent().filter(|folder| *folder != Path::new(""));
-                let folder = std::path::absolute(folder.unwrap_or(Path::new(".")))
+                let folder = std::path::absolute(paths::folder_of(path))
                     .with_context(|| path.display().to_string())?;
                 placed((
                     output::read_text(path).map_err(|error| not_settings(path, error))?,

@@ -6,7 +6,7 @@ mod visibilities;
 
 use crate::answer::Answer;
 use crate::interferometry::plots::{self, PlotFile};
-use crate::output;
+use crate::{output, paths};
 use anyhow::{Context, bail};
 use clap::Args;
 use kerrlight_render::image::exr::{self, Attributes, ChannelSurvey, Survey};
@@ -49,7 +49,7 @@ impl Inspect {
             refuse_plot("an archive of arrays")?;
             return arrays::describe(&self.file, &start).with_context(name);
         }
-        if self.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
+        if paths::ending(&self.file) == "exr" {
             bail!("{}: not an EXR file (its first bytes are not an EXR's)", name());
         }
         let (format, observation) = files::decode(&output::read(&self.file)?).with_context(name)?;

@@ -1,7 +1,7 @@
 //! Images and movies of one file to be observed: grids of numbers as CSV, arrays as npy or npz,
 //! images as FITS, pictures as EXR.
 
-use crate::output;
+use crate::{output, paths};
 use anyhow::{Context, anyhow, bail};
 use kerrlight_vlbi::files::{self, images};
 use kerrlight_vlbi::simulate::StokesMovie;
@@ -14,8 +14,7 @@ pub use images::OwnTimes;
 pub fn read(path: &Path, fov_uas: Option<f64>) -> anyhow::Result<(StokesMovie, OwnTimes)> {
     let name = || path.display().to_string();
     let bytes = output::read(path)?;
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    let extension = extension.to_ascii_lowercase();
+    let extension = paths::ending(path);
     let pixels = match extension.as_str() {
         "fits" | "fit" if fov_uas.is_some() => {
             bail!("--fov-uas is not for FITS images, which have a field of view")

@@ -7,6 +7,7 @@ pub mod plots;
 pub mod scene_movie;
 
 use crate::output::{self, Output};
+use crate::paths;
 use anyhow::{Context, bail};
 use clap::ValueEnum;
 use kerrlight_vlbi::files::{self, EhtTable};
@@ -56,8 +57,7 @@ pub enum Written {
 impl Written {
     /// The format of a file: `asked`, or what the name's ending says.
     fn of(path: &Path, asked: Option<Self>) -> anyhow::Result<Self> {
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-        let by_name = match extension.to_ascii_lowercase().as_str() {
+        let by_name = match paths::ending(path).as_str() {
             "uvfits" | "fits" => Written::Uvfits,
             "txt" => Written::ObsText,
             "csv" => Written::Csv,

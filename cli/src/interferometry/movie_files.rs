@@ -2,7 +2,7 @@
 
 use super::arguments;
 use super::image_files::{self, OwnTimes};
-use crate::output;
+use crate::{output, paths};
 use anyhow::{Context, anyhow, bail};
 use kerrlight_vlbi::simulate::StokesMovie;
 use std::path::{Path, PathBuf};
@@ -41,9 +41,7 @@ pub fn files(argument: &Path) -> anyhow::Result<Vec<PathBuf>> {
         return Ok(vec![argument.to_owned()]);
     }
     let (folder, pattern) = match pattern {
-        Some(pattern) if !argument.is_dir() => {
-            (argument.parent().filter(|p| *p != Path::new("")).unwrap_or(Path::new(".")), pattern)
-        }
+        Some(pattern) if !argument.is_dir() => (paths::folder_of(argument), pattern),
         _ => (argument, Pattern { start: "", end: ".exr", digits: false }),
     };
     let entries =

@@ -1,6 +1,7 @@
 //! The usual pictures of an observation, as PNG or SVG.
 
 use crate::output::Output;
+use crate::paths;
 use anyhow::{anyhow, bail};
 use kerrlight_render::image::colormap::Colormap;
 use kerrlight_vlbi::observation::Observation;
@@ -21,8 +22,7 @@ pub struct PlotFile {
 impl PlotFile {
     /// Checks the place before any work is done.
     pub fn new(path: &Path) -> anyhow::Result<Self> {
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-        let is_svg = match extension.to_ascii_lowercase().as_str() {
+        let is_svg = match paths::ending(path).as_str() {
             "svg" => true,
             "png" => false,
             _ => bail!("plot {} must end in .png or .svg", path.display()),

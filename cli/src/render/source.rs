@@ -40,8 +40,7 @@ impl Source {
         };
         let name = path.display().to_string();
         let folder = path.parent().unwrap_or(Path::new(".")).to_owned();
-        let is_exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-        if !is_exr {
+        if paths::ending(path) != "exr" {
             return Ok(Source { text: output::read_text(path)?, name, folder, files: None });
         }
         let (text, files) = scene_of_exr(path)?;

@@ -15,7 +15,7 @@ mod visibilities;
 use super::BUILT_IN;
 use crate::answer::Answer;
 use crate::output::Output;
-use crate::plain;
+use crate::{paths, plain};
 pub use advice::explained;
 use annotate::annotate;
 use anyhow::{Context, bail};
@@ -152,8 +152,7 @@ fn of_data(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Resul
         return of_observation(&observation, data, toml, model);
     }
     let path = toml::Value::String(seen_from(toml, data)?).to_string();
-    let extension = data.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    if data.is_dir() || matches!(extension.to_ascii_lowercase().as_str(), "npz" | "npy" | "exr") {
+    if data.is_dir() || matches!(paths::ending(data).as_str(), "npz" | "npy" | "exr") {
         return of_movie(&read_movie(data)?, &path);
     }
     let name = data.file_name().and_then(|name| name.to_str()).unwrap_or_default();
