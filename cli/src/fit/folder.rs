@@ -1,6 +1,7 @@
 //! The folder of a run: settings, log, checkpoint, results.
 
 use super::inputs::{self, Inputs, SETTINGS};
+use crate::answer::Answer;
 use crate::checksum::{Sealed, sealed};
 use crate::file_sums::FileSums;
 use crate::lock::Lock;
@@ -18,7 +19,12 @@ use std::time::Duration;
 /// A run's folder, which no other process may work in.
 pub struct Folder {
     path: PathBuf,
-    inputs: Inputs,
+    /// The text of its settings.
+    pub settings: String,
+    /// Files that the run has read.
+    pub inputs: Inputs,
+    /// True if the run was begun before.
+    pub is_resumed: bool,
     _lock: Option<Lock>,
 }
 
@@ -33,11 +39,12 @@ impl Folder {
     /// A new folder, in which the data may lie.
     pub fn create(path: &Path, settings: &str, inputs: Inputs) -> anyhow::Result<Self> {
         let lock = Lock::of_new(path, BUSY, |file| inputs.holds(file))?;
-        let folder = Self { path: path.to_owned(), inputs, _lock: Some(lock) };
+        let (path, settings) = (path.to_owned(), settings.to_owned());
+        let folder = Self { path, settings, inputs, is_resumed: false, _lock: Some(lock) };
         let inputs = serde_json::to_string_pretty(&folder.inputs)?;
         folder.file(inputs::FILE)?.write(format!("{inputs}\n").as_bytes())?;
         // Last: with them it is a run.
-        folder.file(SETTINGS)?.write(settings.as_bytes())?;
+        folder.file(SETTINGS)?.write(folder.settings.as_bytes())?;
         Ok(folder)
     }
 
@@ -63,7 +70,7 @@ impl Folder {
 
     /// A folder that holds a run, within `patience` if another process works in it; all that the run has read must be
     /// what it was.
-    pub fn open(path: &Path, patience: Duration) -> anyhow::Result<(Self, String)> {
+    pub fn open(path: &Path, patience: Duration) -> anyhow::Result<Self> {
         is_run(path)?;
         let lock = Lock::take(path, BUSY, patience)?;
         // With the lock held nobody else writes here: every hidden file is a leftover.
@@ -72,16 +79,16 @@ impl Folder {
     }
 
     /// The same while another process works in it, by whose leave this one reads.
-    pub fn look(path: &Path) -> anyhow::Result<(Self, String)> {
+    pub fn look(path: &Path) -> anyhow::Result<Self> {
         is_run(path)?;
         Self::held(path, None)
     }
 
-    fn held(path: &Path, lock: Option<Lock>) -> anyhow::Result<(Self, String)> {
+    fn held(path: &Path, lock: Option<Lock>) -> anyhow::Result<Self> {
         let inputs = Inputs::load(path)?;
         inputs.check(path, &mut FileSums::default())?;
-        let text = output::read_text(&path.join(SETTINGS))?;
-        Ok((Self { path: path.to_owned(), inputs, _lock: lock }, text))
+        let settings = output::read_text(&path.join(SETTINGS))?;
+        Ok(Self { path: path.to_owned(), settings, inputs, is_resumed: true, _lock: lock })
     }
 
     /// Returns its path.
@@ -89,9 +96,13 @@ impl Folder {
         &self.path
     }
 
-    /// Returns the files that the run has read.
-    pub fn inputs(&self) -> &Inputs {
-        &self.inputs
+    /// The last lines of a run: a figure of merit, and the first of these files; all of them and the results for a script.
+    pub fn answer(&self, worth: &str, results: Value, names: &[&str]) -> Answer {
+        let files: Vec<PathBuf> = names.iter().map(|name| self.path.join(name)).collect();
+        Answer::lines(worth, &files[0].display().to_string())
+            .with_all(results)
+            .with("folder", self.path.display().to_string())
+            .files(files.iter().map(PathBuf::as_path))
     }
 
     /// A file in it, to be written whole.

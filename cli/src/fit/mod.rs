@@ -115,13 +115,14 @@ impl Fit {
         // A device that is missing is told before any data are read.
         let device = self.device.open()?;
         if let Some(path) = &self.resume {
-            let (folder, text) = Folder::open(path, self.patience())?;
-            self.same(&text)?;
-            let work = Work::read(&text).with_context(|| path.display().to_string())?;
-            let read = || work.prepared(&base_dir_of(&text), registry);
+            let folder = Folder::open(path, self.patience())?;
+            let text = &folder.settings;
+            self.same(text)?;
+            let work = Work::read(text).with_context(|| path.display().to_string())?;
+            let read = || work.prepared(&base_dir_of(text), registry);
             let work = inputs::read_again(folder.path(), read)?;
             work.check_device(device.as_ref())?;
-            return self.run_all(&work, &text, &folder, true, device);
+            return self.run_all(&work, &folder, device);
         }
         let guess = self.data.as_deref().map(|data| init::guess(data, self.model)).transpose()?;
         let (own, base_dir) = self.settings(guess.as_ref())?;
@@ -152,7 +153,7 @@ impl Fit {
             None => Folder::unnamed()?,
         };
         let folder = Folder::create(&folder, &text, Inputs::new(&text, read))?;
-        self.run_all(&prepared, &text, &folder, false, device)
+        self.run_all(&prepared, &folder, device)
     }
 
     /// The settings as an answer; those of a program that calls this one have to make sense.
@@ -182,9 +183,7 @@ impl Fit {
     fn run_all(
         &self,
         work: &Prepared,
-        text: &str,
         folder: &Folder,
-        resume: bool,
         device: Option<FitDevice>,
     ) -> anyhow::Result<Answer> {
         let recorder = recorder(folder);
@@ -196,7 +195,7 @@ impl Fit {
                 return Ok(answer);
             }
         };
-        let answer = run::run(prepared, text, folder, resume, device)?;
+        let answer = run::run(prepared, folder, device)?;
         recorder.write_into(folder.path())?;
         let Some(samples) = self.samples else { return Ok(answer) };
         Ok(answer.and("posterior", posterior::draw(prepared, folder, samples)?))

@@ -15,12 +15,8 @@ use kerrlight_tomo::fit::settings::{FitFile, Kind};
 use kerrlight_tomo::fit::setup;
 use kerrlight_tomo::recovery::{Problem, fit_with};
 use kerrlight_tomo::representation::Registry;
-use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
-
-/// The page that shows what was found.
-const REPORT: &str = "report.html";
 
 /// A fit with its data, of which relative paths start from `base_dir`.
 pub fn problem(file: FitFile, base_dir: &Path, registry: &Registry) -> anyhow::Result<Problem> {
@@ -47,28 +43,17 @@ pub fn check_device(problem: &Problem, check: CheckSteps) -> anyhow::Result<()> 
 /// Runs a fit from its start or its last checkpoint to its end.
 pub fn run(
     problem: &Problem,
-    text: &str,
     folder: &Folder,
-    resume: bool,
     device: Option<FitDevice>,
 ) -> anyhow::Result<Answer> {
     let begun = Instant::now();
-    let mut kept = Kept::new(problem, text, folder, resume, device);
+    let mut kept = Kept::new(problem, folder, device);
     let results = fit_with(problem, &mut kept, |fit, state| {
         Estimate::new(fit, folder).write(fit, state, begun)
     });
     let results = results.map_err(|error| failed::told(error, folder));
     drop(kept);
     let (worth, results) = results?;
-    Ok(answer(folder, worth, results))
-}
-
-/// The verdict and where to read it; the results for a script.
-fn answer(folder: &Folder, worth: String, results: Value) -> Answer {
-    let path = folder.path();
-    let files = [REPORT, "results.json", "volume.npz", "movie.npz"].map(|name| path.join(name));
-    Answer::lines(&worth, &files[0].display().to_string())
-        .with_all(results)
-        .with("folder", path.display().to_string())
-        .files(files.iter().map(PathBuf::as_path))
+    let files = ["report.html", "results.json", "volume.npz", "movie.npz"];
+    Ok(folder.answer(&worth, results, &files))
 }

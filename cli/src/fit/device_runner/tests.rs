@@ -7,6 +7,7 @@ use kerrlight_tomo::Error;
 use kerrlight_tomo::fit::{DeviceError, Loss, Progress, StepDevice, Stretch, Taken, checkpoint};
 use kerrlight_tomo::representation::Registry;
 use std::path::Path;
+use std::time::Duration;
 
 /// Learns nothing, and is unplugged after some steps.
 struct Unplugged {
@@ -60,11 +61,11 @@ fn exact_a_lost_device_leaves_a_checkpoint_that_the_processor_takes_up() {
     let (text, registry) = (settings(), Registry::default());
     let prepared = run::problem(parse(&text).unwrap(), Path::new("."), &registry).unwrap();
     let at = tempfile::tempdir().unwrap();
-    let folder =
-        Folder::create(&at.path().join("run"), &text, Inputs::new(&text, Vec::new())).unwrap();
+    let path = at.path().join("run");
+    let folder = Folder::create(&path, &text, Inputs::new(&text, Vec::new())).unwrap();
     let device: crate::devices::FitDevice =
         (|_, _, _| Ok(()), Box::new(|_, _, _| Ok(Box::new(Unplugged { left: 7 }))));
-    let error = run::run(&prepared, &text, &folder, false, Some(device)).err().unwrap();
+    let error = run::run(&prepared, &folder, Some(device)).err().unwrap();
     let told = error.to_string();
     assert!(
         told.contains("lost: unplugged; step 7 is kept") && told.contains("--resume"),
@@ -74,7 +75,9 @@ fn exact_a_lost_device_leaves_a_checkpoint_that_the_processor_takes_up() {
     assert!(!error.is::<Failed>());
     let bytes = folder.checkpoint().unwrap().unwrap();
     assert_eq!(checkpoint::header(&bytes).unwrap().step, 7);
-    run::run(&prepared, &text, &folder, true, None).unwrap();
+    drop(folder);
+    let folder = Folder::open(&path, Duration::ZERO).unwrap();
+    run::run(&prepared, &folder, None).unwrap();
     let bytes = folder.checkpoint().unwrap().unwrap();
     assert_eq!(checkpoint::header(&bytes).unwrap().step, 12);
     let results = std::fs::read_to_string(folder.path().join("results.json")).unwrap();

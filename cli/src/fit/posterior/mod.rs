@@ -61,8 +61,8 @@ impl Posterior {
         if let Some(numbers) = &self.draws {
             return self.some(registry, numbers.clone());
         }
-        let (folder, text) = Folder::open(&self.run, Duration::ZERO)?;
-        let prepared = self.prepared(&text, registry)?;
+        let folder = Folder::open(&self.run, Duration::ZERO)?;
+        let prepared = self.prepared(&folder.settings, registry)?;
         draw(&prepared, &folder, self.samples.unwrap_or(2))
     }
 
@@ -81,8 +81,8 @@ impl Posterior {
     /// Draws some, each a file of its own, and adds nothing up. Others may draw around the same run: a draw is the same
     /// bytes whoever writes it.
     fn some(&self, registry: &Registry, numbers: RangeInclusive<u32>) -> anyhow::Result<Answer> {
-        let (folder, text) = Folder::look(&self.run)?;
-        let prepared = self.prepared(&text, registry)?;
+        let folder = Folder::look(&self.run)?;
+        let prepared = self.prepared(&folder.settings, registry)?;
         check(&prepared.settings)?;
         let unknown = prepared.settings.unknown_geometry()?;
         let path = folder.path().join(FOLDER);

@@ -185,7 +185,7 @@ impl Estimate<'_> {
             loss: found.loss.total,
             chi2_per_datum: names.zip(found.loss.terms.iter().copied()).collect(),
             axis: now.axis.vector(),
-            inputs: self.folder.inputs().files.clone(),
+            inputs: self.folder.inputs.files.clone(),
             verdict: VerdictResults::from(&found.judged),
             device: self.device.clone(),
             validation_chi2_per_datum: validation,

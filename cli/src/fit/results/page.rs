@@ -11,7 +11,6 @@ use super::quiescent::Quiescent;
 use super::residuals;
 use super::verdict::{self, DataVerdict};
 use super::{Estimate, Found};
-use crate::fit::SETTINGS;
 use crate::fit::curves::{loss_plot, psnr_plot};
 use crate::fit::folder::Folder;
 use crate::fit::{band_plots, band_words, held_out};
@@ -236,7 +235,7 @@ pub fn settings(
     folder: &Folder,
 ) -> anyhow::Result<Vec<report::Setting>> {
     let table = toml_file::table_of(file).context("settings")?;
-    let given: toml::Table = output::read_text(&folder.path().join(SETTINGS))?.parse()?;
+    let given: toml::Table = folder.settings.parse()?;
     let (mut all, mut written) = (Vec::new(), Vec::new());
     flatten("", &toml::Value::Table(table), &mut all);
     flatten("", &toml::Value::Table(given), &mut written);

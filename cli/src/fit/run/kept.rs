@@ -24,9 +24,7 @@ use std::time::Instant;
 /// A fit in its folder.
 pub struct Kept<'a> {
     problem: &'a Problem,
-    text: &'a str,
     pub(super) folder: &'a Folder,
-    resume: bool,
     device: Option<FitDevice>,
     pub(super) begun: Instant,
     /// The work that goes on: how it is stopped, and its bar.
@@ -59,15 +57,9 @@ fn name(at: At) -> &'static str {
 }
 
 impl<'a> Kept<'a> {
-    /// Takes a run of these settings.
-    pub fn new(
-        problem: &'a Problem,
-        text: &'a str,
-        folder: &'a Folder,
-        resume: bool,
-        device: Option<FitDevice>,
-    ) -> Self {
-        Self { problem, text, folder, resume, device, begun: Instant::now(), work: None }
+    /// Takes a run in its folder.
+    pub fn new(problem: &'a Problem, folder: &'a Folder, device: Option<FitDevice>) -> Self {
+        Self { problem, folder, device, begun: Instant::now(), work: None }
     }
 
     /// Ends the work that went on.
@@ -212,7 +204,7 @@ impl<'a> Kept<'a> {
 
     fn state(&self, bytes: &[u8], start: &State<f32>) -> anyhow::Result<State<f32>> {
         let state = checkpoint::decode(bytes, start)?;
-        if checkpoint::header(bytes)?.settings != self.text {
+        if checkpoint::header(bytes)?.settings != self.folder.settings {
             bail!("it belongs to a run with other settings");
         }
         Ok(state)
@@ -324,7 +316,7 @@ impl Progress for Kept<'_> {
     }
 
     fn resumed(&mut self, start: &State<f32>) -> Result<Option<Resumed>, Error> {
-        if !self.resume {
+        if !self.folder.is_resumed {
             return Ok(None);
         }
         let restored = self.restored(start).map_err(kept)?;
@@ -341,7 +333,7 @@ impl Progress for Kept<'_> {
     }
 
     fn save(&mut self, state: &State<f32>) -> Result<(), Error> {
-        let bytes = checkpoint::encode(state, self.text)?;
+        let bytes = checkpoint::encode(state, &self.folder.settings)?;
         let file = self.folder.file(folder::CHECKPOINT);
         file.and_then(|file| file.write(&bytes)).map_err(kept)?;
         // From the first checkpoint on there is a state to save: a signal waits for the step.

@@ -118,11 +118,7 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
     folder.keep("results.json", &results)?;
     found.report(&evidence, &results)?;
     let files = ["report.html", "results.json", "image.npz", "image.fits", "image.png"];
-    let files = files.map(|name| folder.path().join(name));
-    Ok(Answer::lines(&found.worth(), &files[0].display().to_string())
-        .with_all(serde_json::to_value(results)?)
-        .with("folder", folder.path().display().to_string())
-        .files(files.iter().map(|path| path.as_path())))
+    Ok(folder.answer(&found.worth(), serde_json::to_value(results)?, &files))
 }
 
 /// An image once a frame.

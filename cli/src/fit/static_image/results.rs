@@ -188,7 +188,7 @@ impl Found<'_> {
             chi2_of_draws: kinds()
                 .zip(chi2_of_draws(&self.survey).into_iter().map(drawn))
                 .collect(),
-            inputs: self.folder.inputs().files.clone(),
+            inputs: self.folder.inputs.files.clone(),
             verdict: VerdictResults::from(&self.judged),
             flux_jy,
             flux_error_jy,
