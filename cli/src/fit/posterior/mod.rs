@@ -7,10 +7,10 @@ mod sample;
 mod summary;
 
 use super::folder::Folder;
-use super::geometry_search;
 use super::held_out;
 use super::inputs;
 use super::run;
+use super::searches;
 use crate::answer::Answer;
 use crate::checksum::{is_whole, sealed};
 use crate::interrupt::{Interrupted, SignalGuard};
@@ -191,7 +191,7 @@ fn add_up(
     path: &Path,
     all: &[Kept],
 ) -> anyhow::Result<Answer> {
-    let geometry = folder.found::<GeometryResults>(geometry_search::FILE)?;
+    let geometry = folder.found::<GeometryResults>(searches::GEOMETRY)?;
     let truth = prepared.measured.truth.as_ref();
     let truth = truth.map(|truth| true_volume(&prepared.settings, truth, 0.0)).transpose()?;
     // With the prior that held-out frames have chosen, which is that of the draws.
@@ -220,7 +220,7 @@ fn geometries<'a>(
 ) -> anyhow::Result<GeometryPosterior<'a>> {
     let free = &unknown.free;
     let best = geometry.geometry_in(&prepared.settings, free);
-    let best = best.with_context(|| folder.damaged(geometry_search::FILE))?;
+    let best = best.with_context(|| folder.damaged(searches::GEOMETRY))?;
     let spread = geometry.spread(best, free);
     let spread = spread.context("the search for the geometry has no errors")?;
     let (results, is_changing) = (Results::read(folder)?, prepared.settings.change.is_some());
@@ -307,7 +307,7 @@ impl<'a> Drawing<'a> {
         samples: u32,
         path: &Path,
     ) -> anyhow::Result<Self> {
-        let geometry = folder.found::<GeometryResults>(geometry_search::FILE)?;
+        let geometry = folder.found::<GeometryResults>(searches::GEOMETRY)?;
         let complete = (1..=u64::from(samples)).all(|number| names(path, number)[1].is_file());
         let geometries = match (unknown, &geometry) {
             (Some(unknown), Some(geometry)) if !complete => {

@@ -9,7 +9,7 @@ use super::{Estimate, Found};
 use crate::checksum::Sealed;
 use crate::fit::closures::{self, ClosureResults};
 use crate::fit::inputs::InputFile;
-use crate::fit::{band_search, geometry_search, held_out, linear};
+use crate::fit::{held_out, linear, searches};
 use crate::report;
 use crate::session;
 use crate::usage::usage;
@@ -167,8 +167,8 @@ impl Estimate<'_> {
     ) -> anyhow::Result<Results> {
         let names = trainer.objective.names().into_iter().map(str::to_owned);
         let now = &found.state.now;
-        let geometry = self.folder.found::<GeometryResults>(geometry_search::FILE)?;
-        let band = self.folder.found::<BandResults>(band_search::FILE)?;
+        let geometry = self.folder.found::<GeometryResults>(searches::GEOMETRY)?;
+        let band = self.folder.found::<BandResults>(searches::BAND)?;
         let log = self.folder.lines()?;
         // Samples that were not fitted have one χ²: with the errors that a flare's past leaves of them.
         let is_told = band.as_ref().is_some_and(|of| of.validation_chi2_per_datum.is_some());

@@ -4,9 +4,7 @@ use super::folder::{self, Folder};
 use crate::devices::FitDevice;
 use crate::fit::journal::Journal;
 use crate::fit::results::last_step;
-use crate::fit::{
-    axis_scan, band_search, closures, device_runner, geometry_search, held_out, leakage, linear,
-};
+use crate::fit::{axis_scan, closures, device_runner, held_out, leakage, linear, searches};
 use crate::interrupt::SignalGuard;
 use crate::plain;
 use crate::progress;
@@ -89,7 +87,7 @@ impl<'a> Kept<'a> {
         let settings = &self.problem.settings;
         match at {
             At::Geometry { .. } => {
-                let [searches, each, fine] = geometry_search::planned(settings);
+                let [searches, each, fine] = searches::planned(settings);
                 progress::counting((searches * each + fine) as u64, "trial")
             }
             At::Band(_) => {
@@ -113,7 +111,7 @@ impl<'a> Kept<'a> {
         let settings = &self.problem.settings;
         match at {
             At::Geometry { search, of, trials, least } => {
-                let [_, each, _] = geometry_search::planned(settings);
+                let [_, each, _] = searches::planned(settings);
                 bar.set_position((search * each + trials) as u64);
                 bar.set_message(format!("search {} of {of}, least chi2/2 {least:.5e}", search + 1));
             }
@@ -215,11 +213,11 @@ impl<'a> Kept<'a> {
         match found {
             Found::Geometry(problem, unknown, found) => {
                 let found = GeometryResults::new(problem, unknown, found)?;
-                folder.keep(geometry_search::FILE, &found)?;
+                folder.keep(searches::GEOMETRY, &found)?;
                 self.read(Stage::Geometry)
             }
             Found::Band(problem, scan) => {
-                folder.keep(band_search::FILE, &BandResults::new(problem, scan)?)?;
+                folder.keep(searches::BAND, &BandResults::new(problem, scan)?)?;
                 self.read(Stage::Band)
             }
             Found::Weight(file, held) => {
@@ -234,8 +232,8 @@ impl<'a> Kept<'a> {
     /// Reads the file of a search, which is told; none if it has not looked.
     fn read(&self, stage: Stage) -> anyhow::Result<Option<Choice>> {
         match stage {
-            Stage::Geometry => geometry_search::chosen(self.folder, &self.problem.settings),
-            Stage::Band => band_search::chosen(self.folder),
+            Stage::Geometry => searches::geometry(self.folder, &self.problem.settings),
+            Stage::Band => searches::band(self.folder),
             Stage::Weight => held_out::chosen(self.folder),
             _ => Ok(None),
         }
