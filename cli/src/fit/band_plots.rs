@@ -37,8 +37,8 @@ pub fn of_runs(runs: &[(String, BandResults)], caption: &str) -> Vec<LinePlot> {
         Some(LinePlot {
             title: format!("Probability of the {words}"),
             caption: format!("Summed over all other unknowns. {caption}").trim_end().to_owned(),
-            x: Axis { label: words.to_owned(), unit: unit.to_owned(), log: false },
-            y: Axis { label: "probability".to_owned(), unit: String::new(), log: false },
+            x: Axis::new(words, unit),
+            y: Axis::new("probability", ""),
             series,
         })
     };
@@ -67,12 +67,11 @@ pub fn loop_plot(table: &str, name: &str) -> Option<LinePlot> {
     let points = |a: usize| rows.iter().map(|row| [row[a], row[a + 1]]).collect::<Vec<_>>();
     let data = Series::new("data", points(0), Marks::Points);
     let model = Series::new("model", points(2), Marks::Line);
-    let axis = |label: &str| Axis { label: label.to_owned(), unit: "Jy".to_owned(), log: false };
     (rows.len() > 1).then(|| LinePlot {
         title: format!("Loop in Q and U{name}"),
         caption: "Linear polarisation of the unresolved source through the plane of Q and U, less what is steady: a flare that orbits in a field draws a loop, twice an orbit where the field is vertical and seen face-on. Data, and the model through the same times, samples that were not fitted included.".to_owned(),
-        x: axis("Q"),
-        y: axis("U"),
+        x: Axis::new("Q", "Jy"),
+        y: Axis::new("U", "Jy"),
         series: vec![model, data],
     })
 }

@@ -64,9 +64,9 @@ fn line_plot(
     LinePlot {
         title: title.to_owned(),
         caption: caption.to_owned(),
-        x: Axis { label: x.to_owned(), unit: String::new(), log },
-        y: Axis { label: y.to_owned(), unit: String::new(), log: false },
-        series: vec![Series { name: "held out".to_owned(), points, errors, marks: Marks::Joined }],
+        x: Axis { log, ..Axis::new(x, "") },
+        y: Axis::new(y, ""),
+        series: vec![Series::new("held out", points, Marks::Joined).with_errors(errors)],
     }
 }
 

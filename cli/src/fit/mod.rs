@@ -5,7 +5,6 @@ mod axis_scan;
 mod band_plots;
 mod band_words;
 mod closures;
-mod curves;
 mod data;
 mod device_runner;
 mod failed;

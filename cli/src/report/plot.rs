@@ -64,6 +64,11 @@ const COLORS: [&str; 6] = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00"
 const MOST_POINTS: usize = 3000;
 
 impl Axis {
+    /// A linear one.
+    pub fn new(label: impl Into<String>, unit: impl Into<String>) -> Self {
+        Axis { label: label.into(), unit: unit.into(), log: false }
+    }
+
     fn title(&self) -> String {
         if self.unit.is_empty() {
             self.label.clone()
@@ -81,6 +86,11 @@ impl Series {
     /// One without errors.
     pub fn new(name: impl Into<String>, points: Vec<[f64; 2]>, marks: Marks) -> Self {
         Series { name: name.into(), points, errors: Vec::new(), marks }
+    }
+
+    /// The same with standard deviations of y.
+    pub fn with_errors(self, errors: Vec<f64>) -> Self {
+        Series { errors, ..self }
     }
 }
 

@@ -48,8 +48,8 @@ fn loss() -> LinePlot {
     LinePlot {
         title: text("Loss"),
         caption: text("Mean square of residuals while the fit went on."),
-        x: Axis { label: text("step"), unit: text(""), log: false },
-        y: Axis { label: text("loss"), unit: text("Jy²"), log: true },
+        x: Axis::new("step", ""),
+        y: Axis { log: true, ..Axis::new("loss", "Jy²") },
         series: vec![curve("image", 1.0), curve("visibilities", 0.3)],
     }
 }
@@ -58,23 +58,16 @@ fn amplitudes() -> LinePlot {
     let model = |x: f64| 1.2 * (-x * x / 18.0).exp() + 0.02;
     let at = |k: i32| 0.05 * f64::from(k);
     let data = |k: i32| [at(k), model(at(k)) * (1.0 + 0.1 * f64::from(k * 7919 % 13 - 6) / 6.0)];
-    let series = |name: &str, points: Vec<[f64; 2]>, errors: Vec<f64>, marks| Series {
-        name: text(name),
-        points,
-        errors,
-        marks,
-    };
+    let data = Series::new("data", (0..180).map(data).collect(), Marks::Points);
+    let points = (0..180).map(|k| [at(k), model(at(k))]).collect();
     LinePlot {
         title: text("Data and model"),
         caption: text(
             "Amplitudes of the data with errors of one σ, and of the recovered emission.",
         ),
-        x: Axis { label: text("baseline"), unit: text("Gλ"), log: false },
-        y: Axis { label: text("|V|"), unit: text("Jy"), log: true },
-        series: vec![
-            series("data", (0..180).map(data).collect(), vec![0.03; 180], Marks::Points),
-            series("model", (0..180).map(|k| [at(k), model(at(k))]).collect(), vec![], Marks::Line),
-        ],
+        x: Axis::new("baseline", "Gλ"),
+        y: Axis { log: true, ..Axis::new("|V|", "Jy") },
+        series: vec![data.with_errors(vec![0.03; 180]), Series::new("model", points, Marks::Line)],
     }
 }
 

@@ -51,8 +51,8 @@ impl Figures<'_> {
                          data and the pictures; those before it count the fit alone.",
                         asked.caption
                     ),
-                    x: Axis { label: "wall time".to_owned(), unit: "s".to_owned(), log: true },
-                    y: Axis { label: unit.clone(), unit: String::new(), log: false },
+                    x: Axis { log: true, ..Axis::new("wall time", "s") },
+                    y: Axis::new(&unit, ""),
                     series: part,
                 });
             }
@@ -98,8 +98,8 @@ impl Figures<'_> {
         let plot = |series| LinePlot {
             title: asked.title.clone(),
             caption: format!("{} {}", asked.caption, self.summary.seeds_told()),
-            x: Axis { label: factor.clone(), unit: String::new(), log },
-            y: Axis { label: unit.clone(), unit: String::new(), log: false },
+            x: Axis { log, ..Axis::new(factor, "") },
+            y: Axis::new(&unit, ""),
             series,
         };
         series_of(series).into_iter().map(plot).collect()
@@ -119,16 +119,11 @@ impl Figures<'_> {
             let points = uv.iter().flat_map(|[u, v]| [[*u, *v], [-*u, -*v]]);
             let points = points.map(|p| p.map(|x| x * 1e-9)).collect();
             let name = format!("{} visibilities", uv.len());
-            let axis = |label: &str| Axis {
-                label: label.to_owned(),
-                unit: "10⁹ wavelengths".to_owned(),
-                log: false,
-            };
             plots.push(LinePlot {
                 title: format!("{}: {}", asked.title, case.name()),
                 caption: format!("{} Both ends of every baseline.", asked.caption),
-                x: axis("u"),
-                y: axis("v"),
+                x: Axis::new("u", "10⁹ wavelengths"),
+                y: Axis::new("v", "10⁹ wavelengths"),
                 series: vec![Series::new(name, points, Marks::Points)],
             });
         }
@@ -152,12 +147,8 @@ impl Figures<'_> {
         let plot = |series| LinePlot {
             title: asked.title.clone(),
             caption: format!("{} Seed 1.", asked.caption),
-            x: Axis { label: "radius".to_owned(), unit: "M".to_owned(), log: false },
-            y: Axis {
-                label: "angular velocity".to_owned(),
-                unit: "rad/time unit".to_owned(),
-                log: false,
-            },
+            x: Axis::new("radius", "M"),
+            y: Axis::new("angular velocity", "rad/time unit"),
             series,
         };
         Ok(series_of(series).into_iter().map(plot).collect())
@@ -183,7 +174,7 @@ fn binned(name: String, points: Vec<[f64; 2]>) -> Series {
     let name = format!("{name}: means and standard deviations of {} cases", points.len());
     let each = points.len().div_ceil(BINS);
     let (points, errors) = points.chunks(each).map(group).unzip();
-    Series { name, points, errors, marks: Marks::Joined }
+    Series::new(name, points, Marks::Joined).with_errors(errors)
 }
 
 /// Splits curves into as many plots as are needed.

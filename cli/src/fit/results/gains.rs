@@ -259,8 +259,8 @@ impl Gains {
             LinePlot {
                 title: format!("Gains of stations{part}"),
                 caption: "Amplitudes of the gains in every frame with their standard deviations; 1 is a station that is calibrated.".to_owned(),
-                x: Axis { label: "time".to_owned(), unit: "h UTC".to_owned(), log: false },
-                y: Axis { label: "amplitude of the gain".to_owned(), unit: String::new(), log: true },
+                x: Axis::new("time", "h UTC"),
+                y: Axis { log: true, ..Axis::new("amplitude of the gain", "") },
                 series: names.iter().map(|name| self.series(name)).collect(),
             }
         };
@@ -272,12 +272,9 @@ impl Gains {
     }
 
     fn series(&self, name: &str) -> Series {
-        Series {
-            name: name.to_owned(),
-            points: self.of(name).map(|g| [g.time_h, g.gain.norm()]).collect(),
-            errors: self.of(name).map(|g| g.errors[0] * g.gain.norm()).collect(),
-            marks: Marks::Points,
-        }
+        let points = self.of(name).map(|g| [g.time_h, g.gain.norm()]).collect();
+        let errors = self.of(name).map(|g| g.errors[0] * g.gain.norm()).collect();
+        Series::new(name, points, Marks::Points).with_errors(errors)
     }
 
     fn stations(&self) -> Vec<StationGains> {

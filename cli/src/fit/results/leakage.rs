@@ -121,12 +121,8 @@ impl Leakage {
         let mut series = Vec::new();
         for (hand, name) in ["d_R", "d_L"].into_iter().enumerate() {
             let errors = self.table.stations.iter().map(|s| 100.0 * s.errors[hand]);
-            series.push(Series {
-                name: name.to_owned(),
-                points: points(&self.table, hand),
-                errors: errors.collect(),
-                marks: Marks::Points,
-            });
+            let found = Series::new(name, points(&self.table, hand), Marks::Points);
+            series.push(found.with_errors(errors.collect()));
             series.extend(self.truth.as_ref().map(|truth| {
                 Series::new(format!("{name}, truth"), points(truth, hand), Marks::Points)
             }));
@@ -134,8 +130,8 @@ impl Leakage {
         LinePlot {
             title: "Leakage of stations".to_owned(),
             caption: "Leakage d_R and d_L of every station in the complex plane; 0 is a feed that is pure.".to_owned(),
-            x: Axis { label: "real part".to_owned(), unit: "%".to_owned(), log: false },
-            y: Axis { label: "imaginary part".to_owned(), unit: "%".to_owned(), log: false },
+            x: Axis::new("real part", "%"),
+            y: Axis::new("imaginary part", "%"),
             series,
         }
     }

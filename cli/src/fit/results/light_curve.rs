@@ -76,12 +76,10 @@ impl Estimate<'_> {
             let data = curve.hours.iter().zip(curve.data[plane..].iter().step_by(count));
             let measured: Vec<[f64; 3]> =
                 data.filter_map(|(h, datum)| datum.map(|[jy, sigma]| [*h, jy, sigma])).collect();
-            series.push(Series {
-                name: parameter.name().to_owned(),
-                points: measured.iter().map(|[h, jy, _]| [*h, *jy]).collect(),
-                errors: measured.iter().map(|[.., sigma]| *sigma).collect(),
-                marks: Marks::Points,
-            });
+            let points = measured.iter().map(|[h, jy, _]| [*h, *jy]).collect();
+            let errors = measured.iter().map(|[.., sigma]| *sigma).collect();
+            let data = Series::new(parameter.name(), points, Marks::Points);
+            series.push(data.with_errors(errors));
         }
         let held = match curve.fitted.iter().position(|fitted| !fitted) {
             Some(first) => format!(
@@ -102,8 +100,8 @@ impl Estimate<'_> {
             caption: format!(
                 "Fluxes of the unresolved source, data as points with their standard deviations, the recovered emission{background} as lines.{held}"
             ),
-            x: Axis { label: "time".to_owned(), unit: "h UTC".to_owned(), log: false },
-            y: Axis { label: "flux density".to_owned(), unit: "Jy".to_owned(), log: false },
+            x: Axis::new("time", "h UTC"),
+            y: Axis::new("flux density", "Jy"),
             series,
         }];
         plots.extend(band_plots::loop_plot(&text, ""));

@@ -81,8 +81,8 @@ impl Changes {
         LinePlot {
             title: "Emission over time".to_owned(),
             caption: "All emission in the volume at the time of each frame. Matter carries emission; where this curve rises, emission appears, where it falls, emission fades or leaves the volume.".to_owned(),
-            x: Axis { label: "time".to_owned(), unit: "GM/c³".to_owned(), log: false },
-            y: Axis { label: "integral of emission".to_owned(), unit: "(GM/c²)³".to_owned(), log: false },
+            x: Axis::new("time", "GM/c³"),
+            y: Axis::new("integral of emission", "(GM/c²)³"),
             series: all,
         }
     }

@@ -11,7 +11,6 @@ use super::quiescent::Quiescent;
 use super::residuals;
 use super::verdict::{self, DataVerdict};
 use super::{Estimate, Found};
-use crate::fit::curves::{loss_plot, psnr_plot};
 use crate::fit::folder::Folder;
 use crate::fit::{band_plots, band_words, held_out};
 use crate::output;
@@ -31,8 +30,8 @@ impl Estimate<'_> {
     /// Draws and writes it.
     pub fn report(&self, found: &Found<'_>, results: &Results) -> anyhow::Result<()> {
         let lines = self.folder.lines()?;
-        let mut plots: Vec<LinePlot> = loss_plot(&lines).into_iter().collect();
-        plots.extend(psnr_plot(&lines));
+        let mut plots: Vec<LinePlot> = plots::losses(&lines).into_iter().collect();
+        plots.extend(plots::quality(&lines));
         plots.extend(results.held_out.as_deref().map(held_out::plot));
         plots.extend(self.light_curves(&found.seen)?);
         if let Some(band) = results.band.as_deref() {

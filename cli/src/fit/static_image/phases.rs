@@ -42,11 +42,9 @@ impl Found<'_> {
 }
 
 fn plot(triangle: &str, points: &[[f64; 4]]) -> LinePlot {
-    let series = |name: &str, column: usize, errors, marks| Series {
-        name: name.to_owned(),
-        points: points.iter().map(|point| [point[0], point[column]]).collect(),
-        errors,
-        marks,
+    let series = |name: &str, column: usize, marks| {
+        let points = points.iter().map(|point| [point[0], point[column]]);
+        Series::new(name, points.collect(), marks)
     };
     let sigma = points.iter().map(|point| point[2]).collect();
     LinePlot {
@@ -54,11 +52,11 @@ fn plot(triangle: &str, points: &[[f64; 4]]) -> LinePlot {
         caption: "The sum of phases around a triangle, which gains of stations do not change. Bars are standard deviations for \
                   high signal to noise; the line is the image."
             .to_owned(),
-        x: Axis { label: "time".to_owned(), unit: "h UTC".to_owned(), log: false },
-        y: Axis { label: "closure phase".to_owned(), unit: "°".to_owned(), log: false },
+        x: Axis::new("time", "h UTC"),
+        y: Axis::new("closure phase", "°"),
         series: vec![
-            series("data", 1, sigma, Marks::Points),
-            series("recovered", 3, Vec::new(), Marks::Line),
+            series("data", 1, Marks::Points).with_errors(sigma),
+            series("recovered", 3, Marks::Line),
         ],
     }
 }

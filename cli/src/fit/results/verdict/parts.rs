@@ -15,7 +15,7 @@ fn series<'a>(name: &str, parts: impl Iterator<Item = (f64, &'a Part)>) -> Serie
             errors.push((2.0 / part.freedom).sqrt());
         }
     }
-    Series { name: name.to_owned(), points, errors, marks: Marks::Points }
+    Series::new(name, points, Marks::Points).with_errors(errors)
 }
 
 /// Draws a plot with a line where χ² is expected, on a logarithmic axis if most of it would be lost on a linear
@@ -46,8 +46,8 @@ fn plot(
     Some(LinePlot {
         title: title.to_owned(),
         caption: caption.to_owned(),
-        x: Axis { label: label.to_owned(), unit: unit.to_owned(), log: false },
-        y: Axis { label: "χ² per data point".to_owned(), unit: String::new(), log },
+        x: Axis::new(label, unit),
+        y: Axis { log, ..Axis::new("χ² per data point", "") },
         series,
     })
 }
