@@ -1,7 +1,6 @@
 //! `kerrlight fit`: recovers emission from movies and visibilities.
 
 mod api;
-mod axis_scan;
 mod band_plots;
 mod band_words;
 mod closures;
@@ -13,7 +12,6 @@ mod held_out;
 mod init;
 mod inputs;
 mod journal;
-mod leakage;
 mod linear;
 pub mod posterior;
 mod results;

@@ -3,13 +3,35 @@
 use super::Estimate;
 use super::gains::write_by_file;
 use crate::fit::folder::Folder;
-use crate::fit::leakage::TABLE;
+use crate::output;
 use crate::report::{Axis, LinePlot, Marks, Series, Table};
+use anyhow::Context;
 use kerrlight_common::frames::Frames;
-use kerrlight_tomo::fit::setup::FitData;
+use kerrlight_tomo::fit::setup::{FitData, SolvedLeakage};
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::polarimetry::{LeakageDistance, LeakageTable, StationLeakage};
 use serde::Serialize;
+use serde_json::json;
+
+/// The table of what was found last.
+const TABLE: &str = "leakage.csv";
+
+/// Keeps what was found before a step, or beside the linear problem.
+pub fn keep(folder: &Folder, step: Option<u64>, found: &SolvedLeakage) -> anyhow::Result<()> {
+    folder.file(TABLE)?.write(files::leakage_to_csv(&found.table).as_bytes())?;
+    let Some(step) = step else { return Ok(()) };
+    folder.log(&json!({ "step": step, "leakage": { "largest_change": found.moved } }))
+}
+
+/// Returns the leakage that a run has found last, if it has solved for it.
+pub fn kept(measured: &FitData, folder: &Folder) -> anyhow::Result<Option<LeakageTable>> {
+    let path = folder.path().join(TABLE);
+    if measured.leakage.is_none() || !path.exists() {
+        return Ok(None);
+    }
+    let table = files::parse_leakage(&output::read_text(&path)?);
+    table.with_context(|| path.display().to_string()).map(Some)
+}
 
 /// Leakage that was found.
 pub struct Leakage {

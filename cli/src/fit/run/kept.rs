@@ -3,8 +3,8 @@
 use super::folder::{self, Folder};
 use crate::devices::FitDevice;
 use crate::fit::journal::Journal;
-use crate::fit::results::last_step;
-use crate::fit::{axis_scan, closures, device_runner, held_out, leakage, linear, searches};
+use crate::fit::results::leakage;
+use crate::fit::{closures, device_runner, held_out, searches};
 use crate::interrupt::SignalGuard;
 use crate::plain;
 use crate::progress;
@@ -12,7 +12,7 @@ use crate::session;
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use kerrlight_tomo::Error;
-use kerrlight_tomo::fit::settings::{FitFile, Kind};
+use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::setup::{self, RaySampling};
 use kerrlight_tomo::fit::{DeviceRunner, Outcome, State, Trainer, checkpoint, journal};
 use kerrlight_tomo::recovery::results::{BandResults, GeometryResults, HeldOutResults};
@@ -21,7 +21,7 @@ use std::time::Instant;
 
 /// A fit in its folder.
 pub struct Kept<'a> {
-    problem: &'a Problem,
+    pub(super) problem: &'a Problem,
     pub(super) folder: &'a Folder,
     device: Option<FitDevice>,
     pub(super) begun: Instant,
@@ -154,37 +154,6 @@ impl<'a> Kept<'a> {
             fit.file.representation.kind.label(),
             fit.trainer.representation.parameters(),
         )
-    }
-
-    fn record(&self, event: Event<'_>) -> anyhow::Result<()> {
-        let folder = self.folder;
-        match event {
-            Event::Axis(found) => {
-                folder.file("axis_scan.csv")?.write(axis_scan::table(&found.scan).as_bytes())?;
-                folder.file("axis_scan.png")?.write(&axis_scan::picture(&found.scan)?)?;
-                folder.log(&axis_scan::line(found))
-            }
-            Event::Linear(solution) => {
-                folder.log(&linear::solved(solution))?;
-                if self.problem.settings.representation.kind == Kind::LinearGrid {
-                    eprintln!("{}", linear::statement(solution));
-                }
-                Ok(())
-            }
-            Event::WarmStarted(found) => folder.log(&linear::imprinted(found)),
-            Event::Round(round, found) => {
-                let moved = found.moved;
-                eprintln!("leakage, round {round}: the largest change is {moved:.2e}");
-                Ok(())
-            }
-            Event::Leakage(step, found) => leakage::keep(folder, step, found),
-            Event::FollowsNoise(step) => {
-                let of = self.problem.settings.training.steps;
-                eprintln!("{}", last_step(step, of));
-                Ok(())
-            }
-            _ => Ok(()),
-        }
     }
 
     /// The state of a checkpoint of the same settings, what was written beside it, and the log up to it.

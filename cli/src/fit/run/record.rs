@@ -1,15 +1,52 @@
-//! Messages of a run on its steps.
+//! What a run records: lines of its log, files beside it, and messages.
 
 use super::kept::Kept;
-use crate::progress;
+use crate::fit::linear;
+use crate::fit::results::{last_step, leakage};
+use crate::{progress, report};
 use indicatif::ProgressBar;
-use kerrlight_tomo::fit::settings::AxisSearch;
+use kerrlight_render::image::colormap::Colormap;
+use kerrlight_tomo::fit::scan::{AxisLoss, AxisScan};
+use kerrlight_tomo::fit::settings::{AxisSearch, Kind};
 use kerrlight_tomo::fit::{Loss, Outcome, State};
-use kerrlight_tomo::recovery::{Fit, compare};
+use kerrlight_tomo::recovery::{Event, Fit, FoundAxis, compare};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 impl Kept<'_> {
+    /// Keeps what was found on the way, and tells of it.
+    pub(super) fn record(&self, event: Event<'_>) -> anyhow::Result<()> {
+        let folder = self.folder;
+        match event {
+            Event::Axis(found) => {
+                folder.file("axis_scan.csv")?.write(map(&found.scan).as_bytes())?;
+                let picture = found.scan.picture(720, Colormap::Viridis)?;
+                folder.file("axis_scan.png")?.write(&report::encode(Some(picture))?)?;
+                folder.log(&scanned(found))
+            }
+            Event::Linear(solution) => {
+                folder.log(&linear::solved(solution))?;
+                if self.problem.settings.representation.kind == Kind::LinearGrid {
+                    eprintln!("{}", linear::statement(solution));
+                }
+                Ok(())
+            }
+            Event::WarmStarted(found) => folder.log(&linear::imprinted(found)),
+            Event::Round(round, found) => {
+                let moved = found.moved;
+                eprintln!("leakage, round {round}: the largest change is {moved:.2e}");
+                Ok(())
+            }
+            Event::Leakage(step, found) => leakage::keep(folder, step, found),
+            Event::FollowsNoise(step) => {
+                let of = self.problem.settings.training.steps;
+                eprintln!("{}", last_step(step, of));
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Logs what a step has done, and tells of what is unusual.
     pub(super) fn step(
         &self,
@@ -67,4 +104,28 @@ impl Kept<'_> {
         }
         line
     }
+}
+
+/// The losses of a scan of axes as a table.
+fn map(scan: &AxisScan) -> String {
+    let line = |at: &AxisLoss| {
+        let [x, y, z] = at.axis.vector();
+        format!("{x},{y},{z},{}\n", at.loss)
+    };
+    let rows: String = scan.map.iter().map(line).collect();
+    format!("x,y,z,loss\n{rows}")
+}
+
+/// A line of the log on the same.
+fn scanned(found: &FoundAxis) -> Value {
+    let FoundAxis { scan, refined } = found;
+    let refined = refined.map(|at| json!({"best": at.axis.vector(), "loss": at.loss}));
+    json!({
+        "step": 0,
+        "axis_scan": {
+            "best": scan.best.axis.vector(), "loss": scan.best.loss,
+            "runner_up": scan.runner_up.axis.vector(), "runner_up_loss": scan.runner_up.loss,
+            "refined": refined,
+        },
+    })
 }
