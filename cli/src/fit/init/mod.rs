@@ -25,7 +25,7 @@ use kerrlight_vlbi::files;
 use kerrlight_vlbi::observation::{Observation, Row};
 use movie::{of_movie, read_movie};
 use quick_look::QuickLook;
-use sources::{called, known};
+use sources::Seen;
 use std::path::{Path, PathBuf};
 
 /// Model that is fitted to visibilities.
@@ -85,46 +85,40 @@ fn head(path: &Path, plain: &str) -> String {
 
 /// The plain settings of one image of several files, for annotation.
 fn of_files(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Result<String> {
-    let mut observations = Vec::new();
-    for path in data {
-        observations.push(crate::interferometry::read(path)?);
-    }
-    let first = observations.first().context("no file of data")?;
-    let source = known(first);
-    let source = source.as_ref();
+    let all = data.iter().map(|path| Seen::read(path)).collect::<anyhow::Result<Vec<Seen>>>()?;
+    let first = all.first().context("no file of data")?;
     let is_image = match model {
         Some(model) => model == Model::Image,
-        None => source.is_some_and(|source| !source.varies),
+        None => first.source.is_some_and(|source| !source.varies),
     };
     if !is_image {
         bail!("several files are fitted as one image that does not change: give --model image");
     }
-    let name = &called(first, source);
-    let file = |path: &PathBuf| {
-        path.file_name().and_then(|name| name.to_str()).unwrap_or_default().to_owned()
-    };
     let paths = data.iter().map(|path| seen_from(toml, path).map(toml::Value::String));
     let paths = toml::Value::Array(paths.collect::<anyhow::Result<_>>()?).to_string();
     // Leakage is solved for unless the names of all files say that it was taken out.
-    let raw = data.iter().map(file).min_by_key(|name| name.to_ascii_lowercase().contains("dterm"));
-    let all = together(&observations);
-    let text = static_image::of_visibilities(&all, source, name, &paths, &raw.unwrap_or_default())?;
-    let read = observations.iter().zip(data).map(|(seen, path)| {
-        let of = known(seen);
-        let said = visibilities::read(seen, &file(path), &called(seen, of.as_ref()), of.is_some());
-        format!("{}{said}\n", guess::READ)
-    });
+    let raw = all.iter().map(|seen| &seen.file);
+    let raw = raw.min_by_key(|name| name.to_ascii_lowercase().contains("dterm"));
+    let observations: Vec<&Observation> = all.iter().map(|seen| &seen.observation).collect();
+    let union = Seen {
+        observation: together(&observations),
+        file: raw.unwrap_or(&first.file).clone(),
+        source: first.source,
+        name: first.name.clone(),
+    };
+    let text = static_image::of_visibilities(&union, &paths)?;
+    let read = all.iter().map(|seen| format!("{}{}\n", guess::READ, visibilities::read(seen)));
     // What its first line says of them all is told of each.
     let rest = text.split_once('\n').map_or(&*text, |(_, rest)| rest);
     Ok(read.collect::<String>() + rest)
 }
 
 /// Rows of all observations in one, for guesses alone: of total intensity, unless all are polarised and of one basis.
-fn together(all: &[Observation]) -> Observation {
+fn together(all: &[&Observation]) -> Observation {
     let is_alike = all.iter().all(|seen| seen.is_polarized() && seen.basis == all[0].basis);
     let part = |seen: &Observation| if is_alike { seen.clone() } else { seen.total_intensity() };
-    let mut union = Observation { rows: Vec::new(), channels: Vec::new(), ..part(&all[0]) };
-    for seen in all.iter().map(part) {
+    let mut union = Observation { rows: Vec::new(), channels: Vec::new(), ..part(all[0]) };
+    for seen in all.iter().map(|seen| part(seen)) {
         let place = |station: &Station| {
             let known = union.stations.iter().position(|other| other.name == station.name);
             known.unwrap_or_else(|| {
@@ -141,23 +135,25 @@ fn together(all: &[Observation]) -> Observation {
             ..*row
         }));
     }
+    // Titles name one day, or none.
+    union.mjd = union.mjd.filter(|day| all.iter().all(|seen| seen.mjd == Some(*day)));
     union
 }
 
 /// The plain settings of a fit of this file, or of these of one image, for annotation.
 fn of_data(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Result<String> {
     let [data] = data else { return of_files(data, toml, model) };
+    let path = || anyhow::Ok(toml::Value::String(seen_from(toml, data)?).to_string());
     if model == Some(Model::Image) {
-        let observation = crate::interferometry::read(data)?;
-        return of_observation(&observation, data, toml, model);
+        let seen = Seen::read(data)?;
+        return of_observation(&seen, &path()?, model);
     }
-    let path = toml::Value::String(seen_from(toml, data)?).to_string();
+    let path = path()?;
     if data.is_dir() || matches!(paths::ending(data).as_str(), "npz" | "npy" | "exr") {
         return of_movie(&read_movie(data)?, &path);
     }
-    let name = data.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-    let first = match crate::interferometry::read(data) {
-        Ok(observation) => return of_observation(&observation, data, toml, model),
+    let first = match Seen::read(data) {
+        Ok(seen) => return of_observation(&seen, &path, model),
         Err(first) => first,
     };
     // A table may hold a light curve, and a FITS file or a table an image.
@@ -165,6 +161,7 @@ fn of_data(data: &[PathBuf], toml: &Path, model: Option<Model>) -> anyhow::Resul
         crate::output::read_text(data).ok().filter(|text| files::is_light_curve(text))
     {
         let curve = files::parse_light_curve(&text).with_context(|| data.display().to_string())?;
+        let name = data.file_name().and_then(|name| name.to_str()).unwrap_or_default();
         let source = sources::named_in(name).or_else(|| sources::named_above(&text));
         return light_curve::of_light_curve(&curve, &path, name, source);
     }
@@ -185,27 +182,16 @@ fn seen_from(toml: &Path, data: &Path) -> anyhow::Result<String> {
 
 /// Guesses settings for visibilities: a static image, if that is wanted, the source is known to stand still for a night, or
 /// what it varies is no more than is known of it.
-fn of_observation(
-    observation: &Observation,
-    data: &Path,
-    toml: &Path,
-    model: Option<Model>,
-) -> anyhow::Result<String> {
-    let path = toml::Value::String(seen_from(toml, data)?).to_string();
-    let file = data.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-    let source = known(observation);
-    let source = source.as_ref();
-    let name = &called(observation, source);
-    let image = || static_image::of_visibilities(observation, source, name, &path, file);
-    let volume = || visibilities::of_visibilities(observation, &path, file);
-    match (model, source) {
+fn of_observation(seen: &Seen, path: &str, model: Option<Model>) -> anyhow::Result<String> {
+    let image = || static_image::of_visibilities(seen, path);
+    let volume = || visibilities::of_visibilities(seen, path);
+    match (model, &seen.source) {
         (Some(Model::Image), _) => image(),
         (Some(Model::Volume), _) | (None, None) => volume(),
         (None, Some(source)) if !source.varies => image(),
         (None, Some(source)) => {
             let static_image = image().ok();
-            let look =
-                static_image.as_ref().and_then(|text| QuickLook::new(text, observation, file));
+            let look = static_image.as_ref().and_then(|text| QuickLook::new(text, seen));
             let (Some(text), Some(look)) = (static_image, look) else {
                 if source.image.is_some() {
                     return volume();

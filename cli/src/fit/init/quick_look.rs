@@ -1,10 +1,10 @@
 //! Test of whether data of a source that varies ask for motion: a quick static image of them, before settings are
 //! guessed.
 
+use super::sources::Seen;
 use kerrlight_imaging::settings::StaticImageFile;
 use kerrlight_imaging::{data, survey};
 use kerrlight_tomo::fit::verdict::is_chance;
-use kerrlight_vlbi::observation::Observation;
 
 /// Residuals of a static image.
 pub struct QuickLook {
@@ -15,10 +15,10 @@ pub struct QuickLook {
 impl QuickLook {
     /// Fits a static image from all of the starts in its settings; penalties are as strong as they stand there, and
     /// nothing is drawn. None if these data have no static image.
-    pub fn new(settings: &str, observation: &Observation, name: &str) -> Option<Self> {
+    pub fn new(settings: &str, seen: &Seen) -> Option<Self> {
         let mut file = StaticImageFile::parse(settings).ok()?;
         (file.strength, file.ring, file.image.draws) = (None, None, None);
-        let measured = data::total_intensity(&file, observation.clone(), name).ok()?;
+        let measured = data::total_intensity(&file, seen.observation.clone(), &seen.file).ok()?;
         let survey = survey(&file, &measured, &[], &|_, _| true).ok()??;
         let terms = measured.visibility_terms::<f64>(&file.loss, file.image.pixels.pow(2)).ok()?;
         let frames = 0..measured.times.len();

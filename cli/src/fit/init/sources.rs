@@ -1,9 +1,10 @@
 //! Sources whose numbers are published.
 
-use crate::plain;
+use crate::{interferometry, plain};
 use kerrlight_vlbi::earth::SourcePosition;
 use kerrlight_vlbi::noise::SCATTERED;
 use kerrlight_vlbi::observation::Observation;
+use std::path::Path;
 
 /// A source whose mass and distance are known.
 #[derive(Clone, Copy)]
@@ -107,12 +108,36 @@ pub fn named_above(text: &str) -> Option<&'static Source> {
     names.find_map(|(_, name)| named_in(name.trim()))
 }
 
+/// Visibilities of a file, with what is known of their source.
+pub struct Seen {
+    /// The visibilities.
+    pub observation: Observation,
+    /// The file's name.
+    pub file: String,
+    /// The source, where its mass and distance are known.
+    pub source: Option<Source>,
+    /// The source's name in a line of text.
+    pub name: String,
+}
+
+impl Seen {
+    /// Reads a file.
+    pub fn read(path: &Path) -> anyhow::Result<Self> {
+        let observation = interferometry::read(path)?;
+        let file = path.file_name().and_then(|name| name.to_str()).unwrap_or_default().to_owned();
+        let source = known(&observation);
+        let name = source.as_ref().map_or(observation.source.trim(), |source| source.name);
+        let name = plain::line(if name.is_empty() { "unnamed source" } else { name }).into_owned();
+        Ok(Self { observation, file, source, name })
+    }
+}
+
 /// Frequencies at which what is published of images and fluxes holds, Hz.
 const BAND_HZ: core::ops::RangeInclusive<f64> = 200e9..=260e9;
 
 /// Returns the source that an observation is of, if it is one of these: at another frequency without what holds at 1.3 mm alone,
 /// and without scattering where `kerrlight observe` has simulated none.
-pub fn known(observation: &Observation) -> Option<Source> {
+fn known(observation: &Observation) -> Option<Source> {
     let source = *found(observation)?;
     let is_scattered = observation.history.iter().any(|line| line.contains(SCATTERED));
     let is_sharp = is_simulated(observation) && !is_scattered;
@@ -139,12 +164,6 @@ fn found(observation: &Observation) -> Option<&'static Source> {
         });
         near || source.words.iter().any(|name| word.starts_with(name))
     })
-}
-
-/// The source's name in a line of text.
-pub fn called(observation: &Observation, source: Option<&Source>) -> String {
-    let name = source.map_or(observation.source.trim(), |source| source.name);
-    plain::line(if name.is_empty() { "unnamed source" } else { name }).into_owned()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Settings of a static image, guessed from visibilities.
 
 use super::polarized::Tables;
-use super::sources::Source;
+use super::sources::{Seen, Source};
 use super::template::{complete, digits, plain_words};
 use super::visibilities::{gains, has_closures, read, short_baselines};
 use anyhow::Context;
@@ -10,13 +10,8 @@ use kerrlight_tomo::fit::setup;
 use kerrlight_vlbi::observation::Observation;
 
 /// The plain settings of a static image of these data, for annotation.
-pub fn of_visibilities(
-    observation: &Observation,
-    source: Option<&Source>,
-    name: &str,
-    path: &str,
-    file: &str,
-) -> anyhow::Result<String> {
+pub fn of_visibilities(seen: &Seen, path: &str) -> anyhow::Result<String> {
+    let (observation, source) = (&seen.observation, seen.source.as_ref());
     let longest = observation.stokes_i().map(|(row, _)| row.uv[0].hypot(row.uv[1]));
     let longest = longest.fold(0.0, f64::max);
     let beam = (longest > 0.0).then(|| 1.0 / longest / MICROARCSECOND);
@@ -41,7 +36,7 @@ pub fn of_visibilities(
         ));
     }
     let folds = folds(observation, average(source), long_only.is_some());
-    let tables = Tables::of(observation, file, has_law, folds);
+    let tables = Tables::of(observation, &seen.file, has_law, folds);
     let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
     let published = source.and_then(|source| source.image.as_ref());
     let field = published.map_or(5.0 * beam, |images| images.field_uas);
@@ -55,7 +50,7 @@ pub fn of_visibilities(
     let start = published.map_or(START * field, |images| images.envelope_uas);
     let scaled = |part: f64| digits(part * field);
     let fields = [
-        ("title", format!("{}{day}", plain_words(name))),
+        ("title", format!("{}{day}", plain_words(&seen.name))),
         ("field", scaled(1.0)),
         ("field_why", field_why.to_owned()),
         ("envelope", envelope),
@@ -73,7 +68,7 @@ pub fn of_visibilities(
         ("gains", gains(observation)),
         ("leakage", tables.leakage),
         ("polarization", tables.polarization),
-        ("read", read(observation, file, name, source.is_some())),
+        ("read", read(seen)),
         ("path", path.to_owned()),
     ];
     complete(include_str!("image.toml"), &fields)

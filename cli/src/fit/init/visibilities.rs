@@ -1,6 +1,6 @@
 //! Starter file for a volume from visibilities, and what every starter file says of them.
 
-use super::sources::{Source, called, is_simulated, known};
+use super::sources::{Seen, Source, is_simulated};
 use super::template::{complete, digits, plain_words};
 use anyhow::bail;
 use kerrlight_common::units::{gravitational_angle, gravitational_time};
@@ -12,15 +12,10 @@ use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::products::ClosureKind;
 use std::collections::BTreeSet;
 
-pub fn of_visibilities(
-    observation: &Observation,
-    path: &str,
-    file: &str,
-) -> anyhow::Result<String> {
+pub fn of_visibilities(seen: &Seen, path: &str) -> anyhow::Result<String> {
+    let Seen { observation, source, name, .. } = seen;
     let flux = short_baselines(observation)?;
-    let source = known(observation);
     let average_s = average(source.as_ref());
-    let name = &called(observation, source.as_ref());
     let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
     let (mass, inclination, field) = match source {
         Some(of) => (
@@ -46,7 +41,7 @@ pub fn of_visibilities(
     if has_closures(observation, average_s, source.is_some_and(|source| source.uv_min.is_some())) {
         losses += "\n[[loss]]\ndata = \"closure-phases\"\nweight = 1.0\nleast_snr = 3.0 #! closure quantities of weaker baselines are not Gaussian";
     }
-    let of_source = source.into_iter().flat_map(|source| [source.uv_min, source.blur]);
+    let of_source = source.iter().flat_map(|source| [source.uv_min, source.blur]);
     let of_source: Vec<&str> = of_source.flatten().collect();
     // Pixels of the region, 8 M deep, with emission 0.02.
     let per_pixel = flux / (core::f64::consts::PI * (10.0f64 / 24.0 * 32.0).powi(2) * 8.0 * 0.02);
@@ -62,7 +57,7 @@ pub fn of_visibilities(
         ("average", format!("{average_s:?}")),
         ("source", of_source.join("\n")),
         ("gains", gains(observation)),
-        ("read", read(observation, file, name, source.is_some()) + unfitted(observation)),
+        ("read", read(seen) + unfitted(observation)),
         ("path", path.to_owned()),
     ];
     complete(include_str!("visibilities.toml"), &fields)
@@ -96,20 +91,20 @@ pub fn gains(observation: &Observation) -> String {
 }
 
 /// Describes the file, in a line.
-pub fn read(observation: &Observation, file: &str, name: &str, is_known: bool) -> String {
+pub fn read(seen: &Seen) -> String {
+    let Seen { observation, file, source, name } = seen;
     let rows: Vec<f64> = observation.stokes_i().map(|(row, _)| row.time_h).collect();
     let stations: BTreeSet<u16> =
         observation.stokes_i().flat_map(|(row, _)| row.stations).collect();
     let [first, last] = rows
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], time| [a.min(*time), b.max(*time)]);
-    let source =
-        if is_known { format!("{name}, recognised by position or name") } else { name.to_owned() };
+    let known = if source.is_some() { ", recognised by position or name" } else { "" };
     let day = observation.mjd.map_or(String::new(), |mjd| format!(", MJD {mjd}"));
     let frequency =
         observation.frequency_hz.map_or(String::new(), |hz| format!(" at {:.1} GHz", hz * 1e-9));
     format!(
-        "{file}: {source}{day}, {first:.2} h to {last:.2} h UTC, {} stations, {} visibilities of Stokes I{frequency}",
+        "{file}: {name}{known}{day}, {first:.2} h to {last:.2} h UTC, {} stations, {} visibilities of Stokes I{frequency}",
         stations.len(),
         rows.len()
     )
