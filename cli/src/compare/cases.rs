@@ -149,8 +149,8 @@ impl Case {
 
     /// Factors with its levels.
     fn picked(&self) -> impl Iterator<Item = (&str, &Level)> {
-        let names = self.recipe.experiment.factor.iter().map(|factor| factor.name.as_str());
-        names.zip(picked(&self.recipe.levels, self.chosen()))
+        let factors = self.recipe.experiment.factor.iter().zip(self.chosen());
+        factors.map(|(factor, k)| (factor.name.as_str(), &factor.levels[*k as usize]))
     }
 
     /// Its level of each factor.
@@ -165,8 +165,9 @@ impl Case {
 
     /// The number of a level, with that of its factor.
     pub fn place(&self, factor: &str, level: &str) -> Option<(usize, u32)> {
-        let at = self.recipe.experiment.factor.iter().position(|f| f.name == factor)?;
-        Some((at, self.recipe.levels[at].iter().position(|l| l.name == level)? as u32))
+        let mut factors = self.recipe.experiment.factor.iter().enumerate();
+        let (at, factor) = factors.find(|(_, of)| of.name == factor)?;
+        Some((at, factor.levels.iter().position(|l| l.name == level)? as u32))
     }
 
     /// Its level of a factor.
@@ -199,17 +200,13 @@ pub fn expand(
     source: &Source,
     choice: &Choice,
 ) -> anyhow::Result<Vec<Case>> {
-    let (recipe, seeds) = recipe(experiment, source, choice)?;
+    let recipe = Arc::new(Recipe::new(experiment, source, choice)?);
     if recipe.variants.is_empty() {
         bail!("no case is left");
     }
-    let of = |seed: u64, variant: usize| Case {
-        recipe: Arc::clone(&recipe),
-        variant: variant as u32,
-        seed,
-    };
-    let (of, variants) = (&of, recipe.variants.len());
-    Ok((1..=seeds).flat_map(|seed| (0..variants).map(move |k| of(seed, k))).collect())
+    let variants = 0..recipe.variants.len() as u32;
+    let all = (1..=recipe.seeds).flat_map(|seed| variants.clone().map(move |k| (k, seed)));
+    Ok(all.map(|(variant, seed)| Case { recipe: Arc::clone(&recipe), variant, seed }).collect())
 }
 
 /// Cases of which each stands for all that differ from it in the seed alone.
@@ -228,12 +225,12 @@ pub fn find(
     choice: &Choice,
     id: &str,
 ) -> anyhow::Result<Case> {
-    let (recipe, seeds) = recipe(experiment, source, choice)?;
+    let recipe = Arc::new(Recipe::new(experiment, source, choice)?);
     let known = || {
         let (before, _) = id.rsplit_once('_')?;
         // The last one: the name of a level may contain `seed` itself.
         let (words, seed) = before.rsplit_once("seed")?;
-        let seed: u64 = seed.parse().ok().filter(|seed| (1..=seeds).contains(seed))?;
+        let seed: u64 = seed.parse().ok().filter(|seed| (1..=recipe.seeds).contains(seed))?;
         let case =
             |variant: usize| Case { recipe: Arc::clone(&recipe), variant: variant as u32, seed };
         // Of a hundred thousand cases only those with these levels have their settings made.
@@ -242,25 +239,6 @@ pub fn find(
     known().ok_or_else(|| {
         anyhow!("--case {id:?}: there is no such case with these settings; --list has all that are")
     })
-}
-
-/// Returns the recipe of the settings of all cases, and the number of seeds.
-fn recipe(
-    experiment: &Experiment,
-    source: &Source,
-    choice: &Choice,
-) -> anyhow::Result<(Arc<Recipe>, u64)> {
-    let quick = choice.quick.then_some(&experiment.quick);
-    let seeds = choice.seeds.or(quick.and_then(|q| q.seeds)).unwrap_or(experiment.seeds);
-    if !(1..=1_000_000).contains(&seeds) {
-        bail!("--seeds {seeds} is not allowed: 1 to 1000000");
-    }
-    // Cases that are asked for by name take the place of the quick look's own choice.
-    let only = match quick {
-        Some(quick) if choice.only.is_empty() => &quick.only,
-        _ => &choice.only,
-    };
-    Ok((Arc::new(Recipe::new(experiment, source, choice, only)?), seeds))
 }
 
 fn remove(table: &mut Table, key: &str) -> anyhow::Result<()> {

@@ -93,6 +93,9 @@ pub struct Factor {
     pub values: Vec<Value>,
     /// Values are multiplied by this before they become settings: for units.
     pub scale: Option<f64>,
+    /// All levels, those of values included.
+    #[serde(skip)]
+    pub levels: Vec<Level>,
 }
 
 /// Level of a factor.
@@ -215,7 +218,8 @@ pub enum FigureKind {
 impl Experiment {
     /// Reads and checks.
     pub fn parse(text: &str) -> anyhow::Result<Self> {
-        let experiment: Self = read(text, &KEYS)?;
+        let mut experiment: Self = read(text, &KEYS)?;
+        experiment.factor.iter_mut().for_each(|factor| factor.levels = factor.all_levels());
         experiment.check()?;
         Ok(experiment)
     }
@@ -244,8 +248,8 @@ impl Experiment {
 
     /// Seeds of cases are told by `seeds` alone.
     fn check_seed(&self) -> anyhow::Result<()> {
-        let levels = self.factor.iter().flat_map(Factor::levels).map(|level| level.set);
-        let mut all = levels.chain([self.set.clone(), self.quick.set.clone()]);
+        let levels = self.factor.iter().flat_map(|factor| &factor.levels).map(|level| &level.set);
+        let mut all = levels.chain([&self.set, &self.quick.set]);
         if all.any(|set| set.contains_key("seed")) {
             bail!("`seed` is not allowed among the settings: `seeds` tells how many there are");
         }
@@ -289,15 +293,26 @@ impl Experiment {
     }
 
     /// Levels of one factor.
-    pub fn levels(&self, factor: &str) -> Vec<Level> {
-        self.factor.iter().find(|f| f.name == factor).map(Factor::levels).unwrap_or_default()
+    pub fn levels(&self, factor: &str) -> &[Level] {
+        let factor = self.factor.iter().find(|f| f.name == factor);
+        factor.map(|factor| factor.levels.as_slice()).unwrap_or_default()
+    }
+
+    /// Those of some factors, with the factors' names.
+    pub fn levels_of(&self, factors: &[String]) -> Vec<Vec<(&str, &str)>> {
+        let of = |factor: &String| -> Vec<(&str, &str)> {
+            let factor = self.factor.iter().filter(|f| f.name == *factor);
+            let levels = factor.flat_map(|f| f.levels.iter().map(move |l| (&*f.name, &*l.name)));
+            levels.collect()
+        };
+        factors.iter().map(of).collect()
     }
 
     fn known(&self, levels: &BTreeMap<String, String>) -> anyhow::Result<()> {
         for (factor, level) in levels {
             let all = self.levels(factor);
             if !all.iter().any(|l| l.name == *level) {
-                let names: Vec<String> = all.into_iter().map(|l| l.name).collect();
+                let names: Vec<&str> = all.iter().map(|l| l.name.as_str()).collect();
                 bail!("there is no {factor} = {level:?}: its levels are {}", names.join(", "));
             }
         }
@@ -355,17 +370,15 @@ impl Factor {
             (None, false, true) | (Some(_), true, false) => {}
             _ => bail!("factor {name:?} needs either levels, or a key with values"),
         }
-        let levels = self.levels();
-        for (k, level) in levels.iter().enumerate() {
-            if levels[..k].iter().any(|other| other.name == level.name) {
+        for (k, level) in self.levels.iter().enumerate() {
+            if self.levels[..k].iter().any(|other| other.name == level.name) {
                 bail!("factor {name:?}: level {:?} is there twice", level.name);
             }
         }
         Ok(())
     }
 
-    /// Its levels, those of values included.
-    pub fn levels(&self) -> Vec<Level> {
+    fn all_levels(&self) -> Vec<Level> {
         let Some(key) = &self.key else { return self.level.clone() };
         let level = |value: &Value| {
             let number = value.as_float().or(value.as_integer().map(|n| n as f64));

@@ -155,20 +155,13 @@ pub fn result(results: &Value, value: &str) -> Option<f64> {
 }
 
 /// Every combination of one of each, the last fastest.
-pub fn product<T: Clone>(each: impl Iterator<Item = Vec<T>>) -> Vec<Vec<T>> {
-    each.fold(vec![Vec::new()], |all, choices| {
+pub fn product<T: Clone>(each: impl IntoIterator<Item = Vec<T>>) -> Vec<Vec<T>> {
+    each.into_iter().fold(vec![Vec::new()], |all, choices| {
         let with = |before: &Vec<T>| -> Vec<Vec<T>> {
             choices.iter().map(|one| [before.as_slice(), &[one.clone()]].concat()).collect()
         };
         all.iter().flat_map(with).collect()
     })
-}
-
-/// Every combination of levels of some factors, in the order of the experiment.
-pub fn combinations(levels: &[(String, Vec<String>)]) -> Vec<Vec<(&str, &str)>> {
-    product(levels.iter().map(|(factor, levels)| {
-        levels.iter().map(|level| (factor.as_str(), level.as_str())).collect()
-    }))
 }
 
 /// Returns the name of a combination: levels, with the factor's name before a number.
@@ -211,13 +204,10 @@ mod tests {
 
     #[test]
     fn exact_combinations_keep_their_order() {
-        let levels = [
-            ("a".to_owned(), vec!["1".to_owned(), "2".to_owned()]),
-            ("b".to_owned(), vec!["x".to_owned(), "y".to_owned()]),
-        ];
-        let names: Vec<String> = combinations(&levels).iter().map(|c| called(c)).collect();
+        let levels = [vec![("a", "1"), ("a", "2")], vec![("b", "x"), ("b", "y")]];
+        let names: Vec<String> = product(levels).iter().map(|c| called(c)).collect();
         assert_eq!(names, ["a 1, x", "a 1, y", "a 2, x", "a 2, y"]);
-        assert_eq!(combinations(&[]), [Vec::new()]);
+        assert_eq!(product::<u32>([]), [Vec::new()]);
     }
 
     #[test]

@@ -145,8 +145,8 @@ impl Compare {
             false => (experiment.clone(), Vec::new()),
         };
         let file = Output::new(&folder.join("results.json"), "")?;
-        let summary = Summary::written(&cases, status, &shown.title, choice.quick, &file)?;
-        let page = Page { experiment: &shown, choice, summary: &summary };
+        let summary = Summary::written(&shown, &cases, status, choice.quick, &file)?;
+        let page = Page { choice, summary: &summary };
         let tables = page.write(&runner, &folder, left_out)?;
         recorder.write_into(&folder)?;
         Ok(end(&tables, &summary, &folder, self.collect))

@@ -1,6 +1,5 @@
 //! Results of a comparison: tables, pictures and one page of them.
 
-use super::experiment::Experiment;
 use super::recipe::Choice;
 use super::runner::Runner;
 use super::summary::Summary;
@@ -22,8 +21,6 @@ pub fn files(folder: &Path) -> Vec<PathBuf> {
 
 /// All that a page is made of.
 pub struct Page<'a> {
-    /// Experiment, as it is shown.
-    pub experiment: &'a Experiment,
     /// Choice of cases that were run.
     pub choice: &'a Choice,
     /// Summary of the results.
@@ -38,14 +35,14 @@ impl Page<'_> {
         folder: &Path,
         mut left_out: Vec<String>,
     ) -> anyhow::Result<String> {
-        let Page { experiment, choice, summary } = self;
+        let Page { choice, summary } = self;
         let file = |name: &str| Output::new(&folder.join(name), "");
         file("results.csv")?.write(&summary.csv()?)?;
         let shown = self.tables();
         let text: String = shown.iter().map(tables::markdown).collect();
         let text = [self.heading(), text].concat();
         file("tables.md")?.write(text.as_bytes())?;
-        let drawn = figures::Figures { experiment, summary, runner }.draw()?;
+        let drawn = figures::Figures { summary, runner }.draw()?;
         left_out.extend(drawn.missing);
         let mut figures: Vec<Figure> = Vec::new();
         for (name, figure) in drawn.figures {
@@ -53,12 +50,15 @@ impl Page<'_> {
             figures.push(figure);
         }
         let report = Report {
-            title: experiment.title.clone(),
+            title: summary.experiment.title.clone(),
             notice: choice.quick.then(quick::notice),
             summary: self.sentences(),
             parts: self.parts(left_out),
             tables: shown,
-            details: vec![tables::all(summary, !choice.quick), tables::levels_told(experiment)],
+            details: vec![
+                tables::all(summary, !choice.quick),
+                tables::levels_told(summary.experiment),
+            ],
             figures,
             plots: drawn.plots,
             ..Report::default()
@@ -69,9 +69,8 @@ impl Page<'_> {
 
     /// Returns the tables: what ran, and what the experiment asks for.
     fn tables(&self) -> Vec<Table> {
-        let Page { experiment, summary, .. } = self;
-        let asked = experiment.table.iter();
-        let asked = asked.map(|asked| tables::table(experiment, summary, asked));
+        let summary = self.summary;
+        let asked = summary.experiment.table.iter().map(|asked| tables::table(summary, asked));
         std::iter::once(ran::table(summary)).chain(asked).collect()
     }
 
@@ -81,14 +80,18 @@ impl Page<'_> {
             return String::new();
         }
         let notice = quick::notice();
-        format!("# {}\n\n{}\n\n", plain::line(&self.experiment.title), notice.text.join("\n\n"))
+        format!(
+            "# {}\n\n{}\n\n",
+            plain::line(&self.summary.experiment.title),
+            notice.text.join("\n\n")
+        )
     }
 
     /// Returns the parts of the page: results, how to read them, how they were measured.
     fn parts(&self, left_out: Vec<String>) -> Vec<Part> {
-        let Page { experiment, choice, summary } = self;
-        let orders =
-            experiment.table.iter().map(|asked| verdicts::of_table(experiment, summary, asked));
+        let Page { choice, summary } = self;
+        let experiment = summary.experiment;
+        let orders = experiment.table.iter().map(|asked| verdicts::of_table(summary, asked));
         // The first table of qualities is the one that the experiment is about.
         let orders = orders.into_iter().find(|all| !all.is_empty()).unwrap_or_default();
         let out = match choice.quick {
@@ -105,7 +108,7 @@ impl Page<'_> {
 
     /// The experiment's own text, which knows nothing of the command line.
     fn setup(&self) -> Vec<String> {
-        let Page { experiment, choice, .. } = self;
+        let Page { choice, summary: Summary { experiment, .. } } = self;
         let changed = !choice.set.is_empty() || choice.seeds.is_some() || !choice.only.is_empty();
         if experiment.setup.is_empty() || !changed {
             return experiment.setup.clone();
@@ -123,8 +126,8 @@ impl Page<'_> {
 
     /// Describes the question, and what was run.
     fn sentences(&self) -> Vec<String> {
-        let Page { experiment, summary, .. } = self;
-        let mut lines = vec![format!("What was asked: {}", experiment.question)];
+        let summary = self.summary;
+        let mut lines = vec![format!("What was asked: {}", summary.experiment.question)];
         let (all, done, open) = (summary.all.len(), summary.done().count(), summary.open());
         let failed = summary.failed().count();
         let seconds: f64 = summary.done().filter_map(|(_, results)| results.get("seconds")).sum();

@@ -1,7 +1,7 @@
 //! Recipes of the settings of cases. They are made when they are wanted: those of a hundred thousand cases would fill
 //! the memory, and to check each of them would take minutes.
 
-use super::experiment::{Experiment, Factor, Level};
+use super::experiment::Experiment;
 use super::labels::product;
 use super::source::Source;
 use anyhow::{anyhow, bail};
@@ -58,8 +58,8 @@ pub struct Recipe {
     pub experiment: Experiment,
     pub source: Source,
     pub choice: Choice,
-    /// Levels of each factor.
-    pub levels: Vec<Vec<Level>>,
+    /// Seeds of every case.
+    pub seeds: u64,
     /// Names of levels as a file system likes them.
     pub words: Vec<Vec<String>>,
     pub variants: Vec<Variant>,
@@ -89,21 +89,27 @@ pub enum Stamp {
 }
 
 impl Recipe {
-    /// Takes the combinations that are left of all: these levels (`factor=level`), without those that are skipped.
-    pub fn new(
-        experiment: &Experiment,
-        source: &Source,
-        choice: &Choice,
-        only: &[String],
-    ) -> anyhow::Result<Self> {
+    /// Takes the combinations that are left of all: the chosen levels, without those that are skipped.
+    pub fn new(experiment: &Experiment, source: &Source, choice: &Choice) -> anyhow::Result<Self> {
+        let quick = choice.quick.then_some(&experiment.quick);
+        let seeds = choice.seeds.or(quick.and_then(|q| q.seeds)).unwrap_or(experiment.seeds);
+        if !(1..=1_000_000).contains(&seeds) {
+            bail!("--seeds {seeds} is not allowed: 1 to 1000000");
+        }
+        // Cases that are asked for by name take the place of the quick look's own choice.
+        let only = match quick {
+            Some(quick) if choice.only.is_empty() => &quick.only,
+            _ => &choice.only,
+        };
         let kept = kept(experiment, only)?;
         let mut experiment = experiment.clone();
         // With paths from the root, a case has the same text, and so the same ID, from any folder.
         experiment.set = source.anchored(&experiment.set);
         experiment.quick.set = source.anchored(&experiment.quick.set);
-        let mut levels: Vec<Vec<Level>> = experiment.factor.iter().map(Factor::levels).collect();
-        levels.iter_mut().flatten().for_each(|level| level.set = source.anchored(&level.set));
-        let words = levels.iter().map(|all| all.iter().map(|level| plain(&level.name)).collect());
+        let levels = experiment.factor.iter_mut().flat_map(|factor| &mut factor.levels);
+        levels.for_each(|level| level.set = source.anchored(&level.set));
+        let levels = || experiment.factor.iter().map(|factor| &factor.levels);
+        let words = levels().map(|all| all.iter().map(|level| plain(&level.name)).collect());
         let mut seen: HashSet<(usize, u32)> = HashSet::new();
         let variant = |chosen: Vec<u32>| {
             let levels = chosen.iter().copied().enumerate();
@@ -111,15 +117,14 @@ impl Recipe {
             let is_new = levels.filter(|level| seen.insert(*level)).count() > 0;
             Variant { chosen: chosen.into(), is_new, ..Variant::default() }
         };
-        let all = product(levels.iter().map(|of| (0..of.len() as u32).collect()));
-        let wanted =
-            all.into_iter().filter(|chosen| is_wanted(&experiment, &levels, chosen, &kept));
+        let all = product(levels().map(|of| (0..of.len() as u32).collect()));
+        let wanted = all.into_iter().filter(|chosen| is_wanted(&experiment, chosen, &kept));
         Ok(Recipe {
             words: words.collect(),
             source: source.clone(),
             choice: choice.clone(),
+            seeds,
             variants: wanted.map(variant).collect(),
-            levels,
             experiment,
             fits: Mutex::default(),
         })
@@ -181,7 +186,7 @@ fn kept(experiment: &Experiment, only: &[String]) -> anyhow::Result<Kept> {
             bail!("--only {choice:?}: there is no factor {factor:?}, only {}", names.join(", "));
         }
         if !known.iter().any(|l| l.name == level) {
-            let names: Vec<String> = known.into_iter().map(|l| l.name).collect();
+            let names: Vec<&str> = known.iter().map(|l| l.name.as_str()).collect();
             bail!("--only {choice:?}: the levels of {factor} are {}", names.join(", "));
         }
         match kept.iter_mut().find(|(name, _)| name == factor) {
@@ -193,10 +198,10 @@ fn kept(experiment: &Experiment, only: &[String]) -> anyhow::Result<Kept> {
 }
 
 /// Returns whether a combination of levels by number is kept and not skipped.
-fn is_wanted(experiment: &Experiment, levels: &[Vec<Level>], chosen: &[u32], kept: &Kept) -> bool {
+fn is_wanted(experiment: &Experiment, chosen: &[u32], kept: &Kept) -> bool {
     let of = |factor: &str| {
         let at = experiment.factor.iter().position(|f| f.name == factor)?;
-        Some(levels[at][chosen[at] as usize].name.as_str())
+        Some(experiment.factor[at].levels[chosen[at] as usize].name.as_str())
     };
     let is_at = |(factor, level): (&String, &String)| of(factor) == Some(level);
     let is_skipped = experiment.skip.iter().any(|skip| skip.iter().all(is_at));

@@ -1,7 +1,8 @@
 //! Summary of the cases of an experiment: all of them, and means over seeds.
 
 use super::cases::{Case, Status};
-use super::labels::{RESULTS, described, number, period};
+use super::experiment::Experiment;
+use super::labels::{RESULTS, described, number, period, product};
 use super::results::Results;
 use super::runner::TOGETHER;
 use crate::checksum;
@@ -13,6 +14,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Cases and how they ended.
 pub struct Summary<'a> {
+    /// Experiment as it is shown.
+    pub experiment: &'a Experiment,
     /// Cases in their order.
     pub all: Vec<(&'a Case, Status<Results>)>,
     /// Number of seeds.
@@ -88,17 +91,17 @@ impl Spread {
 
 impl<'a> Summary<'a> {
     /// Takes these cases.
-    pub fn new(all: Vec<(&'a Case, Status<Results>)>) -> Self {
+    pub fn new(experiment: &'a Experiment, all: Vec<(&'a Case, Status<Results>)>) -> Self {
         let seeds = all.iter().map(|(case, _)| case.seed).max().unwrap_or(1);
-        Summary { all, seeds, groups: Mutex::default() }
+        Summary { experiment, all, seeds, groups: Mutex::default() }
     }
 
     /// Takes these cases, whose settings and results are written for other programs as they are
     /// read.
     pub fn written(
+        experiment: &'a Experiment,
         cases: &'a [Case],
         status: impl Fn(&Case) -> Status + Sync,
-        title: &str,
         quick: bool,
         output: &Output,
     ) -> anyhow::Result<Self> {
@@ -121,9 +124,9 @@ impl<'a> Summary<'a> {
             entries
         });
         let version = env!("CARGO_PKG_VERSION");
-        let object = json!({"title": title, "version": version, "quick": quick});
+        let object = json!({"title": experiment.title, "version": version, "quick": quick});
         output.write_with(|file| Ok(checksum::seal_list(file, object, "cases", entries)?))?;
-        Ok(Self::new(all))
+        Ok(Self::new(experiment, all))
     }
 
     /// Names the seeds that a plot shows.
@@ -142,9 +145,13 @@ impl<'a> Summary<'a> {
         group.into_iter().filter_map(|k| done(&self.all[k])).collect()
     }
 
-    /// Returns whether any case, done or not, is at a level.
-    pub fn has(&self, factor: &str, level: &str) -> bool {
-        self.group(&[(factor, level)]).is_some()
+    /// Every combination of levels of some factors, without levels that no case, done or not, is at.
+    pub fn combinations(&self, factors: &[String]) -> Vec<Vec<(&'a str, &'a str)>> {
+        let mut all = self.experiment.levels_of(factors);
+        for levels in &mut all {
+            levels.retain(|level| self.group(&[*level]).is_some());
+        }
+        product(all)
     }
 
     /// Cases that are at all of these levels, by number.

@@ -2,25 +2,12 @@
 
 use super::cases::{Case, Status};
 use super::experiment::{Companion, Experiment, Level, TableAsked};
-use super::labels::{called, combinations, described, number, pairs};
+use super::labels::{called, described, number, pairs, product};
 use super::results::Results;
 use super::summary::{Spread, Summary};
 use crate::plain;
 use crate::report::Table;
 use toml::Value;
-
-/// Levels of factors, without those that no case is at.
-pub fn levels(
-    experiment: &Experiment,
-    summary: &Summary,
-    factors: &[String],
-) -> Vec<(String, Vec<String>)> {
-    let of = |factor: &String| {
-        let all = experiment.levels(factor).into_iter().map(|level| level.name);
-        (factor.clone(), all.filter(|level| summary.has(factor, level)).collect())
-    };
-    factors.iter().map(of).collect()
-}
 
 /// Cell of a table at some levels.
 pub struct Cell {
@@ -32,20 +19,16 @@ pub struct Cell {
 
 impl Cell {
     /// Nothing where no case has been run.
-    pub fn of(
-        experiment: &Experiment,
-        summary: &Summary,
-        asked: &TableAsked,
-        at: &[(&str, &str)],
-    ) -> Option<Self> {
+    pub fn of(summary: &Summary, asked: &TableAsked, at: &[(&str, &str)]) -> Option<Self> {
         let Some(factor) = &asked.best_of else {
             return Some(Self { spread: summary.spread(&asked.value, at)?, best: None });
         };
-        let cell = |level: Level| {
+        let cell = |level: &Level| {
             let here = [at, &[(factor.as_str(), level.name.as_str())]].concat();
-            Some(Self { spread: summary.spread(&asked.value, &here)?, best: Some(level.name) })
+            let best = Some(level.name.clone());
+            Some(Self { spread: summary.spread(&asked.value, &here)?, best })
         };
-        let all = experiment.levels(factor).into_iter().filter_map(cell);
+        let all = summary.experiment.levels(factor).iter().filter_map(cell);
         // `best_of` is allowed only for results of which more is better.
         all.max_by(|a, b| a.spread.mean.total_cmp(&b.spread.mean))
     }
@@ -61,14 +44,12 @@ impl Cell {
 }
 
 /// One table; a note in its place if it would be empty.
-pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> Table {
+pub fn table(summary: &Summary, asked: &TableAsked) -> Table {
     let (unit, digits) = described(&asked.value);
-    let rows = levels(experiment, summary, &asked.rows);
-    let columns = levels(experiment, summary, &asked.columns);
-    let (rows, columns) = (combinations(&rows), combinations(&columns));
+    let [rows, columns] = [&asked.rows, &asked.columns].map(|of| summary.combinations(of));
     let fixed = pairs(&asked.r#where);
     let cell = |row: &[(&str, &str)], column: &[(&str, &str)]| {
-        Cell::of(experiment, summary, asked, &[row, column, &fixed].concat())
+        Cell::of(summary, asked, &[row, column, &fixed].concat())
     };
     let text =
         |cell: Option<Cell>| cell.map_or(NONE.to_owned(), |cell| cell.text(digits, summary.seeds));
@@ -86,7 +67,7 @@ pub fn table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> 
             format!("Nothing to show: no case that was run to its end has this value ({unit}).");
         return Table::new(title, caption, [""; 0], lines);
     }
-    lines.extend(asked.beside.iter().map(|row| beside(experiment, asked, row, &columns, digits)));
+    lines.extend(asked.beside.iter().map(|row| beside(summary, asked, row, &columns, digits)));
     let gaps = lines.iter().flatten().any(|cell| cell == NONE);
     let head = asked.rows.join(", ");
     let names = columns.iter().map(|column| match column.as_slice() {
@@ -112,19 +93,14 @@ const NONE: &str = "–";
 
 /// A row of numbers from elsewhere, of the columns that are shown.
 fn beside(
-    experiment: &Experiment,
+    summary: &Summary,
     asked: &TableAsked,
     row: &Companion,
     columns: &[Vec<(&str, &str)>],
     digits: usize,
 ) -> Vec<String> {
-    let names = |factor: &String| {
-        let levels = experiment.levels(factor).into_iter().map(|level| level.name);
-        (factor.clone(), levels.collect::<Vec<String>>())
-    };
     // Values count over all levels, some of which may not be shown.
-    let every: Vec<(String, Vec<String>)> = asked.columns.iter().map(names).collect();
-    let every = combinations(&every);
+    let every = product(summary.experiment.levels_of(&asked.columns));
     let value = |column: &Vec<(&str, &str)>| {
         let at = every.iter().position(|other| other == column);
         at.and_then(|k| row.values.get(k)).copied().filter(|x| x.is_finite())
@@ -137,12 +113,12 @@ fn beside(
 pub fn levels_told(experiment: &Experiment) -> Table {
     let mut rows = Vec::new();
     for factor in &experiment.factor {
-        for level in factor.levels() {
+        for level in &factor.levels {
             let mut changes = Vec::new();
             if let Some(fit) = &level.fit {
                 changes.push(format!("the fit {}", fit.display()));
             }
-            flatten("", &Value::Table(level.set), &mut changes);
+            flatten("", &Value::Table(level.set.clone()), &mut changes);
             changes.extend(level.remove.iter().map(|key| format!("no {key}")));
             let changes =
                 if changes.is_empty() { "nothing".to_owned() } else { changes.join("; ") };
@@ -262,11 +238,11 @@ mod tests {
         let cases = expand(&experiment, &Source::default(), &Choice::default()).unwrap();
         let results = [30.0, 20.0, 21.0, 25.0]
             .map(|x| Status::Done(Results::of(&serde_json::json!({"psnr_db": x}))));
-        let summary = Summary::new(cases.iter().zip(results).collect());
-        let table = table(&experiment, &summary, &experiment.table[0]);
+        let summary = Summary::new(&experiment, cases.iter().zip(results).collect());
+        let table = table(&summary, &experiment.table[0]);
         assert_eq!(table.rows, [["bhnerf", "30.00 (0.001)"], ["grid", "25.00 (0.002)"]]);
         assert_eq!(table.caption, "Of two. One seed. In brackets: the best level of rate.");
-        let said = verdicts::of_table(&experiment, &summary, &experiment.table[0]);
+        let said = verdicts::of_table(&summary, &experiment.table[0]);
         assert_eq!(said, ["Best, by PSNR (dB): bhnerf (30.00 (0.001)) > grid (25.00 (0.002))."]);
         let odd =
             Table { title: "a\n# b".to_owned(), rows: vec![vec!["|\u{1b}".to_owned()]], ..table };
@@ -277,7 +253,7 @@ mod tests {
             .iter()
             .map(|case| (case, Status::Done(Results::of(&serde_json::json!({})))))
             .collect();
-        let empty = super::table(&experiment, &Summary::new(none), &experiment.table[0]);
+        let empty = super::table(&Summary::new(&experiment, none), &experiment.table[0]);
         assert!(empty.rows.is_empty() && empty.caption.contains("no case that was run to its end"));
         assert!(markdown(&empty).contains(&empty.caption), "{}", markdown(&empty));
         for (old, new, message) in [

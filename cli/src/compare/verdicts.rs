@@ -1,9 +1,9 @@
 //! Sentences on tables of qualities.
 
-use super::experiment::{Experiment, QUALITIES, TableAsked};
-use super::labels::{called, combinations, described, pairs};
+use super::experiment::{QUALITIES, TableAsked};
+use super::labels::{called, described, pairs};
 use super::summary::Summary;
-use super::tables::{Cell, levels};
+use super::tables::Cell;
 
 /// Rows of a table in an order that some of its columns share.
 struct Order {
@@ -53,21 +53,20 @@ pub fn of_all(summary: &Summary) -> Option<String> {
 }
 
 /// The order of the rows of a table of qualities: a sentence for columns of the same order.
-pub fn of_table(experiment: &Experiment, summary: &Summary, asked: &TableAsked) -> Vec<String> {
+pub fn of_table(summary: &Summary, asked: &TableAsked) -> Vec<String> {
     if !QUALITIES.contains(&asked.value.as_str()) {
         return Vec::new();
     }
     let (unit, digits) = described(&asked.value);
-    let rows = levels(experiment, summary, &asked.rows);
-    let columns = levels(experiment, summary, &asked.columns);
     let fixed = pairs(&asked.r#where);
     let mut orders: Vec<Order> = Vec::new();
-    for column in combinations(&columns) {
-        let mut ranked: Vec<_> = combinations(&rows)
+    for column in summary.combinations(&asked.columns) {
+        let mut ranked: Vec<_> = summary
+            .combinations(&asked.rows)
             .into_iter()
             .filter_map(|row| {
                 let at = [row.as_slice(), &column, &fixed].concat();
-                Some((called(&row), Cell::of(experiment, summary, asked, &at)?))
+                Some((called(&row), Cell::of(summary, asked, &at)?))
             })
             .collect();
         if ranked.len() < 2 {

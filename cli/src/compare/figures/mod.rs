@@ -6,15 +6,17 @@ mod plots;
 mod volumes;
 
 use super::cases::Case;
-use super::experiment::{Experiment, FigureAsked, FigureKind};
+use super::experiment::{FigureAsked, FigureKind};
 use super::labels::{described, pairs};
 use super::results::Results;
 use super::runner::Runner;
 use super::summary::Summary;
-use super::tables::levels;
 use crate::output;
 use crate::report::{Figure, LinePlot, encode};
 use anyhow::Context;
+
+/// Levels of some factors.
+type Levels<'l> = Vec<(&'l str, &'l str)>;
 
 /// Pictures and plots.
 #[derive(Default)]
@@ -32,9 +34,7 @@ const MOST: usize = 12;
 
 /// All that figures are made of.
 pub struct Figures<'a> {
-    /// Experiment that is shown.
-    pub experiment: &'a Experiment,
-    /// Summary of its results.
+    /// Summary of the results.
     pub summary: &'a Summary<'a>,
     /// Folders of the runs.
     pub runner: &'a Runner<'a>,
@@ -44,7 +44,7 @@ impl Figures<'_> {
     /// All that the experiment asks for and that there is something of.
     pub fn draw(&self) -> anyhow::Result<Drawn> {
         let mut drawn = Drawn::default();
-        for (k, asked) in self.experiment.figure.iter().enumerate() {
+        for (k, asked) in self.summary.experiment.figure.iter().enumerate() {
             let (figures, plots) = (drawn.figures.len(), drawn.plots.len());
             self.one(k, asked, &mut drawn).with_context(|| format!("figure {:?}", asked.title))?;
             let count = drawn.figures.len() + drawn.plots.len() - figures - plots;
@@ -117,24 +117,19 @@ impl Figures<'_> {
             return Ok(None);
         };
         let fixed = pairs(&asked.r#where);
-        let names = |factor: &String| {
-            levels(self.experiment, self.summary, std::slice::from_ref(factor)).remove(0).1
+        let [rows, columns] = [&asked.rows, &asked.columns].map(|of| self.summary.combinations(of));
+        let cell = |r: &Levels<'_>, c: &Levels<'_>| {
+            let at = [r.as_slice(), c, &fixed].concat();
+            self.summary.spread(value, &at).map(|s| s.mean)
         };
-        let (rows, columns) = (names(row), names(column));
-        let cell = |r: &String, c: &String| {
-            let at =
-                [vec![(row.as_str(), r.as_str()), (column.as_str(), c.as_str())], fixed.clone()];
-            self.summary.spread(value, &at.concat()).map(|s| s.mean)
+        let means = rows.iter().map(|r| columns.iter().map(|c| cell(r, c)).collect()).collect();
+        let names = |factor: &String, of: &[Levels<'_>]| {
+            let levels = of.iter().flatten().map(|(_, level)| (*level).to_owned());
+            std::iter::once(factor.clone()).chain(levels).collect()
         };
-        let means: Vec<Vec<Option<f64>>> =
-            rows.iter().map(|r| columns.iter().map(|c| cell(r, c)).collect()).collect();
         let (unit, digits) = described(value);
-        let map = super::map::Map {
-            rows: [row.clone()].into_iter().chain(rows).collect(),
-            columns: [column.clone()].into_iter().chain(columns).collect(),
-            means,
-            digits,
-        };
+        let (rows, columns) = (names(row, &rows), names(column, &columns));
+        let map = super::map::Map { rows, columns, means, digits };
         let Some(picture) = map.draw() else { return Ok(None) };
         let caption = format!("{}: mean {unit}. {}", asked.title, asked.caption);
         Ok(Some(Figure { png: encode(Some(picture))?, caption, alt: asked.title.clone() }))

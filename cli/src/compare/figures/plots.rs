@@ -3,9 +3,8 @@
 use super::Figures;
 use crate::compare::cases::Case;
 use crate::compare::experiment::FigureAsked;
-use crate::compare::labels::{called, combinations, described, result};
+use crate::compare::labels::{called, described, result};
 use crate::compare::results::Results;
-use crate::compare::tables::levels;
 use crate::fit;
 use crate::output;
 use crate::report::{Axis, LinePlot, Marks, Series};
@@ -19,14 +18,13 @@ impl Figures<'_> {
     /// One plot for each combination of the columns, a curve for each of the rows; every seed's points.
     pub(super) fn times(&self, asked: &FigureAsked) -> anyhow::Result<Vec<LinePlot>> {
         let value = asked.value.as_deref().unwrap_or("psnr_db");
-        let columns = levels(self.experiment, self.summary, &asked.columns);
-        let rows = levels(self.experiment, self.summary, &asked.rows);
+        let rows = self.summary.combinations(&asked.rows);
         // Steps of several seeds have no order among each other.
         let marks = if self.summary.seeds == 1 { Marks::Joined } else { Marks::Points };
         let mut plots = Vec::new();
-        for column in combinations(&columns) {
+        for column in self.summary.combinations(&asked.columns) {
             let mut series = Vec::new();
-            for row in combinations(&rows) {
+            for row in &rows {
                 let at = [row.as_slice(), &column].concat();
                 let mut points = Vec::new();
                 for (case, results) in self.chosen_at(asked, &at) {
@@ -39,7 +37,7 @@ impl Figures<'_> {
                 }
                 points.sort_by(|a, b| a[0].total_cmp(&b[0]));
                 // One without points keeps the colours of the others as they are in other plots.
-                series.push(Series::new(called(&row), points, marks));
+                series.push(Series::new(called(row), points, marks));
             }
             let (unit, _) = described(value);
             let seeds = self.summary.seeds_told();
@@ -76,9 +74,8 @@ impl Figures<'_> {
         let (Some(value), Some(factor)) = (&asked.value, asked.columns.first()) else {
             return Vec::new();
         };
-        let rows = levels(self.experiment, self.summary, &asked.rows);
         let mut series = Vec::new();
-        for row in combinations(&rows) {
+        for row in self.summary.combinations(&asked.rows) {
             let point = |(case, results): (&Case, &Results)| {
                 Some([case.number(factor)?, results.get(value)?])
             };
@@ -132,9 +129,8 @@ impl Figures<'_> {
 
     /// Velocities that were simulated, and the one that was assumed.
     pub(super) fn velocities(&self, asked: &FigureAsked) -> anyhow::Result<Vec<LinePlot>> {
-        let rows = levels(self.experiment, self.summary, &asked.rows);
         let mut series = Vec::new();
-        for row in combinations(&rows) {
+        for row in self.summary.combinations(&asked.rows) {
             let Some((case, _)) = self.chosen_at(asked, &row).into_iter().next() else {
                 continue;
             };

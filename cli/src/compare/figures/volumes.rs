@@ -3,9 +3,8 @@
 use super::Figures;
 use crate::compare::cases::Case;
 use crate::compare::experiment::FigureAsked;
-use crate::compare::labels::{called, combinations};
+use crate::compare::labels::called;
 use crate::compare::results::Results;
-use crate::compare::tables::levels;
 use crate::fit;
 use crate::report::{Figure, encode};
 use crate::volume_files;
@@ -37,13 +36,11 @@ impl Figures<'_> {
 
     /// The volumes of all rows, the truths first; `None` where a recovery is missing.
     fn lines(&self, asked: &FigureAsked) -> anyhow::Result<Option<Vec<Line>>> {
-        let columns = levels(self.experiment, self.summary, &asked.columns);
-        let kinds = levels(self.experiment, self.summary, &asked.rows);
-        let kinds = combinations(&kinds);
+        let kinds = self.summary.combinations(&asked.rows);
         let rows = self.rows(asked, &kinds);
         let mut lines = vec![Line { name: "truth".to_owned(), cells: Vec::new() }];
         lines.extend(rows.iter().map(|row| Line { name: row.name(asked), cells: Vec::new() }));
-        for column in combinations(&columns) {
+        for column in self.summary.combinations(&asked.columns) {
             let at = |row: &Row| {
                 let levels = [row.levels, &column].concat();
                 self.chosen_at(asked, &levels).into_iter().find(|(case, _)| case.seed == row.seed)
