@@ -244,7 +244,7 @@ impl Verb {
             Verb::Convert(convert) => convert.run(),
             Verb::Fit(fit) => among_workers(|| fit.run(&program.registry)),
             Verb::Posterior(posterior) => among_workers(|| posterior.run(&program.registry)),
-            Verb::Compare(compare) => compare.run(arguments.threads, arguments.memory, program),
+            Verb::Compare(compare) => compare.run(arguments, program),
             Verb::Inspect(inspect) => inspect.run(),
             Verb::Devices(devices) => devices.run(),
         }

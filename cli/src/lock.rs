@@ -1,6 +1,6 @@
 //! A folder that one process at a time works in.
 
-use anyhow::{Context, anyhow, ensure};
+use anyhow::{Context, bail, ensure};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -73,7 +73,9 @@ impl Lock {
                 Err(TryLockError::WouldBlock) if clock.elapsed() < patience => {
                     std::thread::sleep(Duration::from_millis(20));
                 }
-                Err(TryLockError::WouldBlock) => return Err(in_use(folder, busy)),
+                Err(TryLockError::WouldBlock) => {
+                    bail!("{} is in use: another kerrlight {busy} it", folder.display())
+                }
             }
         }
     }
@@ -91,10 +93,6 @@ fn open(path: &Path) -> anyhow::Result<File> {
     let mut options = OpenOptions::new();
     let file = options.read(true).write(true).create(true).truncate(false).open(path);
     file.with_context(|| format!("cannot open {}", path.display()))
-}
-
-fn in_use(folder: &Path, busy: &str) -> anyhow::Error {
-    anyhow!("{} is in use: another kerrlight {busy} it", folder.display())
 }
 
 /// Returns whether there is nothing else in a folder but its lock; so it is if there is no folder.

@@ -20,6 +20,7 @@ mod summary;
 mod tables;
 mod verdicts;
 
+use crate::Arguments;
 use crate::answer::Answer;
 use crate::interrupt::{Interrupted, SignalGuard};
 use crate::lock::Lock;
@@ -84,17 +85,12 @@ pub struct Failed {
 
 impl Compare {
     /// Runs an experiment.
-    pub fn run(
-        &self,
-        threads: Option<u16>,
-        memory: Option<u64>,
-        program: &Program,
-    ) -> anyhow::Result<Answer> {
+    pub fn run(&self, arguments: &Arguments, program: &Program) -> anyhow::Result<Answer> {
         let Some(name) = &self.experiment else { return Ok(listing::experiments()) };
         let mut asked = self.asked(name, program)?;
         let folder = asked.folder.clone();
         if let Some(id) = &self.case {
-            return self.one(id, &asked, threads, memory, program);
+            return run_one(id, &asked, arguments, program);
         }
         let chosen = cases::expand(&asked.experiment, &asked.source, &asked.choice)?;
         if self.status {
@@ -112,7 +108,7 @@ impl Compare {
             bail!("{}: no case can be run; {}: {why}", name.display(), first.name());
         }
         if self.list {
-            return Ok(listing::cases(chosen, &self.command(&asked, threads, memory)));
+            return Ok(listing::cases(chosen, &self.command(&asked, arguments)));
         }
         // Cases that are not run need no data.
         if !self.collect {
@@ -121,7 +117,7 @@ impl Compare {
         let recorder = Recorder::of_process();
         let lock = self.enter(&asked)?;
         let draws = experiment.samples(choice.quick);
-        let runner = Runner::new(&folder, threads, memory, program, draws, lock)?;
+        let runner = Runner::new(&folder, arguments, program, draws, lock)?;
         // The report is written anew: what earlier runs of this folder found has to stay in it.
         let cases = if choice.is_restricted() {
             let all = cases::expand(experiment, source, &choice.unrestricted())?;
@@ -152,26 +148,8 @@ impl Compare {
         Ok(end(&tables, &summary, &folder, self.collect))
     }
 
-    /// Runs one case of a folder in which others may run others.
-    fn one(
-        &self,
-        id: &str,
-        asked: &Asked,
-        threads: Option<u16>,
-        memory: Option<u64>,
-        program: &Program,
-    ) -> anyhow::Result<Answer> {
-        let Asked { plan, text, experiment, source, choice, folder } = asked;
-        let case = cases::find(experiment, source, choice, id)?;
-        ran::check_data(std::slice::from_ref(&case))?;
-        let lock = plan::join(plan, text, folder)?;
-        let draws = experiment.samples(choice.quick);
-        let runner = Runner::new(folder, threads, memory, program, draws, Some(lock))?;
-        one::run(&case, &runner, folder)
-    }
-
     /// The command that runs the same cases in the same folder.
-    fn command(&self, asked: &Asked, threads: Option<u16>, memory: Option<u64>) -> Vec<String> {
+    fn command(&self, asked: &Asked, arguments: &Arguments) -> Vec<String> {
         let name = self.experiment.iter().map(|name| name.display().to_string());
         let mut words: Vec<String> = ["kerrlight".to_owned(), "compare".to_owned()].into();
         words.extend(name);
@@ -181,8 +159,8 @@ impl Compare {
         seeds.iter().for_each(|seeds| add("--seeds", seeds.to_string()));
         only.iter().for_each(|only| add("--only", only.clone()));
         set.iter().for_each(|set| add("--set", set.clone()));
-        threads.iter().for_each(|threads| add("--threads", threads.to_string()));
-        memory.iter().for_each(|memory| add("--memory", memory.to_string()));
+        arguments.threads.iter().for_each(|threads| add("--threads", threads.to_string()));
+        arguments.memory.iter().for_each(|memory| add("--memory", memory.to_string()));
         words.extend(quick.then(|| "--quick".to_owned()));
         words
     }
@@ -253,6 +231,22 @@ struct Asked {
     source: Source,
     choice: Choice,
     folder: PathBuf,
+}
+
+/// Runs one case of a folder in which others may run others.
+fn run_one(
+    id: &str,
+    asked: &Asked,
+    arguments: &Arguments,
+    program: &Program,
+) -> anyhow::Result<Answer> {
+    let Asked { plan, text, experiment, source, choice, folder } = asked;
+    let case = cases::find(experiment, source, choice, id)?;
+    ran::check_data(std::slice::from_ref(&case))?;
+    let lock = plan::join(plan, text, folder)?;
+    let draws = experiment.samples(choice.quick);
+    let runner = Runner::new(folder, arguments, program, draws, Some(lock))?;
+    one::run(&case, &runner, folder)
 }
 
 /// The chosen cases, and those that an earlier run of the same folder has done beside them.

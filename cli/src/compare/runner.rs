@@ -2,6 +2,7 @@
 
 use super::cases::{Case, Status};
 use super::labels::RESULTS;
+use crate::Arguments;
 use crate::checksum::is_whole;
 use crate::file_sums::FileSums;
 use crate::fit::{Inputs, from_folder, posterior};
@@ -21,9 +22,8 @@ use std::time::Duration;
 /// The folders of the cases.
 pub struct Runner<'a> {
     folder: PathBuf,
+    arguments: &'a Arguments,
     program: &'a Program,
-    threads: Option<u16>,
-    memory: Option<u64>,
     samples: Option<u32>,
     _lock: Option<Lock>,
 }
@@ -38,8 +38,7 @@ impl<'a> Runner<'a> {
     /// Runs in `cases` of this folder, whose lock is held by those who run any.
     pub fn new(
         folder: &Path,
-        threads: Option<u16>,
-        memory: Option<u64>,
+        arguments: &'a Arguments,
         program: &'a Program,
         samples: Option<u32>,
         lock: Option<Lock>,
@@ -47,7 +46,7 @@ impl<'a> Runner<'a> {
         let folder = folder.join(CASES);
         std::fs::create_dir_all(&folder)
             .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-        Ok(Self { folder, program, threads, memory, samples, _lock: lock })
+        Ok(Self { folder, arguments, program, samples, _lock: lock })
     }
 
     /// The run's folder of a case.
@@ -133,10 +132,10 @@ impl<'a> Runner<'a> {
         if let Some(samples) = self.samples {
             command.args(["--samples", &samples.to_string()]);
         }
-        if let Some(threads) = self.threads {
+        if let Some(threads) = self.arguments.threads {
             command.args(["--threads", &threads.to_string()]);
         }
-        if let Some(memory) = self.memory {
+        if let Some(memory) = self.arguments.memory {
             command.args(["--memory", &memory.to_string()]);
         }
         let said = said(run);
