@@ -1,8 +1,7 @@
 //! Subject of the page, as one object.
 
 use super::matter::{self, SPOTS, Volumes};
-use super::run_folder::Measured;
-use super::subject::Subject;
+use super::subject::{Measured, Subject};
 use super::{sky, still};
 use crate::render::preview::PreviewOptions;
 use anyhow::Context;

@@ -3,7 +3,6 @@
 mod given;
 mod matter;
 mod page;
-mod run_folder;
 mod server;
 mod sky;
 mod still;
