@@ -2,7 +2,7 @@
 
 use super::experiment::{Experiment, Level};
 use super::labels::called;
-use super::recipe::{Choice, Recipe, Stamp, Variant, picked};
+use super::recipe::{Choice, Recipe, Variant, picked};
 use super::source::Source;
 use crate::changed::Changed;
 use crate::{fit, keys, paths, plain};
@@ -93,8 +93,14 @@ impl Case {
     /// CRC-32 of the settings; 0 where there are none.
     fn sum(&self) -> u32 {
         let text = |seed: u64| self.text(seed).unwrap_or_default();
-        let stamp = self.variant().stamp.get_or_init(|| Stamp::of(&text(MARK), &MARK.to_string()));
-        let Stamp::Around([before, behind]) = stamp else {
+        let part = |part: &str| (crc32fast::hash(part.as_bytes()), part.len() as u64);
+        let stamp = self.variant().stamp.get_or_init(|| {
+            let text = text(MARK);
+            // A seed given by --set leaves no mark in the text.
+            let (before, behind) = text.split_once(&MARK.to_string())?;
+            (!behind.contains(&MARK.to_string())).then(|| [before, behind].map(part))
+        });
+        let Some([before, behind]) = stamp else {
             return crc32fast::hash(text(self.seed).as_bytes());
         };
         // The CRC-32 of joined texts follows from those of the parts: only the seed is hashed.

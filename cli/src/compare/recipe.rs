@@ -74,18 +74,12 @@ pub struct Variant {
     pub chosen: Box<[u32]>,
     /// True if one of its levels is in none of those before.
     pub is_new: bool,
-    pub stamp: OnceLock<Stamp>,
+    /// CRC-32 and length of its text before the seed and behind it, from which checksums with any seed follow; none where
+    /// the seed does not stand there once.
+    pub stamp: OnceLock<Option<[(u32, u64); 2]>>,
     /// Error in its settings.
     pub error: OnceLock<Option<String>>,
     pub cost: OnceLock<f64>,
-}
-
-/// Stamp from which checksums of settings with any seed follow.
-pub enum Stamp {
-    /// CRC-32 and length of the text before the seed, and of the text behind it.
-    Around([(u32, u64); 2]),
-    /// The text, in which the seed does not stand once.
-    Any,
 }
 
 impl Recipe {
@@ -150,19 +144,6 @@ impl Recipe {
         let table = self.source.fit(path)?;
         fits.insert(path.to_owned(), table.clone());
         Ok(table)
-    }
-}
-
-impl Stamp {
-    /// Takes settings with a seed that stands nowhere else in them.
-    pub fn of(text: &str, seed: &str) -> Self {
-        let parts: Vec<&str> = text.split(seed).collect();
-        let sum = |part: &str| (crc32fast::hash(part.as_bytes()), part.len() as u64);
-        match parts.as_slice() {
-            [before, behind] => Stamp::Around([sum(before), sum(behind)]),
-            // A seed given by --set leaves no mark in the text.
-            _ => Stamp::Any,
-        }
     }
 }
 

@@ -351,7 +351,7 @@ fn parse(text: &str) -> anyhow::Result<FitFile> {
             "there is a table [image]: a static image has no volume, and this needs one; errors of an image are in its report"
         );
     }
-    FitFile::parse(text).map_err(work::explained)
+    FitFile::parse(text).map_err(init::explained)
 }
 
 /// The built-in experiment with changes.

@@ -9,18 +9,10 @@ use crate::devices::FitDevice;
 use anyhow::{Context, bail};
 use kerrlight_imaging::settings::StaticImageFile;
 use kerrlight_tomo::Error;
-use kerrlight_tomo::fit::settings::{FitError, FitFile};
+use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::recovery::Problem;
 use kerrlight_tomo::representation::Registry;
 use std::path::Path;
-
-/// An error of settings, with what to write where a key is missing.
-pub fn explained(error: Error) -> anyhow::Error {
-    match error {
-        Error::Fit(FitError::Syntax(error)) => init::explained(&error),
-        other => other.into(),
-    }
-}
 
 /// Settings of either.
 #[derive(Debug, PartialEq)]
@@ -55,12 +47,12 @@ impl Prepared {
 impl Work {
     /// The settings in a text: a table `image` makes them those of a static image.
     pub fn read(text: &str) -> anyhow::Result<Self> {
-        Self::parse(text).map_err(explained)
+        Self::parse(text).map_err(init::explained)
     }
 
     /// The same with changes.
     pub fn read_changed(changed: &Changed<'_>) -> anyhow::Result<Self> {
-        changed.read(Self::parse, explained)
+        changed.read(Self::parse, init::explained)
     }
 
     fn parse(text: &str) -> Result<Self, Error> {

@@ -36,7 +36,7 @@ pub fn describe(path: &Path, start: &[u8]) -> anyhow::Result<Answer> {
 }
 
 /// Describes arrays, a line each.
-pub fn answer(path: &Path, format: &str, lines: &[Line]) -> Answer {
+fn answer(path: &Path, format: &str, lines: &[Line]) -> Answer {
     let name = path.display();
     let holds = if format == "NPY" { None } else { kind(lines) };
     let what = holds.as_ref().map_or(String::new(), |what| format!(", {what}"));
@@ -52,29 +52,11 @@ pub fn answer(path: &Path, format: &str, lines: &[Line]) -> Answer {
 const HEAD: &str = "array           shape                 type              least           most           mean  not finite\n";
 
 /// A line about an array.
-pub struct Line {
+struct Line {
     name: String,
     shape: Vec<u64>,
     text: String,
     json: Value,
-}
-
-impl Line {
-    /// Describes an array of this name, shape and type; `rest` is what else there is to say of it.
-    pub fn new(name: &str, shape: &[u64], kind: &str, found: Option<&Survey>, rest: &str) -> Self {
-        let lengths: Vec<String> = shape.iter().map(u64::to_string).collect();
-        let lengths = format!("({})", lengths.join(", "));
-        let counted = found.map_or("    no numbers".to_owned(), numbers);
-        let text = format!("{name:<16}{lengths:<22}{kind:<10}{counted}{rest}\n");
-        let mut json = json!({"name": name, "shape": shape, "type": kind});
-        if let Some(found) = found {
-            json["least"] = json!(found.least);
-            json["most"] = json!(found.most);
-            json["mean"] = json!(found.mean());
-            json["not_finite"] = json!(found.not_finite);
-        }
-        Line { name: name.to_owned(), shape: shape.to_vec(), text, json }
-    }
 }
 
 /// Returns what kerrlight takes an archive for.
@@ -95,7 +77,7 @@ fn kind(lines: &[Line]) -> Option<String> {
 
 /// Numbers of an array, one after the other; nothing is kept but these.
 #[derive(Default)]
-pub struct Survey {
+struct Survey {
     first: Vec<f64>,
     least: Option<f64>,
     most: Option<f64>,
@@ -114,7 +96,7 @@ impl Survey {
     }
 
     /// Counts a number.
-    pub fn add(&mut self, value: f64) {
+    fn add(&mut self, value: f64) {
         // One more than is shown tells that there are more.
         if self.first.len() <= SHOWN {
             self.first.push(value);
@@ -130,6 +112,7 @@ impl Survey {
     }
 }
 
+/// Describes an array.
 fn array(name: &str, file: impl Read) -> anyhow::Result<Line> {
     let file = numpy::open(file).context("not an array of NumPy")?;
     let shape = file.shape().to_vec();
@@ -137,7 +120,18 @@ fn array(name: &str, file: impl Read) -> anyhow::Result<Line> {
         if file.order() == Order::Fortran && shape.len() > 1 { ", Fortran order" } else { "" };
     let kind = file.dtype().descr().replace(['\'', ' '], "");
     let found = survey(file)?;
-    Ok(Line::new(name, &shape, &kind, found.as_ref(), order))
+    let lengths: Vec<String> = shape.iter().map(u64::to_string).collect();
+    let lengths = format!("({})", lengths.join(", "));
+    let counted = found.as_ref().map_or("    no numbers".to_owned(), numbers);
+    let text = format!("{name:<16}{lengths:<22}{kind:<10}{counted}{order}\n");
+    let mut json = json!({"name": name, "shape": shape, "type": kind});
+    if let Some(found) = found {
+        json["least"] = json!(found.least);
+        json["most"] = json!(found.most);
+        json["mean"] = json!(found.mean());
+        json["not_finite"] = json!(found.not_finite);
+    }
+    Ok(Line { name: name.to_owned(), shape, text, json })
 }
 
 fn numbers(found: &Survey) -> String {

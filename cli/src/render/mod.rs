@@ -17,7 +17,7 @@ use clap::Args;
 use exr_options::ExrOptions;
 use kerrlight_common::memory;
 use kerrlight_render::image::Picture;
-use kerrlight_render::image::preview as drawing;
+use kerrlight_render::image::preview::encode_png;
 use kerrlight_render::image::reduce::Reduction;
 use kerrlight_render::picture::{Raster, Summary};
 use kerrlight_render::scene::Scene;
@@ -149,10 +149,8 @@ impl Render {
 
     /// Writes the PNG.
     fn draw(&self, scene: &Scene, picture: &Picture, png: &Output) -> anyhow::Result<()> {
-        let look = self.look.look(scene);
-        let white = drawing::white(picture, look).context("cannot draw the picture")?;
-        let drawn = drawing::draw(picture, look, white).context("cannot draw the picture")?;
-        png.write(&drawing::encode(&drawn).context("cannot encode the PNG")?)
+        let drawn = encode_png(picture, self.look.look(scene));
+        png.write(&drawn.context("cannot draw the picture")?)
     }
 
     fn all_overrides(&self) -> Vec<String> {

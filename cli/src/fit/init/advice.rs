@@ -1,11 +1,15 @@
 //! Advice beside errors in settings.
 
-use kerrlight_common::toml_file::ReadError;
 use kerrlight_imaging::settings::StaticImageFile;
-use kerrlight_tomo::fit::settings::FitFile;
+use kerrlight_tomo::Error;
+use kerrlight_tomo::fit::settings::{FitError, FitFile};
 
-/// An error in settings; of what is missing, with what to write.
-pub fn explained(error: &ReadError) -> anyhow::Error {
+/// An error of settings, with what to write where a key is missing.
+pub fn explained(error: Error) -> anyhow::Error {
+    let error = match error {
+        Error::Fit(FitError::Syntax(error)) => error,
+        other => return other.into(),
+    };
     let text = error.to_string();
     // The reader of TOML tells the kind of error and the name in its words alone.
     let missing = text.split_once("missing field `").and_then(|(_, rest)| rest.split('`').next());

@@ -35,7 +35,9 @@ impl Estimate<'_> {
         let frame = self.frame_of_still();
         let all = |image: &[f32]| image.iter().map(|x| f64::from(*x)).sum::<f64>();
         let flux = all(&movie.image(frame)?) - all(quiescent);
-        let text = self.scene_text(state, frame, flux)?;
+        let (heading, place) = (self.heading()?, self.place(frame)?);
+        let parts = [heading, place, self.screen(flux)?, self.light(), self.volume(state)?];
+        let text = parts.join("\n");
         // A fit may see from where a scene cannot.
         if let Err(error) = Scene::parse(&text) {
             eprintln!("note: no {SCENE} is written: {error}");
@@ -46,17 +48,6 @@ impl Estimate<'_> {
         let file = VolumeFile { volume, axis: Some(axis.vector()) };
         self.folder.file(VOLUME)?.write(&file.to_npz())?;
         self.folder.file(SCENE)?.write(text.as_bytes())
-    }
-
-    fn scene_text(&self, state: &State<f32>, frame: usize, flux: f64) -> anyhow::Result<String> {
-        let parts = [
-            self.heading()?,
-            self.place(frame)?,
-            self.screen(flux)?,
-            self.light(),
-            self.volume(state)?,
-        ];
-        Ok(parts.join("\n"))
     }
 
     /// The frame whose time is nearest to that of the still image.
