@@ -42,16 +42,13 @@ pub fn sentences(measured: &FitData, losses: &[Loss]) -> Vec<String> {
 #[derive(Serialize)]
 pub struct ClosureResults {
     data: &'static str,
-    used: usize,
-    possible: usize,
-    of_scans: Option<usize>,
+    #[serde(flatten)]
+    count: ClosureCount,
 }
 
 /// Returns them for results.json.
 pub fn results(measured: &FitData, losses: &[Loss]) -> Vec<ClosureResults> {
-    let one = |(loss, count): (&Loss, ClosureCount)| {
-        let ClosureCount { used, possible, of_scans } = count;
-        ClosureResults { data: loss.data.name(), used, possible, of_scans }
-    };
+    let one =
+        |(loss, count): (&Loss, ClosureCount)| ClosureResults { data: loss.data.name(), count };
     counts(measured, losses).into_iter().map(one).collect()
 }

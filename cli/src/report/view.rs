@@ -8,6 +8,7 @@ use kerrlight_render::dynamics::AngularVelocity;
 use kerrlight_render::image::colormap::Colormap;
 use kerrlight_render::volume::projection::{self, Surroundings, View};
 use kerrlight_render::volume::{Shown, Volume};
+use serde::Serialize;
 use serde_json::json;
 
 const VIEWER: &str = include_str!("assets/viewer.html");
@@ -24,7 +25,7 @@ const SCRIPTS: [&str; 6] = [
 const MOST_NODES: usize = 128;
 
 /// Rotation of matter about the axis: right-handed by Ω(r)(t − t₀), r being the spherical radius.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Motion {
     /// Direction of the axis, of any length but zero.
     pub axis: [f64; 3],
@@ -35,6 +36,7 @@ pub struct Motion {
     /// t₀, the time of the volumes.
     pub reference: f64,
     /// The unit of time, for instance `GM/c³` or `h`.
+    #[serde(rename = "unit")]
     pub time_unit: String,
 }
 
@@ -123,14 +125,8 @@ impl View3d {
             }));
         }
         let colors: Vec<u8> = Colormap::AfmhotUs.table().into_iter().step_by(4).flatten().collect();
-        let motion = self.motion.as_ref().map(|motion| {
-            json!({
-                "axis": motion.axis, "rates": motion.rates, "times": motion.times,
-                "reference": motion.reference, "unit": motion.time_unit,
-            })
-        });
         let scene = json!({
-            "volumes": volumes, "scale": scale, "unit": self.unit, "motion": motion,
+            "volumes": volumes, "scale": scale, "unit": self.unit, "motion": self.motion,
             "holeRadius": self.hole_radius, "rMax": self.r_max, "colors": base64::encode(colors),
         });
         let parts = [

@@ -2,9 +2,10 @@
 
 use super::{ClosureKind, ClosureSet};
 use crate::observation::{Averaging, Observation};
+use serde::Serialize;
 
 /// Numbers of independent closure quantities of one kind.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct ClosureCount {
     /// Number of those of baselines that are strong enough.
     pub used: usize,
