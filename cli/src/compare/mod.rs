@@ -119,9 +119,9 @@ impl Compare {
         let draws = experiment.samples(choice.quick);
         let runner = Runner::new(&folder, arguments, program, draws, lock)?;
         // The report is written anew: what earlier runs of this folder found has to stay in it.
-        let cases = if choice.is_restricted() {
-            let all = cases::expand(experiment, source, &choice.unrestricted())?;
-            with_known(chosen, all, &runner)
+        let cases = if choice.seeds.is_some() || !choice.only.is_empty() {
+            let all = Choice { seeds: None, only: Vec::new(), ..choice.clone() };
+            with_known(chosen, cases::expand(experiment, source, &all)?, &runner)
         } else {
             chosen
         };
@@ -170,7 +170,13 @@ impl Compare {
         let begun = if name.is_dir() { Plan::load(name)? } else { None };
         let (plan, text, folder) = match begun {
             Some((plan, text)) => {
-                self.adds_nothing(name)?;
+                // Nothing changes what a folder was begun with.
+                if self.choice != Choice::default() {
+                    bail!(
+                        "{} has its cases: --seeds, --only, --set and --quick go with an experiment",
+                        name.display()
+                    );
+                }
                 match &self.output {
                     Some(other) => (plan.again(), text, other.clone()),
                     None => (plan, text, name.to_owned()),
@@ -182,19 +188,8 @@ impl Compare {
             }
         };
         let experiment = Experiment::parse(&text).with_context(|| name.display().to_string())?;
-        let (source, choice) = (plan.source(), plan.choice(&program.registry));
+        let (source, choice) = (plan.base.clone(), plan.choice(&program.registry));
         Ok(Asked { plan, text, experiment, source, choice, folder })
-    }
-
-    /// Refuses to change what a folder was begun with.
-    fn adds_nothing(&self, folder: &Path) -> anyhow::Result<()> {
-        if self.choice != Choice::default() {
-            bail!(
-                "{} has its cases: --seeds, --only, --set and --quick go with an experiment",
-                folder.display()
-            );
-        }
-        Ok(())
     }
 
     fn folder_for(&self, name: &Path) -> PathBuf {

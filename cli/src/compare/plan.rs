@@ -30,7 +30,7 @@ pub struct Plan {
     /// Version of the program.
     version: String,
     /// Folder from which paths in the experiment start; none for one that the program carries.
-    base: Source,
+    pub base: Source,
     /// The command line's; paths in assignments start from the root.
     #[serde(flatten)]
     choice: Choice,
@@ -77,11 +77,6 @@ impl Plan {
     /// Begun anew by this program.
     pub fn again(self) -> Self {
         Self { version: env!("CARGO_PKG_VERSION").to_owned(), ..self }
-    }
-
-    /// Returns the source of its experiment's files.
-    pub fn source(&self) -> Source {
-        self.base.clone()
     }
 
     /// Returns the choice of cases.

@@ -41,18 +41,6 @@ impl PartialEq for Choice {
     }
 }
 
-impl Choice {
-    /// Returns whether some cases are left out.
-    pub fn is_restricted(&self) -> bool {
-        self.seeds.is_some() || !self.only.is_empty()
-    }
-
-    /// All cases, with the same settings.
-    pub fn unrestricted(&self) -> Self {
-        Self { seeds: None, only: Vec::new(), ..self.clone() }
-    }
-}
-
 /// Recipe of the settings of all cases.
 pub struct Recipe {
     pub experiment: Experiment,

@@ -96,9 +96,9 @@ impl<'a> Runner<'a> {
                 Status::Open => Status::Failed("it ended without results".to_owned()),
                 known => known,
             },
-            // What stops because it is told to has not failed.
+            // What stops because it is told to has not failed: a signal may reach it before it reaches this process.
             _ if keeper.stopped() => Status::Open,
-            Ok((status, _)) if was_told(status) => Status::Open,
+            Ok((status, _)) if matches!(status.code(), Some(129 | 130 | 143)) => Status::Open,
             Ok((status, said)) => Status::Failed(failure(status, &said)),
             Err(error) => Status::Failed(crate::plain::reasons(&error)),
         }
@@ -167,12 +167,6 @@ fn said(run: &Path) -> PathBuf {
     let mut name = run.as_os_str().to_owned();
     name.push(".txt");
     name.into()
-}
-
-/// Returns whether a fit has ended because a signal told it to, which may reach it before it reaches this
-/// process.
-fn was_told(status: ExitStatus) -> bool {
-    status.code().is_some_and(|code| matches!(code, 129 | 130 | 143))
 }
 
 /// Results of a run of this version that is whole, with what follows from its draws where so many are wanted.

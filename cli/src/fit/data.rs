@@ -123,17 +123,14 @@ fn images(file: &FitFile, path: &Path) -> anyhow::Result<WithSize> {
             npz_frames(output::read_through(path)?).with_context(name)
         }
         // In Fortran order no image lies in one piece: such an array is read as a whole.
-        "npy" if is_in_c_order(path)? => npy_frames(output::read_through(path)?).with_context(name),
+        "npy" if numpy::Stream::new(BufReader::new(output::open(path)?)).is_ok() => {
+            npy_frames(output::read_through(path)?).with_context(name)
+        }
         _ => {
             let Movie { grid, pixels } = movie(file, &files[0])?;
             Ok((Frames::of(pixels, grid.pixels()), [grid.width, grid.height]))
         }
     }
-}
-
-/// Returns whether an array can be read image by image.
-fn is_in_c_order(path: &Path) -> anyhow::Result<bool> {
-    Ok(numpy::Stream::new(BufReader::new(output::open(path)?)).is_ok())
 }
 
 /// An image a file.

@@ -15,13 +15,15 @@ pub fn attributes(
     summary: &Summary,
 ) -> Attributes {
     let entry = |name: &str, value: String| (name.to_owned(), value);
+    // In M, or in the picture plane of a camera.
+    let pixel = if scene.camera.is_some() { "pixel_size_plane" } else { "pixel_size_m" };
     let mut all = Attributes::from([
         entry("version", env!("CARGO_PKG_VERSION").to_owned()),
         entry("scene", text.to_owned()),
         entry("scene_resolved", scene.to_toml()),
         entry("intensity_unit", summary.intensity_unit.to_owned()),
         entry("intensity_per_scene_unit", summary.unit_factor.to_string()),
-        entry(pixel_unit(scene), scene.pixel_size().to_string()),
+        entry(pixel, scene.pixel_size().to_string()),
         entry("flux", summary.flux.to_string()),
         entry("flux_error", summary.flux_error.to_string()),
         entry("flux_unit", summary.flux_unit.to_owned()),
@@ -36,11 +38,6 @@ pub fn attributes(
         all.extend([entry("files", files.to_owned())]);
     }
     all
-}
-
-/// Names the unit of a pixel's size: M, or the picture plane of a camera.
-fn pixel_unit(scene: &Scene) -> &'static str {
-    if scene.camera.is_some() { "pixel_size_plane" } else { "pixel_size_m" }
 }
 
 /// Summary of a picture in one line: flux, size and time.

@@ -46,6 +46,10 @@ pub fn of_visibilities(seen: &Seen, path: &str) -> anyhow::Result<String> {
     // Pixels of the region, 8 M deep, with emission 0.02.
     let per_pixel = flux / (core::f64::consts::PI * (10.0f64 / 24.0 * 32.0).powi(2) * 8.0 * 0.02);
     let kind = if is_simulated(observation) { "simulated" } else { "measured" };
+    let unfitted = match observation.is_polarized() {
+        true => "; its polarisation is not fitted without [polarization]",
+        false => "",
+    };
     let fields = [
         ("title", format!("{}{day}: {kind} visibilities", plain_words(name))),
         ("mass", mass),
@@ -57,7 +61,7 @@ pub fn of_visibilities(seen: &Seen, path: &str) -> anyhow::Result<String> {
         ("average", format!("{average_s:?}")),
         ("source", of_source.join("\n")),
         ("gains", gains(observation)),
-        ("read", read(seen) + unfitted(observation)),
+        ("read", read(seen) + unfitted),
         ("path", path.to_owned()),
     ];
     complete(include_str!("visibilities.toml"), &fields)
@@ -108,14 +112,6 @@ pub fn read(seen: &Seen) -> String {
         stations.len(),
         rows.len()
     )
-}
-
-/// Names the data that a volume leaves out.
-fn unfitted(observation: &Observation) -> &'static str {
-    match observation.is_polarized() {
-        true => "; its polarisation is not fitted without [polarization]",
-        false => "",
-    }
 }
 
 /// Median amplitude of the baselines within a site, or else of those nearly as short as the shortest, Jy.
