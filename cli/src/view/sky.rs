@@ -1,9 +1,9 @@
 //! The sky of a scene as a picture: azimuth from 0 to 360 degrees from left to right, +z along the upper edge.
 
 use super::subject::Subject;
+use crate::report::encode;
 use anyhow::Context;
-use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder};
+use image::RgbImage;
 use kerrlight_render::emission::sky::{Beam, SkyModel};
 use rayon::prelude::*;
 
@@ -25,11 +25,8 @@ pub fn panorama(subject: &Subject) -> anyhow::Result<Option<(Vec<u8>, f64)>> {
         light.iter().map(|color| shared_exponent(color.map(|x| x / unit)).to_le_bytes()).collect();
     let upper = pixels.iter().flat_map(|[a, b, c, _]| [*a, *b, *c]);
     let bytes: Vec<u8> = upper.chain(pixels.iter().flat_map(|[.., last]| [*last, 0, 0])).collect();
-    let mut png = Vec::new();
-    let encoder = PngEncoder::new(&mut png);
-    let size = (WIDTH as u32, 2 * HEIGHT as u32);
-    encoder.write_image(&bytes, size.0, size.1, ExtendedColorType::Rgb8).context("the sky")?;
-    Ok(Some((png, f64::from(unit))))
+    let picture = RgbImage::from_raw(WIDTH as u32, 2 * HEIGHT as u32, bytes);
+    Ok(Some((encode(picture).context("the sky")?, f64::from(unit))))
 }
 
 /// The largest number of [`shared_exponent`].

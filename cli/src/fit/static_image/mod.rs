@@ -13,7 +13,6 @@ use super::closures;
 use super::data;
 use super::folder::{self, Folder};
 use super::results::gains::{Gains, KnownSky, Others};
-use super::results::leakage::Leakage;
 use super::results::verdict::{DataVerdict, Evidence};
 use crate::answer::Answer;
 use crate::interrupt::{Interrupted, SignalGuard};
@@ -29,7 +28,7 @@ use kerrlight_imaging::{
 use kerrlight_tomo::fit::FrameTerm;
 use kerrlight_tomo::fit::settings::{Loss, LossKind};
 use kerrlight_tomo::fit::setup::FitData;
-use kerrlight_tomo::fit::verdict::{Statistics, Tested};
+use kerrlight_tomo::fit::verdict::Statistics;
 use kerrlight_vlbi::files::images;
 use polarized::Polarized;
 use std::path::Path;
@@ -95,7 +94,10 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
     let (survey, shapes, polarized) = searched(prepared)?;
     let movie = still(&survey.found().solution.image, measured);
     let evidence = Evidence { file: None, losses: &file.loss, seed: file.seed, measured };
-    let (polarized, tested) = told(prepared, polarized, folder)?.unzip();
+    let (polarized, tested) = match (&prepared.polarized, polarized) {
+        (Some(measured), Some(survey)) => Polarized::new(file, measured, survey, folder)?.unzip(),
+        _ => (None, None),
+    };
     let mut judged = evidence.judged(compared(file, measured, &survey)?, &movie, tested)?;
     judged.expect(&numbers::chi2_of_draws(&survey), survey.draws.len());
     let gains = Gains::beside(&evidence, &movie, &others(&survey, measured), folder)?;
@@ -139,18 +141,6 @@ fn others(survey: &Survey, measured: &FitData) -> Others {
         draws: survey.draws.iter().map(of).collect(),
         known_sky: survey.calibration().map(known),
     }
-}
-
-/// Returns the polarisation that was found, and its residuals; writes the leakage of stations, where it was solved for.
-fn told(
-    prepared: &Prepared,
-    survey: Option<PolarizedSurvey>,
-    folder: &Folder,
-) -> anyhow::Result<Option<(Polarized, (String, Tested))>> {
-    let (Some(measured), Some(survey)) = (&prepared.polarized, survey) else { return Ok(None) };
-    let table = survey.leakage.as_ref().map(|leakage| leakage.table.clone());
-    let leakage = table.map(|table| Leakage::written(table, measured, folder)).transpose()?;
-    Polarized::new(&prepared.file, measured, survey, leakage)
 }
 
 /// The search, with its progress; an error if a signal stops it.

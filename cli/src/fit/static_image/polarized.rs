@@ -1,6 +1,7 @@
 //! The linear polarisation of a static image: numbers and sentences.
 
 use super::numbers::with_error;
+use crate::fit::folder::Folder;
 use crate::fit::held_out::losses;
 use crate::fit::results::leakage::Leakage;
 use crate::report::{LinePlot, Outcome};
@@ -119,13 +120,16 @@ impl From<&Polarized> for PolarizedNumbers {
 }
 
 impl Polarized {
-    /// Takes the polarisation that was found of these data, and its residuals to be judged.
+    /// Takes the polarisation that was found of these data, and its residuals to be judged; writes the leakage of stations,
+    /// where it was solved for.
     pub fn new(
         file: &StaticImageFile,
         measured: &FitData,
         survey: PolarizedSurvey,
-        leakage: Option<Leakage>,
+        folder: &Folder,
     ) -> anyhow::Result<Option<(Self, (String, Tested))>> {
+        let table = survey.leakage.as_ref().map(|leakage| leakage.table.clone());
+        let leakage = table.map(|table| Leakage::written(table, measured, folder)).transpose()?;
         let Some(settings) = file.polarization.clone() else { return Ok(None) };
         let images = &survey.found.images;
         // I, Q and U lie one after the other.
