@@ -132,7 +132,7 @@ pub struct Closeness {
 
 impl Closeness {
     /// Tells it, the axis where that was looked for.
-    pub fn sentences(&self, axis: &AxisSearch) -> Vec<String> {
+    pub fn sentences(&self) -> Vec<String> {
         let mut all = Vec::new();
         if let (Some(psnr), Some(nrmse)) = (self.psnr_db, self.nrmse) {
             all.push(format!(
@@ -140,7 +140,7 @@ impl Closeness {
             ));
         }
         all.extend(self.note.map(|note| format!("Note that {note}.")));
-        if !matches!(axis, AxisSearch::Known {}) {
+        if !self.is_axis_known {
             let dot = self.axis_dot_truth;
             let angle = dot.clamp(-1.0, 1.0).acos().to_degrees();
             all.push(format!(

@@ -4,7 +4,7 @@ use super::bounds::Reached;
 use super::gains::Gains;
 use super::leakage::Leakage;
 use super::medium;
-use super::numbers::{Results, last_step, outcomes};
+use super::numbers::{Closeness, Results, last_step, outcomes};
 use super::over_time::Changes;
 use super::plots;
 use super::quiescent::Quiescent;
@@ -191,12 +191,8 @@ impl Estimate<'_> {
         lines.extend(is_early.then(|| last_step(step, of)));
         lines.extend(results.advice.iter().cloned());
         lines.extend(results.bounds.iter().map(Reached::sentence));
-        lines.extend(
-            results
-                .linear
-                .as_ref()
-                .map(|of| format!("The linear grid's solution: {}.", of.statement)),
-        );
+        let linear = results.linear.iter();
+        lines.extend(linear.map(|of| format!("The linear grid's solution: {}.", of.statement)));
         lines.extend(results.unknown.iter().map(|open| format!("Note that {open}.")));
         let chi2 = results.chi2_per_datum.iter();
         let each = chi2.map(|(name, value)| format!("{name}: χ² per data point {value:.4}"));
@@ -210,8 +206,7 @@ impl Estimate<'_> {
         lines.extend(found.gains.iter().flat_map(Gains::sentences));
         lines.extend(found.leakage.iter().flat_map(Leakage::sentences));
         lines.extend(found.quiescent.iter().flat_map(Quiescent::sentences));
-        let closeness = results.closeness.as_ref();
-        lines.extend(closeness.map(|of| of.sentences(&file.axis)).into_iter().flatten());
+        lines.extend(results.closeness.iter().flat_map(Closeness::sentences));
         lines
     }
 }

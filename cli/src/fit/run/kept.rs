@@ -179,23 +179,23 @@ impl<'a> Kept<'a> {
 
     fn written(&self, found: &Found<'_>) -> anyhow::Result<Option<Choice>> {
         let folder = self.folder;
-        match found {
+        let stage = match found {
             Found::Geometry(problem, unknown, found) => {
                 let found = GeometryResults::new(problem, unknown, found)?;
                 folder.keep(searches::GEOMETRY, &found)?;
-                self.read(Stage::Geometry)
+                Stage::Geometry
             }
             Found::Band(problem, scan) => {
                 folder.keep(searches::BAND, &BandResults::new(problem, scan)?)?;
-                self.read(Stage::Band)
+                Stage::Band
             }
-            Found::Weight(file, held) => {
-                let Some(settings) = &file.held_out else { return Ok(None) };
+            Found::Weight(FitFile { held_out: Some(settings), .. }, held) => {
                 folder.keep(held_out::FILE, &HeldOutResults::new(settings, held))?;
-                self.read(Stage::Weight)
+                Stage::Weight
             }
-            _ => Ok(Some(found.choice())),
-        }
+            _ => return Ok(None),
+        };
+        self.read(stage)
     }
 
     /// Reads the file of a search, which is told; none if it has not looked.
