@@ -1,7 +1,5 @@
 //! Pictures of an experiment.
 
-mod images;
-mod light_curves;
 mod plots;
 mod volumes;
 
@@ -11,9 +9,13 @@ use super::labels::{described, pairs};
 use super::results::Results;
 use super::runner::Runner;
 use super::summary::Summary;
+use crate::fit;
+use crate::interferometry::movie_files;
 use crate::output;
-use crate::report::{Figure, LinePlot, encode};
+use crate::report::{self, Figure, LinePlot};
 use anyhow::Context;
+use kerrlight_tomo::recovery::results::BandResults;
+use std::path::PathBuf;
 
 /// Levels of some factors.
 type Levels<'l> = Vec<(&'l str, &'l str)>;
@@ -31,6 +33,9 @@ pub struct Drawn {
 
 /// Most pictures or plots of a figure: a page of thousands of cases should stay small.
 const MOST: usize = 12;
+
+/// Least width of a drawn image, pixels.
+const DRAWN: usize = 160;
 
 /// All that figures are made of.
 pub struct Figures<'a> {
@@ -70,21 +75,17 @@ impl Figures<'_> {
         match asked.kind {
             FigureKind::Volumes => drawn.figures.extend(named("volumes", self.volumes(asked)?)),
             FigureKind::Axes => {
-                let cases = self.chosen(asked).filter(|(case, _)| case.seed == 1);
                 // One more says that there are more.
-                for (case, _) in cases.take(MOST + 1) {
-                    let path = self.runner.run_of(case).join("axis_scan.png");
-                    if path.exists() {
-                        let caption = format!(
-                            "{}: {}. {} The folders of the other seeds have their own maps (axis_scan.png).",
-                            asked.title,
-                            case.name(),
-                            asked.caption
-                        );
-                        let alt = asked.title.clone();
-                        let figure = Figure { png: output::read(&path)?, caption, alt };
-                        drawn.figures.push((name(&case.slug()), figure));
-                    }
+                for (case, path) in self.files(asked, "axis_scan.png", MOST + 1) {
+                    let caption = format!(
+                        "{}: {}. {} The folders of the other seeds have their own maps (axis_scan.png).",
+                        asked.title,
+                        case.name(),
+                        asked.caption
+                    );
+                    let alt = asked.title.clone();
+                    let figure = Figure { png: output::read(&path)?, caption, alt };
+                    drawn.figures.push((name(&case.slug()), figure));
                 }
             }
             FigureKind::Map => drawn.figures.extend(named("map", self.map(asked)?)),
@@ -107,6 +108,13 @@ impl Figures<'_> {
     /// Those of them at these levels.
     fn chosen_at(&self, asked: &FigureAsked, levels: &[(&str, &str)]) -> Vec<(&Case, &Results)> {
         self.summary.at(&[levels, &pairs(&asked.r#where)].concat())
+    }
+
+    /// Files of this name in the runs of the first seed, of so many cases at most.
+    fn files(&self, asked: &FigureAsked, name: &str, most: usize) -> Vec<(&Case, PathBuf)> {
+        let cases = self.chosen(asked).filter(|(case, _)| case.seed == 1).take(most);
+        let files = cases.map(|(case, _)| (case, self.runner.run_of(case).join(name)));
+        files.filter(|(_, path)| path.exists()).collect()
     }
 
     /// Means over two factors as colours with their numbers.
@@ -132,6 +140,53 @@ impl Figures<'_> {
         let map = super::map::Map { rows, columns, means, digits };
         let Some(picture) = map.draw() else { return Ok(None) };
         let caption = format!("{}: mean {unit}. {}", asked.title, asked.caption);
-        Ok(Some(Figure { png: encode(Some(picture))?, caption, alt: asked.title.clone() }))
+        Ok(Some(Figure { png: report::encode(Some(picture))?, caption, alt: asked.title.clone() }))
+    }
+
+    /// The images of the first seed of all cases that have one, on one scale.
+    fn images(&self, asked: &FigureAsked) -> anyhow::Result<Option<Figure>> {
+        let mut images: Vec<(String, Vec<f32>)> = Vec::new();
+        let mut side = 0;
+        for (case, path) in self.files(asked, "image.npz", usize::MAX) {
+            let (movie, _) = movie_files::read(&[path], None)?;
+            let n = movie.i.grid.width;
+            if side != 0 && n != side {
+                anyhow::bail!("images have {side} and {n} pixels a side: `where` can choose some");
+            }
+            side = n;
+            images.push((case.name(), movie.i.pixels.iter().map(|x| *x as f32).collect()));
+        }
+        if images.is_empty() {
+            return Ok(None);
+        }
+        let zoom = DRAWN.div_ceil(side);
+        let drawn: Vec<(&str, Vec<f32>)> = images
+            .iter()
+            .map(|(name, image)| (name.as_str(), report::enlarged(image, side, zoom)))
+            .collect();
+        let what = format!("{}. {}", asked.title, asked.caption);
+        report::images(&drawn, side * zoom, &what).map(Some)
+    }
+
+    /// The probability of each unknown, a curve for each case of the first seed.
+    fn geometries(&self, asked: &FigureAsked) -> anyhow::Result<Vec<LinePlot>> {
+        let mut runs: Vec<(String, BandResults)> = Vec::new();
+        for (case, path) in self.files(asked, fit::BAND, usize::MAX) {
+            let text = output::read_text(&path)?;
+            let results =
+                serde_json::from_str(&text).with_context(|| path.display().to_string())?;
+            runs.push((case.name(), results));
+        }
+        Ok(fit::plots_of_bands(&runs, &asked.caption))
+    }
+
+    /// Loops in Q and U, a plot for each case of the first seed.
+    fn loops(&self, asked: &FigureAsked) -> anyhow::Result<Vec<LinePlot>> {
+        let mut plots = Vec::new();
+        for (case, path) in self.files(asked, fit::LIGHT_CURVE, MOST + 1) {
+            let table = output::read_text(&path)?;
+            plots.extend(fit::loop_plot(&table, &format!(": {}", case.name())));
+        }
+        Ok(plots)
     }
 }
