@@ -95,8 +95,9 @@ impl Convert {
     /// Converts.
     pub fn run(&self) -> anyhow::Result<Answer> {
         let file = ObservationFile::new(&self.output, self.format, self.comments)?;
-        let mut inputs = std::iter::once(&self.input).chain(&self.gains).chain(&self.leakage);
-        inputs.try_for_each(|input| file.output.must_differ_from(input))?;
+        let array = self.array.as_ref().map(PathBuf::from);
+        let inputs = std::iter::once(&self.input).chain(&self.gains).chain(&self.leakage);
+        inputs.chain(&array).try_for_each(|input| file.output.must_differ_from(input))?;
         self.check_numbers()?;
         let mut observation = interferometry::read(&self.input)?;
         interferometry::note_cautions(&self.input.display().to_string(), &observation);

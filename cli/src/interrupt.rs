@@ -187,11 +187,16 @@ pub fn listen() -> anyhow::Result<()> {
     let mut signals = SigSet::empty();
     signals.add(Signal::SIGINT);
     signals.add(Signal::SIGTERM);
+    // Batch systems announce a limit of time by it.
+    signals.add(Signal::SIGXCPU);
     if !is_hangup_ignored() {
         signals.add(Signal::SIGHUP);
     }
+    // A file that is too large is an error of writing, as a full disk is.
+    let mut blocked = signals;
+    blocked.add(Signal::SIGXFSZ);
     // If signals cannot be blocked, they end the program as usual.
-    if signals.thread_block().is_ok() {
+    if blocked.thread_block().is_ok() {
         threads::spawn(move || {
             while let Ok(signal) = signals.wait() {
                 OF_PROCESS.raise(signal as u8);

@@ -18,16 +18,19 @@ impl Lock {
     }
 
     /// Takes the lock of a folder that is new or empty but for what `is_own` knows; it is made if there is none. Of
-    /// several processes that want the same one, a single one gets it.
+    /// several processes that want the same one, a single one gets it. What can be resumed holds a file `begun`.
     pub fn of_new(
         folder: &Path,
         busy: &str,
+        begun: &str,
         is_own: impl Fn(&Path) -> bool,
     ) -> anyhow::Result<Self> {
         let is_free = || {
+            let is_begun = folder.join(begun).exists();
+            let resume = if is_begun { "resume it with --resume, or " } else { "" };
             ensure!(
                 is_free(folder, &is_own),
-                "{} exists and is not an empty folder: resume it with --resume, or give another with -o",
+                "{} exists and is not an empty folder: {resume}give another with -o",
                 folder.display()
             );
             Ok(())

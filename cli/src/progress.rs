@@ -4,13 +4,17 @@ use crate::session;
 use crate::threads;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
+use std::sync::LazyLock;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A bar that shows how much of the work is done.
 pub fn bar(length: u64) -> ProgressBar {
     styled(Some(length), "{bar:40} {percent:>3} %  {elapsed} gone, {eta} left", "")
 }
+
+/// The first look at the clock.
+static BEGUN: LazyLock<Instant> = LazyLock::new(Instant::now);
 
 /// Tells every so often how much of the work is done, until the bar is finished or gone. What is counted has this name; parts of
 /// a hundred have none.
@@ -24,7 +28,9 @@ fn tell(
     let bar = bar.downgrade();
     let lines = move || {
         loop {
-            thread::sleep(every);
+            // All bars tell at the same times: work of many short parts would tell nothing by clocks of its own.
+            let gone = BEGUN.elapsed().as_nanos() % every.as_nanos();
+            thread::sleep(every - Duration::from_nanos(gone as u64));
             let Some(bar) = bar.upgrade().filter(|bar| !bar.is_finished()) else { return };
             let (done, length) = (bar.position(), bar.length());
             let of = match length {

@@ -158,7 +158,10 @@ pub fn result(results: &Value, value: &str) -> Option<f64> {
 pub fn product<T: Clone>(each: impl IntoIterator<Item = Vec<T>>) -> Vec<Vec<T>> {
     each.into_iter().fold(vec![Vec::new()], |all, choices| {
         let with = |before: &Vec<T>| -> Vec<Vec<T>> {
-            choices.iter().map(|one| [before.as_slice(), &[one.clone()]].concat()).collect()
+            choices
+                .iter()
+                .map(|one| [before.as_slice(), std::slice::from_ref(one)].concat())
+                .collect()
         };
         all.iter().flat_map(with).collect()
     })
@@ -207,7 +210,7 @@ mod tests {
         let levels = [vec![("a", "1"), ("a", "2")], vec![("b", "x"), ("b", "y")]];
         let names: Vec<String> = product(levels).iter().map(|c| called(c)).collect();
         assert_eq!(names, ["a 1, x", "a 1, y", "a 2, x", "a 2, y"]);
-        assert_eq!(product::<u32>([]), [Vec::new()]);
+        assert_eq!(product::<u32>([]), [Vec::<u32>::new()]);
     }
 
     #[test]

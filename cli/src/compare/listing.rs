@@ -4,6 +4,7 @@ use super::cases::Case;
 use super::runner::TOGETHER;
 use super::source;
 use crate::answer::Answer;
+use crate::plain;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
@@ -19,7 +20,7 @@ pub fn experiments() -> Answer {
 /// Cases of an experiment, one after the other: name of the folder, expected cost and command, with tabs between; as
 /// JSON also what is wrong with their settings, which is told on standard error besides.
 pub fn cases(cases: Vec<Case>, command: &[String]) -> Answer {
-    let command = command.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ");
+    let command = command.iter().map(|word| plain::quoted(word)).collect::<Vec<_>>().join(" ");
     let mut lines: Vec<(String, Value)> = Vec::new();
     let all = (0..cases.len()).map(move |k| {
         // A stretch at a time: its lines are made in parallel, and the first ones are printed
@@ -48,13 +49,4 @@ fn line(case: &Case, command: &str) -> (String, Value) {
     let entry =
         json!({"id": id, "name": case.name(), "cost": cost, "command": command, "error": error});
     (text, entry)
-}
-
-/// A word as a shell reads it.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_=./:,+@%".contains(c);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', r"'\''"))
 }

@@ -140,6 +140,9 @@ impl Compare {
             true => quick::look(experiment),
             false => (experiment.clone(), Vec::new()),
         };
+        if self.collect && !cases.iter().any(|case| matches!(status(case), Status::Done(_))) {
+            status::refuse_others(&folder, &cases)?;
+        }
         let file = Output::new(&folder.join("results.json"), "")?;
         let summary = Summary::written(&shown, &cases, status, choice.quick, &file)?;
         let page = Page { choice, summary: &summary };
@@ -211,7 +214,7 @@ impl Compare {
                 .with_context(|| format!("cannot make the folder {}", folder.display()))?;
             Lock::take(folder, plan::BUSY, Duration::ZERO)?
         } else {
-            Lock::of_new(folder, plan::BUSY, |_| false)?
+            Lock::of_new(folder, plan::BUSY, plan::FILE, |_| false)?
         };
         asked.plan.write(folder, &asked.text)?;
         Ok(Some(lock))

@@ -98,7 +98,7 @@ impl<'a> Runner<'a> {
             },
             // What stops because it is told to has not failed: a signal may reach it before it reaches this process.
             _ if keeper.stopped() => Status::Open,
-            Ok((status, _)) if matches!(status.code(), Some(129 | 130 | 143)) => Status::Open,
+            Ok((status, _)) if matches!(status.code(), Some(129 | 130 | 143 | 152)) => Status::Open,
             Ok((status, said)) => Status::Failed(failure(status, &said)),
             Err(error) => Status::Failed(crate::plain::reasons(&error)),
         }
@@ -123,10 +123,7 @@ impl<'a> Runner<'a> {
         if run.join("fit.toml").is_file() && !is_foreign {
             command.arg("--resume").arg(run);
         } else {
-            if run.exists() {
-                std::fs::remove_dir_all(run)
-                    .with_context(|| format!("cannot clear {}", run.display()))?;
-            }
+            clear(run)?;
             command.arg(&settings).arg("-o").arg(run);
         }
         if let Some(samples) = self.samples {
@@ -145,6 +142,27 @@ impl<'a> Runner<'a> {
         let status = wait(child.map_err(|error| threads::no_process("the fit", &error))?, keeper)?;
         Ok((status, output::read_text(&said).unwrap_or_default()))
     }
+}
+
+/// Makes room for a run. What another version has finished is moved aside, and told; what was cut off before it had settings goes.
+fn clear(run: &Path) -> anyhow::Result<()> {
+    if !run.exists() {
+        return Ok(());
+    }
+    let cannot = || format!("cannot clear {}", run.display());
+    if !run.join("results.json").exists() {
+        return std::fs::remove_dir_all(run).with_context(cannot);
+    }
+    let aside = |k: u32| PathBuf::from(format!("{}.old-{k}", run.display()));
+    let free = (1..).map(aside).find(|path| !path.exists());
+    let free = free.with_context(cannot)?;
+    std::fs::rename(run, &free).with_context(cannot)?;
+    eprintln!(
+        "warning: {} is of another version or damaged: it is {} now",
+        run.display(),
+        free.display()
+    );
+    Ok(())
 }
 
 /// The end of a fit, whose input is held open until a signal comes: it is closed then, or by the system if this

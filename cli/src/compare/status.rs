@@ -5,7 +5,7 @@ use super::one;
 use super::runner::{self, CASES};
 use crate::answer::Answer;
 use crate::lock::Lock;
-use anyhow::anyhow;
+use anyhow::{anyhow, bail};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::collections::HashSet;
@@ -82,6 +82,22 @@ pub fn show(folder: &Path, cases: &[Case], samples: Option<u32>) -> anyhow::Resu
         .with("running", running)
         .with("open", open)
         .with("failed", failed.iter().map(told).collect::<Vec<Value>>()))
+}
+
+/// Refuses a folder whose cases are all of other settings: a report would be of none.
+pub fn refuse_others(folder: &Path, cases: &[Case]) -> anyhow::Result<()> {
+    let own: HashSet<String> = cases.iter().map(Case::slug).collect();
+    let entries = std::fs::read_dir(folder.join(CASES)).into_iter().flatten().flatten();
+    let names = entries.filter(|entry| entry.path().is_dir()).map(|entry| entry.file_name());
+    let mut others = names.filter(|name| name.to_str().is_none_or(|name| !own.contains(name)));
+    match others.next() {
+        Some(other) => bail!(
+            "{} holds {} and none of the cases that are asked for: the experiment or its fit file has changed since they ran",
+            folder.display(),
+            other.display()
+        ),
+        None => Ok(()),
+    }
 }
 
 /// Returns the error of a folder in which nothing was begun.

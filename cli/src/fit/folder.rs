@@ -2,10 +2,11 @@
 
 use super::inputs::{self, Inputs, SETTINGS};
 use crate::answer::Answer;
-use crate::checksum::{Sealed, sealed};
+use crate::checksum::{Sealed, is_whole, sealed};
 use crate::file_sums::FileSums;
 use crate::lock::Lock;
 use crate::output::{self, Output};
+use crate::plain;
 use crate::session;
 use anyhow::{Context, bail};
 use serde::Serialize;
@@ -32,13 +33,44 @@ pub struct Folder {
 pub const LOG: &str = "log.jsonl";
 pub const CHECKPOINT: &str = "checkpoint.safetensors";
 
+/// Files that a run writes in the formats of data.
+const RESULTS: [&str; 14] = [
+    "movie.npz",
+    "volume.npz",
+    "truth.npz",
+    "quiescent.npz",
+    "scene.npz",
+    "image.npz",
+    "image.fits",
+    "draws.npz",
+    "light_curve.csv",
+    "emission.csv",
+    "axis_scan.csv",
+    "gains.csv",
+    "leakage.csv",
+    SETTINGS,
+];
+
 /// Words for another process in a folder.
 const BUSY: &str = "fits in";
 
 impl Folder {
     /// A new folder, in which the data may lie.
     pub fn create(path: &Path, settings: &str, inputs: Inputs) -> anyhow::Result<Self> {
-        let lock = Lock::of_new(path, BUSY, |file| inputs.holds(file))?;
+        let is_data = |file: &Path| inputs.holds(file);
+        if let Some(name) = RESULTS.iter().find(|name| is_data(&path.join(name))) {
+            bail!(
+                "{} is read, and the run writes a file of that name: give another folder with -o",
+                path.join(name).display()
+            );
+        }
+        // What a run has left that was cut off before it had settings is nothing.
+        let is_begun = path.join(SETTINGS).exists();
+        let is_left = |file: &Path| {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            !is_begun && (name == inputs::FILE || name.starts_with(output::BESIDE))
+        };
+        let lock = Lock::of_new(path, BUSY, SETTINGS, |file| is_data(file) || is_left(file))?;
         let (path, settings) = (path.to_owned(), settings.to_owned());
         let folder = Self { path, settings, inputs, is_resumed: false, _lock: Some(lock) };
         let inputs = serde_json::to_string_pretty(&folder.inputs)?;
@@ -105,9 +137,13 @@ impl Folder {
             .files(files.iter().map(PathBuf::as_path))
     }
 
-    /// A file in it, to be written whole.
+    /// A file in it, to be written whole, that is none of those which the run has read.
     pub fn file(&self, name: &str) -> anyhow::Result<Output> {
-        Output::new(&self.path.join(name), "")
+        let path = self.path.join(name);
+        if self.inputs.holds(&path) {
+            bail!("{} was read by this run and would be lost: move it", path.display());
+        }
+        Output::new(&path, "")
     }
 
     /// The last checkpoint, if there is one.
@@ -130,8 +166,11 @@ impl Folder {
         if !path.exists() {
             return Ok(None);
         }
-        let found = serde_json::from_str(&output::read_text(&path)?);
-        found.map(Some).with_context(|| self.damaged(name))
+        let text = output::read_text(&path)?;
+        if !is_whole(&text) {
+            bail!(self.damaged(name));
+        }
+        serde_json::from_str(&text).map(Some).with_context(|| self.damaged(name))
     }
 
     /// Says of such a file that it is not what a search keeps.
@@ -152,7 +191,8 @@ impl Folder {
 
     /// Explains what to do about work that was interrupted and is kept.
     pub fn stopped(&self) -> String {
-        format!("stopped; resume with: kerrlight fit --resume {}", self.path.display())
+        let folder = plain::quoted(&self.path.to_string_lossy());
+        format!("stopped; resume with: kerrlight fit --resume {folder}")
     }
 
     /// The lines of the log.

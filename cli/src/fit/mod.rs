@@ -39,6 +39,7 @@ use kerrlight_tomo::representation::Registry;
 pub use posterior::Posterior;
 pub use results::LIGHT_CURVE;
 pub use searches::BAND;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use work::{Prepared, Work};
@@ -335,7 +336,9 @@ pub fn is_same_fit(one: &str, other: &str, folder: &Path) -> anyhow::Result<bool
 
 /// The error of a file that holds no settings; data are named as such.
 fn not_settings(path: &Path, error: anyhow::Error) -> anyhow::Error {
-    let is_fits = std::fs::read(path).is_ok_and(|bytes| bytes.starts_with(b"SIMPLE  ="));
+    let mut head = [0; 9];
+    let read = output::open(path).and_then(|mut file| Ok(file.read_exact(&mut head)?));
+    let is_fits = read.is_ok() && head == *b"SIMPLE  =";
     let shown = plain::path(path);
     match is_fits {
         true => anyhow!(

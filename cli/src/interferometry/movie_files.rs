@@ -4,6 +4,7 @@ use super::arguments;
 use super::image_files::{self, OwnTimes};
 use crate::{output, paths};
 use anyhow::{Context, anyhow, bail};
+use kerrlight_render::image::exr;
 use kerrlight_vlbi::simulate::StokesMovie;
 use std::path::{Path, PathBuf};
 
@@ -58,7 +59,22 @@ pub fn files(argument: &Path) -> anyhow::Result<Vec<PathBuf>> {
     if names.is_empty() {
         bail!("{shown}: there are no files {}*{}", pattern.start, pattern.end);
     }
-    Ok(names.iter().map(|name| folder.join(name)).collect())
+    let files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
+    check_film(argument, &files)?;
+    Ok(files)
+}
+
+/// Refuses a part of the frames of a film that kerrlight has rendered: equal steps between them would be none.
+fn check_film(argument: &Path, files: &[PathBuf]) -> anyhow::Result<()> {
+    let attributes = |path: &PathBuf| exr::decode_attributes(output::open(path).ok()?).ok();
+    let Some(first) = attributes(&files[0]) else { return Ok(()) };
+    let Some(all) = first.get("frames").and_then(|all| all.parse::<usize>().ok()) else {
+        return Ok(());
+    };
+    if files.len() != all {
+        bail!("{}: {} frames of a film of {all}", argument.display(), files.len());
+    }
+    Ok(())
 }
 
 /// Common parts of the names of a sequence.

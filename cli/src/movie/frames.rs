@@ -103,19 +103,7 @@ impl Sequence {
         // The first frame has the scale of all.
         let first = (self.part.start > 0).then_some(0);
         for k in first.into_iter().chain(self.part.clone()) {
-            let path = self.path(k, "exr");
-            if !path.exists() {
-                continue;
-            }
-            let shown = path.display().to_string();
-            let (_, attributes) =
-                exr::decode(&output::read(&path)?).with_context(|| shown.clone())?;
-            if let Some(name) = differs(&self.settings(k), &attributes) {
-                bail!(
-                    "{shown} is a frame with other settings ({name} differs): give another folder \
-                     or remove the frames in {folder}"
-                );
-            }
+            let Some(attributes) = self.known(k)? else { continue };
             self.done[k] = true;
             self.fluxes[k] = flux_of(&attributes);
             self.unresolved[k] = number(&attributes, "unresolved_rays").unwrap_or(0);
@@ -124,6 +112,24 @@ impl Sequence {
             }
         }
         Ok(())
+    }
+
+    /// The attributes of a frame that is there, which has to be one of this film.
+    fn known(&self, k: usize) -> anyhow::Result<Option<Attributes>> {
+        let path = self.path(k, "exr");
+        if !path.exists() {
+            return Ok(None);
+        }
+        let shown = path.display().to_string();
+        let (_, attributes) = exr::decode(&output::read(&path)?).with_context(|| shown.clone())?;
+        if let Some(name) = differs(&self.settings(k), &attributes) {
+            bail!(
+                "{shown} is a frame with other settings ({name} differs): give another folder \
+                 or remove the frames in {}",
+                self.folder.display()
+            );
+        }
+        Ok(Some(attributes))
     }
 
     /// Refuses frames that this film does not have.
@@ -238,6 +244,10 @@ impl Sequence {
             attributes.append(&mut this.settings(*k));
             let bytes = exr::encode(&picture, &attributes, style);
             let bytes = bytes.context("cannot encode the EXR")?;
+            // Another process may have written it since these began: the same, or a frame of another film.
+            if this.known(*k)?.is_some() {
+                return Ok(summary);
+            }
             Output::new(&this.path(*k, "exr"), "exr")?.write(&bytes)?;
             Ok(summary)
         });

@@ -171,6 +171,9 @@ impl Ensemble {
     }
 }
 
+/// Nodes at the corners of a cell.
+const CELL: usize = 8;
+
 fn feature(volumes: &[Volume], nodes: &[usize], peak: f64) -> Feature {
     let places: Vec<[f64; 4]> = volumes.iter().map(|volume| centroid(volume, nodes)).collect();
     let middle = |c: usize| places.iter().map(|p| p[c]).sum::<f64>() / places.len() as f64;
@@ -184,10 +187,17 @@ fn feature(volumes: &[Volume], nodes: &[usize], peak: f64) -> Feature {
     // Angles from that of the mean centroid: their mean is not torn apart at ±π.
     let turned = |p: &[f64; 4]| (p[1].atan2(p[0]) - ahead + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
     let [turn, spread] = of(&turned);
+    // Centroids of fewer nodes than those of a cell do not move as far as the light does: it may be anywhere between.
+    let between = match nodes.len() {
+        0..CELL => volumes.iter().flat_map(Volume::spacing).fold(0.0, f64::max) / 12f64.sqrt(),
+        _ => 0.0,
+    };
+    let wide = |[mean, deviation]: [f64; 2], unit: f64| [mean, deviation.hypot(between / unit)];
+    let away = middle(0).hypot(middle(1)).max(between);
     Feature {
-        radius: of(&|p| (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt()),
-        azimuth: [ahead + turn, spread],
-        height: of(&|p| p[2]),
+        radius: wide(of(&|p| (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt()), 1.0),
+        azimuth: wide([ahead + turn, spread], away.max(f64::MIN_POSITIVE)),
+        height: wide(of(&|p| p[2]), 1.0),
         light: of(&|p| p[3]),
         peak,
         nodes: nodes.to_vec(),
@@ -254,5 +264,17 @@ mod tests {
         assert!((b - a - 2.0 * first.radius[1]).abs() < 1e-3, "{a} {b}");
         assert!((second.azimuth[0] - (-4f64).atan2(-3.0)).abs() < 0.02);
         assert!(first.peak > second.peak);
+    }
+
+    /// A node that shines alone stands for light up to half a spacing away.
+    #[test]
+    fn exact_a_feature_of_one_node_is_as_sure_as_the_grid() {
+        let one = volume(|x| if x == [4.0, 3.0, 0.0] { 1.0 } else { 0.0 });
+        let volumes = [one.clone(), one];
+        let features = Ensemble::of(&volumes).unwrap().features(&volumes);
+        let [only] = &features[..] else { panic!("{features:?}") };
+        let sigma = 1.0 / 12f64.sqrt();
+        assert!((only.radius[0] - 5.0).abs() < 1e-6 && (only.radius[1] - sigma).abs() < 1e-9);
+        assert!((only.azimuth[1] - sigma / 5.0).abs() < 1e-9, "{only:?}");
     }
 }

@@ -15,8 +15,8 @@ use crate::answer::Answer;
 use crate::checksum::{is_whole, sealed};
 use crate::interrupt::{Interrupted, SignalGuard};
 use crate::record::Recorder;
-use crate::{output, progress, session, volume_files};
-use anyhow::{Context, bail};
+use crate::{output, plain, progress, session, volume_files};
+use anyhow::{Context, bail, ensure};
 use clap::Args;
 use indicatif::ProgressBar;
 use kerrlight_render::volume::{Volume, VolumeFile};
@@ -208,7 +208,8 @@ fn add_up(
 }
 
 fn again(folder: &Folder, samples: u32) -> String {
-    format!("kerrlight posterior {} --samples {samples}", folder.path().display())
+    let folder = plain::quoted(&folder.path().to_string_lossy());
+    format!("kerrlight posterior {folder} --samples {samples}")
 }
 
 /// Geometries about the one that the run has found.
@@ -260,6 +261,7 @@ struct Results {
 impl Results {
     fn read(folder: &Folder) -> anyhow::Result<Self> {
         let text = output::read_text(&folder.path().join("results.json"))?;
+        ensure!(is_whole(&text), "results.json is damaged");
         serde_json::from_str(&text).context("results.json is damaged")
     }
 

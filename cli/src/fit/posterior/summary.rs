@@ -362,5 +362,6 @@ fn certain(ensemble: &Ensemble) -> f64 {
         counted.map(|(m, _)| f64::from(*m)).sum()
     };
     let all = light(false);
-    if all > 0.0 { light(true) / all } else { 0.0 }
+    // A sum of nothing is -0.
+    if all > 0.0 { light(true) / all + 0.0 } else { 0.0 }
 }

@@ -58,7 +58,7 @@ impl Estimate<'_> {
     }
 
     fn heading(&self) -> anyhow::Result<String> {
-        let (folder, later) = (plain::path(self.folder.path()), self.later()?);
+        let (folder, later) = (plain::quoted(&plain::path(self.folder.path())), self.later()?);
         let times: Vec<f64> = self.measured.times.iter().map(|time| time + later).collect();
         let mut text = format!(
             "# The emission that a fit recovered, with its motion. The fit: {}\n#   kerrlight render {folder}/{SCENE}\n",
