@@ -189,6 +189,11 @@ impl Medium for GasModel {
         None
     }
 
+    fn thin_layer(&self) -> Option<f64> {
+        // The coarsest nodes are up to 0.08 apart.
+        (self.flatness > 12.0).then(|| 1.0 / self.flatness)
+    }
+
     fn relative_size(&self) -> f64 {
         let falls = match self.profile {
             GasProfile::Gaussian => 1.0,

@@ -48,6 +48,10 @@ pub trait Medium: core::fmt::Debug + Send + Sync {
     fn sphere(&self) -> f64;
     /// Returns the size of its cells, if its light is not smooth along panels of any length.
     fn cell_size(&self) -> Option<CellSize>;
+    /// Standard deviation in cos θ of a layer about the equator that may lie between the coarsest nodes.
+    fn thin_layer(&self) -> Option<f64> {
+        None
+    }
     /// Size of its finest features by their radius, at most about 1: structure of cells is some of them
     /// wide.
     fn relative_size(&self) -> f64 {

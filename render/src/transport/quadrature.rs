@@ -99,6 +99,8 @@ pub(super) struct Sums {
     pub depths: Vec<f64>,
     /// Estimated error of each panel's intensity.
     pub misses: Vec<f64>,
+    /// Estimated error of the part of light from behind that is seen.
+    pub transmission_error: f64,
 }
 
 /// Sums emission up, front to back: I = ∫ j e^{−D} ds, D = ∫ κ ds. The sums' depths are
@@ -108,12 +110,13 @@ pub(super) fn integrate(
     nodes: &RayNodes<'_>,
     emission: &Emission,
     cuts: Option<[f64; 2]>,
-    Sums { depths, misses }: &mut Sums,
+    Sums { depths, misses, transmission_error }: &mut Sums,
 ) -> Light {
     let order = quadrature.rule.order();
     let mut light = Light::default();
     depths.clear();
     misses.clear();
+    *transmission_error = 0.0;
     let (mut most, mut brightest) = (0.0, None);
     let mut gains = [0.0; MOST_NODES];
     let gains = &mut gains[..order];
@@ -126,7 +129,12 @@ pub(super) fn integrate(
         }
         let absorption = emission.absorption.get(start..start + order);
         let miss = absorption.and_then(|absorption| {
-            shade(quadrature, [weights, absorption], gains, &mut light.depth, depths)
+            let before = light.depth;
+            let (miss, of_depth) =
+                shade(quadrature, [weights, absorption], gains, &mut light.depth, depths);
+            // Of a panel that is opaque itself nothing behind is seen.
+            *transmission_error += of_depth * (-light.depth.max(before)).exp();
+            miss
         });
         for (i, (gain, g)) in gains.iter().zip(redshift).enumerate() {
             light.intensity += gain;
@@ -163,27 +171,28 @@ pub(super) fn integrate(
 }
 
 /// Dims the gains of a panel by what lies before its nodes, whose weights and absorption are given. The error, if it
-/// is not that of the rule.
+/// is not that of the rule, and that of the panel's depth.
 fn shade(
     quadrature: &Quadrature,
     [weights, absorption]: [&[f64]; 2],
     gains: &mut [f64],
     depth: &mut f64,
     depths: &mut Vec<f64>,
-) -> Option<f64> {
+) -> (Option<f64>, f64) {
     let (mut thick, start) = ([0.0; MOST_NODES], depths.len());
     for ((thick, weight), k) in thick.iter_mut().zip(weights).zip(absorption) {
         *thick = weight * k;
     }
     let thick = &thick[..gains.len()];
+    let missed = quadrature.missed(thick);
     if thick.iter().sum::<f64>() > OPAQUE {
-        return Some(shade_opaque(thick, gains, depth, depths));
+        return (Some(shade_opaque(thick, gains, depth, depths)), missed);
     }
     quadrature.absorb(thick, depth, depths);
     for (gain, depth) in gains.iter_mut().zip(&depths[start..]) {
         *gain *= (-depth).exp();
     }
-    None
+    (None, missed)
 }
 
 /// Optical depth of a panel beyond which e^{−D} is no polynomial over it.

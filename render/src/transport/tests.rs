@@ -177,3 +177,28 @@ fn exact_sighting_of_a_spot_in_gas_that_absorbs() {
     let stepped = rays.iter().filter(|ray| ray.stepped).count();
     assert!(stepped > 10 && 2 * stepped < rays.len(), "{stepped} of {}", rays.len());
 }
+
+/// A thin layer shines, and absorbs, in proportion to its thickness: none of it lies between the nodes.
+#[test]
+fn exact_thin_gas_is_met_by_every_ray_that_crosses_it() {
+    let sums = |flatness: f64, inclination: u32| {
+        let gas = format!(
+            "gas={{profile=\"gaussian\",scale_radius=10.0,flatness={flatness},motion=\"keplerian\",\
+             emissivity=3e-18,absorptivity=1e5,outer_radius=60.0}}"
+        );
+        let tilt = format!("observer.inclination_deg={inclination}");
+        let set = [&gas, &tilt, "effects.absorption=true", "tracer.tolerance=1e-5"];
+        let seen = observe(&PreparedScene::new(&scene(&set), None).unwrap(), &[0.0]);
+        let sum = |of: fn(&RayResult) -> f64| flatness * seen.iter().map(of).sum::<f64>();
+        [sum(|seen| seen.intensity), sum(|seen| seen.optical_depth)]
+    };
+    for inclination in [5, 60] {
+        let [light, depth] = sums(300.0, inclination);
+        for flatness in [1000.0] {
+            let [thin, of_thin] = sums(flatness, inclination);
+            assert!((of_thin / depth - 1.0).abs() < 3e-4, "{flatness} {of_thin} {depth}");
+            // Thicker gas dims itself more.
+            assert!((0.0..0.01).contains(&(thin / light - 1.0)), "{flatness} {thin:e} {light:e}");
+        }
+    }
+}

@@ -28,8 +28,14 @@ const ORDER: usize = 8;
 /// Panels are cut into at most so many times as many.
 const FINEST: u32 = 256;
 
-/// The same where cells have to be resolved.
+/// The same where cells or thin layers have to be resolved.
 const FINEST_OF_CELLS: u32 = 1024;
+
+/// Nodes next to each other in a thin layer are no farther apart, in its standard deviations.
+const BETWEEN: f64 = 1.5;
+
+/// Standard deviations beyond which a thin layer is dark.
+const BEYOND: f64 = 6.0;
 
 /// Errors of rays fainter than this share of what the medium can reach are measured by that.
 const FAINT: f64 = 1e-4;
@@ -281,7 +287,9 @@ impl Media {
             let sums = &mut scratch.sums;
             let light = integrate(&scratch.quadrature, nodes, &emission, seen.cuts, sums);
             let enough = optics.tolerance * (light.intensity + FAINT * medium.scale());
-            done &= resolved && (finest || light.error <= enough);
+            // What shines behind is seen through the depth.
+            let is_clear = scratch.sums.transmission_error <= optics.tolerance;
+            done &= resolved && (finest || light.error <= enough && is_clear);
             scratch.lights_of(m, seen.number)[first + j] = light;
         }
         scratch.profile.clear();
@@ -333,12 +341,26 @@ fn request(medium: &dyn Medium, optics: &Optics) -> NodeRequest {
 
 /// Returns the largest number of panels that a coarsest panel is cut into.
 pub(in crate::transport) fn finest(medium: &dyn Medium) -> u32 {
-    if medium.cell_size().is_some() { FINEST_OF_CELLS } else { FINEST }
+    let is_fine = medium.cell_size().is_some() || medium.thin_layer().is_some();
+    if is_fine { FINEST_OF_CELLS } else { FINEST }
 }
 
-/// Returns whether panels are short enough for the cells of a medium, and whether they are as short as they ever get.
+/// Returns whether nodes are close enough for the cells or the layer of a medium, and whether panels are as short as they ever
+/// get.
 fn resolution(medium: &dyn Medium, nodes: &RayNodes<'_>, order: usize) -> (bool, bool) {
+    if let Some(sigma) = medium.thin_layer() {
+        return (is_met(nodes.cos_theta, sigma), false);
+    }
     let Some(cell) = medium.cell_size() else { return (true, false) };
     let longest = cell.longest(nodes, order);
     (longest <= ROUNDING * cell.size, longest <= ROUNDING * CellSize::FINEST * cell.size)
+}
+
+/// Returns whether nodes in a layer of this standard deviation about the equator are close to each other, so that none of it
+/// lies between two of them.
+fn is_met(cos_theta: &[f64], sigma: f64) -> bool {
+    cos_theta.windows(2).all(|pair| {
+        let nearest = if pair[0] * pair[1] < 0.0 { 0.0 } else { pair[0].abs().min(pair[1].abs()) };
+        nearest > BEYOND * sigma || (pair[1] - pair[0]).abs() <= BETWEEN * sigma
+    })
 }
