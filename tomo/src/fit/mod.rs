@@ -72,7 +72,7 @@ pub use learning::steps::Place;
 pub use learning::trainer::Trainer;
 pub use learning::training::{BatchSize, COMPARED, Training};
 pub use loss::change_price::{ChangeBuffers, ChangePrice};
-pub use loss::curve_term::{FluxDatum, StokesCurveTerm};
+pub use loss::curve_term::{BackgroundDatum, FluxDatum, StokesCurveTerm};
 pub use loss::objective::{Buffers, Data, Drawn, Gradients, Loss, Objective, Weighted};
 pub use loss::regulariser::{Regulariser, Shape};
 pub use loss::scan_term::{Scan, ScanTerm};

@@ -1,7 +1,7 @@
 //! Results of searches, and what of them a fit goes on with.
 
 use super::problem::Problem;
-use crate::fit::FluxDatum;
+use crate::fit::BackgroundDatum;
 use crate::fit::geometry::Geometry;
 use crate::fit::scan::{AxisLoss, AxisScan};
 use crate::fit::settings::{FitFile, UnknownGeometry};
@@ -62,7 +62,7 @@ pub enum Choice {
         /// Factor on the angular velocity.
         rotation_factor: f64,
         /// Expected background, Jy with its standard deviation.
-        background: Option<Vec<FluxDatum>>,
+        background: Option<Vec<BackgroundDatum>>,
     },
     /// Dimensionless, in the unit of its setting.
     Weight(f64),

@@ -45,7 +45,7 @@ impl Estimate<'_> {
                 match &curve.background {
                     None => write!(text, ",{flux},{sigma},{}", seen[k])?,
                     Some(background) => {
-                        let [value, deviation] = background[k];
+                        let [value, deviation, _] = background[k];
                         let model = f64::from(seen[k]) + value;
                         write!(text, ",{flux},{sigma},{model},{value},{deviation}")?;
                     }

@@ -169,8 +169,9 @@ impl CurveRows {
     }
 }
 
-/// Returns the expected background at all data, and its standard deviation (both over those of the data), given the data
-/// that are used and a band; 0 where the data have no standard deviation.
+/// Returns the expected background at all data, its standard deviation (both over those of the data), and the covariance with
+/// the other one of two numbers of a sample, given the data that are used and a band; 0 where the data have no standard
+/// deviation.
 ///
 /// # Errors
 /// If the band has no node.
@@ -178,7 +179,7 @@ pub fn expected_background(
     curve: &CurveRows,
     data: &[f64],
     band: &Band,
-) -> Result<Vec<[f64; 2]>, Error> {
+) -> Result<Vec<[f64; 3]>, Error> {
     let used = curve.numbers(true);
     let all: Vec<usize> = (0..curve.data()).collect();
     let own = curve.of_background(&band.background);
@@ -190,9 +191,9 @@ pub fn expected_background(
     let across = part(&own, &used, &all);
     let solved = together.solve(&across);
     let expected = solved.tr_mul(&some(data, &used));
-    let deviation = |k: usize| {
-        let variance = own[(k, k)] - across.column(k).dot(&solved.column(k));
-        variance.max(0.0).sqrt()
-    };
-    Ok(all.iter().map(|k| [expected[*k], deviation(*k)]).collect())
+    let covariance = |a: usize, b: usize| own[(a, b)] - across.column(a).dot(&solved.column(b));
+    let are_pairs = curve.sampling.parameters() == 2;
+    let beside = |k: usize| if are_pairs { covariance(k, k ^ 1) } else { 0.0 };
+    let deviation = |k: usize| covariance(k, k).max(0.0).sqrt();
+    Ok(all.iter().map(|k| [expected[*k], deviation(*k), beside(*k)]).collect())
 }

@@ -310,7 +310,7 @@ fn exact_expected_background() {
         let data: Vec<f64> = (&background + other).as_slice().to_vec();
         let expected = expected_background(&curve, &data, &truth).unwrap();
         let off = |k: usize| (background[k] - expected[k][0]).powi(2) / left[(k, k)];
-        for (k, [_, deviation]) in expected.iter().enumerate() {
+        for (k, [_, deviation, _]) in expected.iter().enumerate() {
             assert!((deviation.powi(2) / left[(k, k)] - 1.0).abs() < 1e-6);
         }
         sum += (0..n).map(off).sum::<f64>() / n as f64;

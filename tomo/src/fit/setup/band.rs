@@ -10,7 +10,7 @@ use crate::fit::band::{
 };
 use crate::fit::journal::{self, Journal};
 use crate::fit::settings::{BandSettings, FitError, FitFile, refuse};
-use crate::fit::{FluxDatum, ForwardModel, Motion};
+use crate::fit::{BackgroundDatum, ForwardModel, Motion};
 use background::{backgrounds, expected};
 use kerrlight_render::dynamics::AngularVelocity;
 use kerrlight_render::polarization::StokesParameter;
@@ -57,7 +57,7 @@ pub struct BandScan {
     /// Periods of the orbit in minutes, geometry by geometry and radius by radius; infinite where matter stands still.
     pub periods_min: Vec<Vec<f64>>,
     /// Expected background at all data in the best geometry and its standard deviation, Jy; none if there is none.
-    pub background: Option<Vec<FluxDatum>>,
+    pub background: Option<Vec<BackgroundDatum>>,
 }
 
 /// Told how many geometries are done; says whether to go on.

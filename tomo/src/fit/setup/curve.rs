@@ -1,7 +1,7 @@
 //! A light curve as the terms of a loss.
 
 use super::Result;
-use crate::fit::{FluxDatum, StokesCurveTerm};
+use crate::fit::{BackgroundDatum, FluxDatum, StokesCurveTerm};
 use kerrlight_render::polarization::StokesParameter;
 
 /// A light curve that a fit explains.
@@ -15,9 +15,8 @@ pub struct Curve {
     pub data: Vec<Option<FluxDatum>>,
     /// Frames that are fitted; the others judge the fit.
     pub fitted: Vec<bool>,
-    /// Background of the emission that is fitted and its standard deviation, Jy, in the order of the data; none where
-    /// there is none.
-    pub background: Option<Vec<FluxDatum>>,
+    /// Background of the emission that is fitted, in the order of the data; none where there is none.
+    pub background: Option<Vec<BackgroundDatum>>,
 }
 
 impl Curve {
@@ -44,15 +43,25 @@ impl Curve {
         let count = self.parameters.len();
         let of = |k: usize| {
             let [flux, sigma] = self.data[k].filter(|_| self.fitted[k / count] == fitted)?;
-            let [background, deviation] = self.background_at(k);
+            let [background, deviation, _] = self.background_at(k);
             // The background is known up to its deviation, which counts like noise.
             Some([flux - background, sigma.hypot(deviation)])
         };
-        StokesCurveTerm::new(count, (0..self.data.len()).map(of).collect())
+        let term = StokesCurveTerm::new(count, (0..self.data.len()).map(of).collect())?;
+        // Errors of Q and U are one ellipse, whichever way position angles are counted.
+        let correlation = |frame: usize| {
+            let first = frame * count;
+            let total = |k: usize| {
+                let sigma = self.data[k].map_or(0.0, |[_, sigma]| sigma);
+                sigma.hypot(self.background_at(k)[1])
+            };
+            self.background_at(first)[2] / (total(first) * total(first + 1))
+        };
+        Ok(if count == 2 { term.correlated(correlation) } else { term })
     }
 
-    /// Returns the background of the emission that is fitted at a number of the data, and its standard deviation, Jy.
-    pub fn background_at(&self, k: usize) -> FluxDatum {
-        self.background.as_ref().map_or([0.0; 2], |background| background[k])
+    /// Returns the background of the emission that is fitted at a number of the data.
+    pub fn background_at(&self, k: usize) -> BackgroundDatum {
+        self.background.as_ref().map_or([0.0; 3], |background| background[k])
     }
 }

@@ -3,7 +3,7 @@
 use super::Truth;
 use super::curve::Curve;
 use super::leakage::LeakageUnknown;
-use crate::fit::FluxDatum;
+use crate::fit::BackgroundDatum;
 use kerrlight_common::frames::Frames;
 use kerrlight_vlbi::gains::{GainPriors, GainTable};
 use kerrlight_vlbi::observation::Observation;
@@ -63,10 +63,9 @@ impl FitData {
         }
     }
 
-    /// A light curve before a background (Jy with its standard deviation, in the order of its data), which the emission does
-    /// not explain.
+    /// A light curve before a background in the order of its data, which the emission does not explain.
     #[must_use]
-    pub fn before(&self, background: Vec<FluxDatum>) -> Self {
+    pub fn before(&self, background: Vec<BackgroundDatum>) -> Self {
         let mut copy = self.clone();
         if let Some(curve) = &mut copy.curve {
             curve.background = Some(background);

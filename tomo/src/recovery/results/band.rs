@@ -1,7 +1,7 @@
 //! Geometries that were weighed by the light curve of a flare in an orbital band, as band.json keeps them.
 
 use crate::Error;
-use crate::fit::FluxDatum;
+use crate::fit::BackgroundDatum;
 use crate::fit::band::{Background, Band, Interval};
 use crate::fit::setup::{self, BandGeometry, BandScan};
 use crate::null::or_nan;
@@ -46,7 +46,7 @@ pub struct BandResults {
     /// Background of the flare, where that is assumed.
     pub background: Option<Background>,
     /// Expected background at all data.
-    pub background_jy: Option<Vec<FluxDatum>>,
+    pub background_jy: Option<Vec<BackgroundDatum>>,
     /// χ² of the samples that were not fitted, over their number.
     pub validation_chi2_per_datum: Option<f64>,
     /// Simulated band.
