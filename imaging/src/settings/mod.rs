@@ -12,8 +12,8 @@ use kerrlight_common::toml_file::Keys;
 use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_tomo::fit::linear::Prior;
 use kerrlight_tomo::fit::settings::{
-    FitError, InstrumentSettings, Loss, LossKind, Scattering, Variability, Within, check_ranges,
-    read, refuse,
+    FitError, InstrumentSettings, Loss, LossKind, Scattering, Variability, Within, check_losses,
+    check_ranges, read, refuse,
 };
 use kerrlight_vlbi::operator::ImageGrid;
 use penalties::priors_of;
@@ -293,6 +293,7 @@ impl StaticImageFile {
         if self.loss.is_empty() {
             refuse!("loss is empty: there is nothing to fit; add a table [[loss]]");
         }
+        check_losses(&self.loss)?;
         for (k, loss) in self.loss.iter().enumerate() {
             loss_of_visibilities(loss).within(format!("loss {k}"))?;
             if let Some(first) = self.loss[..k].iter().position(|other| other.data == loss.data) {

@@ -103,13 +103,15 @@ pub fn line_of(text: &str, key: &str) -> Option<usize> {
     let document = Document::parse(text).ok()?;
     let mut item: &Item = document.as_item();
     let mut span = None;
+    let mut rest = key;
     for part in key.split('.') {
+        rest = rest.split_once('.').map_or("", |(_, rest)| rest);
         let next = match part.parse::<usize>() {
             Ok(index) => match item {
                 Item::ArrayOfTables(tables) => {
                     span = tables.get(index).and_then(|table| table.span()).or(span);
                     let table = tables.get(index)?;
-                    return line_in_table(text, table, key, span);
+                    return line_in_table(text, table, rest, span);
                 }
                 _ => item.get(index),
             },
@@ -129,11 +131,21 @@ pub fn line_of(text: &str, key: &str) -> Option<usize> {
 fn line_in_table(
     text: &str,
     table: &toml_edit::Table,
-    key: &str,
+    rest: &str,
     around: Option<std::ops::Range<usize>>,
 ) -> Option<usize> {
-    let last = key.rsplit('.').next()?;
-    let span = table.get(last).and_then(Item::span).or(around);
+    // The deepest part of the way that has a place.
+    let (mut item, mut span) = (None::<&Item>, around);
+    for part in rest.split('.') {
+        let next = match (item, part.parse::<usize>()) {
+            (None, _) => table.get(part),
+            (Some(item), Ok(index)) => item.get(index),
+            (Some(item), Err(_)) => item.get(part),
+        };
+        let Some(next) = next else { break };
+        span = next.span().or(span);
+        item = Some(next);
+    }
     span.map(|span| line_at(text, span.start))
 }
 

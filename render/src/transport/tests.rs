@@ -194,11 +194,9 @@ fn exact_thin_gas_is_met_by_every_ray_that_crosses_it() {
     };
     for inclination in [5, 60] {
         let [light, depth] = sums(300.0, inclination);
-        for flatness in [1000.0] {
-            let [thin, of_thin] = sums(flatness, inclination);
-            assert!((of_thin / depth - 1.0).abs() < 3e-4, "{flatness} {of_thin} {depth}");
-            // Thicker gas dims itself more.
-            assert!((0.0..0.01).contains(&(thin / light - 1.0)), "{flatness} {thin:e} {light:e}");
-        }
+        let [thin, of_thin] = sums(1000.0, inclination);
+        assert!((of_thin / depth - 1.0).abs() < 3e-4, "{of_thin} {depth}");
+        // Thicker gas dims itself more.
+        assert!((0.0..0.01).contains(&(thin / light - 1.0)), "{thin:e} {light:e}");
     }
 }

@@ -90,9 +90,17 @@ fn predicted(through: &Through<'_>, movie: &Frames<f32>) -> anyhow::Result<Vec<C
             beyond_what_passes: found.beyond,
         })
     };
-    // Total intensity is the first of the images of a frame.
-    let movie = movie.mapped(pixels, |image| image[..pixels].to_vec())?;
-    Ok(evidence.judged(compared, &movie, None)?.terms.iter().filter_map(of).collect())
+    // Total intensity is the first of the images of a frame; frames of light curves have none.
+    let total = match measured.curve {
+        None => Some(movie.mapped(pixels, |image| image[..pixels].to_vec())?),
+        Some(_) => None,
+    };
+    Ok(evidence
+        .judged(compared, total.as_ref().unwrap_or(movie), None)?
+        .terms
+        .iter()
+        .filter_map(of)
+        .collect())
 }
 
 /// The seed of the field that a prior of voxels gives a draw.

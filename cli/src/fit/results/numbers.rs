@@ -21,6 +21,9 @@ use kerrlight_tomo::recovery::results::{BandResults, GeometryResults, HeldOutRes
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+/// Error over the truth above which a truth that changes is dark at the reference time.
+const NEARLY_DARK: f64 = 1e3;
+
 /// Words on a truth without emission.
 pub const DARK: &str =
     "the truth is dark on all nodes: PSNR, relative error and correlation are not defined";
@@ -217,14 +220,17 @@ impl Estimate<'_> {
         let mask = Mask { r_min, r_max, z_width };
         let all = metrics::compare(&found.volume, volume, None)?;
         let inside = metrics::compare(&found.volume, volume, Some(&mask))?;
+        // Emission that fades is never quite dark: what is found then is compared with next to nothing.
+        let is_lit = found.changes.is_none() || all.nrmse.is_none_or(|of| of < NEARLY_DARK);
+        let lit = |number: Option<f64>| number.filter(|_| is_lit);
         Ok(Some(Closeness {
             axis_dot_truth: found.state.now.axis.dot(truth.axis()),
             is_axis_known: matches!(self.file.axis, AxisSearch::Known {}),
-            note: all.psnr_db.is_none().then_some(DARK),
-            psnr_db: all.psnr_db,
-            psnr_inside_db: inside.psnr_db,
-            nrmse: all.nrmse,
-            correlation: all.correlation,
+            note: lit(all.psnr_db).is_none().then_some(DARK),
+            psnr_db: lit(all.psnr_db),
+            psnr_inside_db: lit(inside.psnr_db),
+            nrmse: lit(all.nrmse),
+            correlation: lit(all.correlation),
             over_time: found.changes.as_ref().map(|changes| OverTime {
                 psnr_over_time_db: changes.closeness.psnr_db(),
                 nrmse_over_time: changes.closeness.nrmse(),
@@ -237,15 +243,19 @@ impl Estimate<'_> {
 pub fn last_line(headline: &str, results: &Results) -> String {
     let said = results.advice.iter().cloned().chain(results.bounds.iter().map(Reached::sentence));
     let headline = std::iter::once(headline.to_owned()).chain(said).collect::<Vec<_>>().join(" ");
-    match results.closeness {
-        Some(Closeness { psnr_db: Some(psnr), nrmse: Some(nrmse), .. }) => {
+    let told = results.closeness.as_ref().and_then(|of| match &of.over_time {
+        Some(over) => Some((" over all frames", over.psnr_over_time_db?, over.nrmse_over_time?)),
+        None => Some(("", of.psnr_db?, of.nrmse?)),
+    });
+    match told {
+        Some((when, psnr, nrmse)) => {
             // The error of an empty volume is the truth itself, a relative error of 1.
             let empty = psnr + 20.0 * nrmse.log10();
             format!(
-                "{headline} PSNR with respect to the truth: {psnr:.2} dB (an empty volume: {empty:.2} dB)."
+                "{headline} PSNR with respect to the truth{when}: {psnr:.2} dB (an empty volume: {empty:.2} dB)."
             )
         }
-        _ => headline,
+        None => headline,
     }
 }
 

@@ -303,10 +303,11 @@ impl SightlineRequest {
     fn check_equal(&self, per_ray: usize, observer: &Observer) -> Result<(), Error> {
         let check = Error::check;
         // The first chord would be infinitely long.
-        let allowed = "a finite radius with nodes equidistant in Mino time";
+        let allowed = "a finite observer.radius with nodes equidistant in Mino time";
         check("observer radius", f64::INFINITY, !observer.is_at_infinity(), allowed)?;
         // Samples of a ray have no velocities.
-        check("redshift", 1.0, !self.momentum, "off with nodes equidistant in Mino time")?;
+        let allowed = "without effects.redshift_power and [polarization]";
+        check("per_ray of equal-mino-time", per_ray as f64, !self.momentum, allowed)?;
         check("samples per ray", per_ray as f64, per_ray >= 2, "at least 2")
     }
 }

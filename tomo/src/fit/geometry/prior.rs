@@ -120,7 +120,7 @@ impl Prior {
         match self {
             Prior::Uniform { low, high } | Prior::Isotropic { low, high } => {
                 let ok = low.is_finite() && high.is_finite() && high > low;
-                check("high", high, ok, "above low")?;
+                check("last value of the prior", high, ok, "above its first")?;
             }
             Prior::Normal { mean, sigma } => {
                 check("mean", mean, mean.is_finite(), "a finite number")?;

@@ -1,6 +1,7 @@
 //! Files of data, and what of them is compared.
 
-use super::{MeasuredCurve, Scattering, Variability};
+use super::{MeasuredCurve, Scattering, Variability, refuse};
+use crate::Error;
 use kerrlight_render::polarization::StokesParameter;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -97,7 +98,43 @@ pub enum LossKind {
     LightCurve,
 }
 
+/// Refuses numbers that have no part in a term of the loss, and data that count twice.
+///
+/// # Errors
+/// Names the term and the key.
+pub fn check_losses(losses: &[Loss]) -> Result<(), Error> {
+    use LossKind::{Image, LightCurve, PolarizedVisibilities, Visibilities};
+    for (k, Loss { data, sigma, least_snr, .. }) in losses.iter().enumerate() {
+        let name = data.name();
+        if sigma.is_some() && !matches!(data, Image | LightCurve) {
+            refuse!(
+                "loss.{k}.sigma is for image and light-curve: errors of {name} are in the data"
+            );
+        }
+        if least_snr.is_some() && !data.has_weak_baselines() {
+            refuse!(
+                "loss.{k}.least_snr is for closure quantities and ratios: all baselines count in {name}, as their errors say"
+            );
+        }
+        let is_same = |other: &Loss| match (other.data, *data) {
+            (a, b) if a == b => true,
+            (Visibilities, PolarizedVisibilities) | (PolarizedVisibilities, Visibilities) => true,
+            _ => false,
+        };
+        if let Some(before) = losses[..k].iter().position(is_same) {
+            refuse!("loss.{k}.data = {name}: they count in loss.{before} already");
+        }
+    }
+    Ok(())
+}
+
 impl LossKind {
+    /// Returns whether weak baselines are left out of it: what is made of several is not Gaussian then.
+    fn has_weak_baselines(self) -> bool {
+        use LossKind::{ClosurePhases, LogClosureAmplitudes, PolarimetricRatios};
+        matches!(self, ClosurePhases | LogClosureAmplitudes | PolarimetricRatios)
+    }
+
     /// All kinds in their order, each with its name in `loss.data` and in a sentence.
     pub const NAMES: [(LossKind, &str, &str); 8] = [
         (LossKind::Image, "image", "images"),

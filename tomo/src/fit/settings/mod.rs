@@ -23,7 +23,7 @@ mod unknowns;
 mod view;
 
 pub use band::{BackgroundSettings, BandSettings, Steps};
-pub use data::{DataFiles, Loss, LossKind};
+pub use data::{DataFiles, Loss, LossKind, check_losses};
 pub use error::FitError;
 pub use error::{Within, refuse};
 pub use gaussian::{FieldKind, FieldSettings, Negative, PriorOfVoxels};

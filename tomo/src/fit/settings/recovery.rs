@@ -58,9 +58,11 @@ pub struct Linear {
     pub degree: Degree,
     /// Rounds in which nodes may be admitted again.
     #[serde(default = "rounds")]
+    #[schemars(range(min = 1), extend("unit" = "rounds"))]
     pub rounds: usize,
     /// Iterations per round, at most.
     #[serde(default = "iterations")]
+    #[schemars(range(min = 1), extend("unit" = "iterations"))]
     pub iterations: usize,
 }
 
@@ -216,6 +218,6 @@ pub enum Optimiser {
     /// Steps along the mean gradient of random parts of the data.
     #[default]
     Adam,
-    /// The same for all but the weight matrices of networks, which step along orthogonal matrices.
+    /// The same for all but the weight matrices of `bhnerf` and `mlp4d`, which step along orthogonal matrices.
     Muon,
 }

@@ -338,12 +338,16 @@ pub struct Observation {
     #[schemars(range(min = 1, max = 1_000_000), extend("unit" = "scans"))]
     pub scans: u32,
     /// Integration time of a scan, above 0 s.
+    #[schemars(range(min = 1e-6, max = 1e6), extend("unit" = "seconds"))]
     pub integration_s: f64,
     /// Frequency, above 0 GHz.
+    #[schemars(range(min = 0.001, max = 1e6), extend("unit" = "GHz"))]
     pub frequency_ghz: f64,
     /// Bandwidth, above 0 GHz.
+    #[schemars(range(min = 1e-9, max = 1000.0), extend("unit" = "GHz"))]
     pub bandwidth_ghz: f64,
     /// Least and greatest elevation, degrees.
+    #[schemars(inner(range(min = -90.0, max = 90.0)), extend("unit" = "degrees"))]
     pub elevation_deg: [f64; 2],
     /// Noise that is added; errors are thermal in both cases.
     pub noise: Noise,

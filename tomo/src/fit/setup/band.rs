@@ -220,6 +220,19 @@ pub fn check_band<'a>(
     if settings.rotation_factors.is_empty() || settings.position_angles_deg.is_empty() {
         refuse!("band: rotation_factors and position_angles_deg need one value or more");
     }
+    let all = [
+        ("rotation_factors", &settings.rotation_factors),
+        ("position_angles_deg", &settings.position_angles_deg),
+        ("widths", &settings.widths),
+        ("lengths", &settings.lengths),
+    ];
+    for (key, values) in all {
+        let is_twice = |k: &usize| values[..*k].contains(&values[*k]);
+        if let Some(k) = (1..values.len()).find(is_twice) {
+            let allowed = "a value once: each is as probable as the others";
+            return Err(FitError::range(format!("band.{key}.{k}"), values[k], allowed).into());
+        }
+    }
     let turns = settings.position_angles_deg.iter().any(|angle| *angle != 0.0);
     if turns && !can_turn(curve) {
         refuse!(

@@ -7,7 +7,7 @@ use crate::fit::linear::{Change, Voxels};
 use crate::fit::settings;
 use crate::fit::settings::{
     AxisSearch, FieldKind, FitError, FitFile, Kind, LossKind, Optimiser, Quantity, Start, Within,
-    refuse,
+    check_losses, refuse,
 };
 use crate::fit::{BatchSize, ChangePrice, OccupancySettings, Region, Training, WithStaticImage};
 use crate::optimise::{LinearDecay, Muon};
@@ -246,6 +246,7 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     let (_, axis_rate) = axis(file)?;
     afford(file, registry)?;
     file.check_unknowns()?;
+    check_losses(&file.loss)?;
     // Of any length: those of the data are known once rays are traced.
     let training = training(file, axis_rate, [0.0, 0.0])?;
     change::check(file)?;
@@ -329,7 +330,7 @@ fn check_prior(file: &FitFile) -> Result<()> {
     if !is_linear && !matches!(file.training.start, Start::Linear { .. }) {
         refuse!("linear.prior needs representation.kind = \"linear-grid\" or a linear start");
     }
-    if is_linear && file.change.is_some() {
+    if file.change.is_some() {
         refuse!(
             "linear.prior does not work together with [change]: it knows no covariance in time"
         );
