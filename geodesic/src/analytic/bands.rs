@@ -57,7 +57,7 @@ impl LensingBand {
         let mut far = 2.0 * critical;
         while self.excess(angle, far, false) > 0.0 {
             far *= 2.0;
-            if far > 1e12 {
+            if far.is_nan() || far > 1e12 {
                 return None;
             }
         }

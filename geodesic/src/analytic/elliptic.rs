@@ -35,7 +35,7 @@ pub(crate) fn cel(kc: f64, p: f64, mut a: f64, mut b: f64) -> f64 {
         p += g;
         let m_before = m;
         m += kc;
-        if (m_before - kc).abs() <= HALF_PRECISION * m_before {
+        if (m_before - kc).abs() <= HALF_PRECISION * m_before || m.is_nan() {
             return FRAC_PI_2 * (b + a * m) / (m * (m + p));
         }
         kc = 2.0 * e.sqrt();

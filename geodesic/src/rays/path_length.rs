@@ -22,6 +22,9 @@ impl Default for PathLength {
 /// The part of W = ẇ² at infinity down to which the far part of a ray is integrated over w.
 const FAR: f64 = 0.3;
 
+/// Inverse radius, M⁻¹, that no photon orbits at: they have radii of 4 M at most.
+const OUTSIDE: f64 = 0.2;
+
 impl PathLength {
     /// Length in M from the observer to the point at Mino time `mino_time` (M⁻¹) of the path of `ray`. For an observer at
     /// infinity it is the limit of the length less the observer's distance from the plane through the hole across the line
@@ -58,7 +61,9 @@ impl PathLength {
     fn far_part(&self, hole: &Kerr, ray: &Ray, path: &Path, mino_time: f64) -> (f64, f64) {
         let turning = path.turning_point().map_or(f64::INFINITY, |(time, _)| time);
         let mut time = mino_time.min(turning);
-        while ray.potential.value(path.at(time).inverse_radius) < FAR {
+        // Behind the photon orbits W rises again: the far part ends before them.
+        let is_near = |w: f64| w > OUTSIDE || ray.potential.value(w) < FAR;
+        while is_near(path.at(time).inverse_radius) {
             time *= 0.5;
         }
         let w = path.at(time).inverse_radius;
@@ -71,5 +76,31 @@ impl PathLength {
         let polar = |time: f64| (hole.spin() * path.at(time).cos_theta()).powi(2);
         let polar = self.rule.iter().map(|(node, weight)| weight * time * polar(time * node));
         (time, radial.sum::<f64>() + polar.sum::<f64>() - 1.0 / w)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Inclination, Observer, Quantities, Tracer};
+
+    /// Lengths between two times of captured rays beside the critical curve, √27 M, are integrals of Σ = r².
+    #[test]
+    fn exact_lengths_of_captured_rays_beside_the_critical_curve() {
+        let hole = Kerr::new(0.0).unwrap();
+        let observer = Observer::at_infinity(Inclination::from_degrees(60.0).unwrap());
+        for distance in [0.3, 1e-3, 1e-6] {
+            let ray = observer.ray(&hole, 27f64.sqrt() * (1.0 - distance), 0.0).unwrap();
+            let mut path = Path::new();
+            Tracer::new(1e-12).unwrap().trace(&hole, &ray, Quantities::default(), &mut path);
+            let (first, last) = (0.02, 0.98 * path.mino_total());
+            let count = 200_000;
+            let step = (last - first) / f64::from(count);
+            let square = |k: i32| path.at(first + step * (f64::from(k) + 0.5)).radius().powi(2);
+            let expected = step * (0..count).map(square).sum::<f64>();
+            let length = |time: f64| PathLength::default().until(&hole, &ray, &path, time);
+            let found = length(last) - length(first);
+            assert!((found / expected - 1.0).abs() < 1e-6, "{distance} {found} {expected}");
+        }
     }
 }

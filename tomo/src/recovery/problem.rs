@@ -1,13 +1,15 @@
 //! Problem of a fit: settings with their data.
 
 use crate::Error;
-use crate::fit::settings::{AxisSearch, FitError, FitFile};
+use crate::fit::settings::{AxisSearch, FitError, FitFile, refuse};
 use crate::fit::setup::{self, FitData, Instrument, RaySampling};
 use crate::fit::{Motion, Objective};
 use crate::representation::Registry;
+use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::array::Array;
 use kerrlight_vlbi::light_curve::LightCurve;
 use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::operator::ImageGrid;
 use kerrlight_vlbi::simulate::Movie;
 
 /// A fit with its data: all that can be found wrong is, before anything is computed for long.
@@ -52,10 +54,11 @@ impl Problem {
     /// Takes images in Jy/pixel, rows from the top.
     ///
     /// # Errors
-    /// As [`Problem::simulated`], and if there are other pixels than the settings say.
+    /// As [`Problem::simulated`], and if there are other pixels than the settings say, on another field of the sky.
     pub fn of_movie(settings: FitFile, movie: Movie) -> Result<Self, Error> {
         let measure = |settings: &FitFile, _: &Instrument| {
             let Movie { grid, pixels } = movie;
+            check_grid(settings, grid, pixels.len())?;
             let frames = kerrlight_common::frames::Frames::of(pixels, grid.pixels());
             FitData::of_movie(settings, frames, [grid.width, grid.height], "the movie")
         };
@@ -144,4 +147,16 @@ impl Problem {
         let data = measured.terms(&self.settings.loss, pixels)?;
         Ok(Objective { model: instrument.forward(motion)?, data })
     }
+}
+/// Refuses a movie that is no whole images, or whose field differs from that of the settings by more than a hundredth.
+fn check_grid(settings: &FitFile, grid: ImageGrid, numbers: usize) -> Result<(), Error> {
+    if grid.pixels() == 0 || numbers == 0 || !numbers.is_multiple_of(grid.pixels()) {
+        refuse!("the movie has {numbers} numbers: no images of {} x {}", grid.width, grid.height);
+    }
+    let Ok(sky) = setup::sky(settings) else { return Ok(()) };
+    let [own, fit] = [grid, sky].map(|of| of.pixel_rad * of.width as f64 / MICROARCSECOND);
+    if (own - fit).abs() > 0.01 * own.max(fit) {
+        refuse!("the movie is {own:.4} µas wide, and the field of the settings {fit:.4} µas");
+    }
+    Ok(())
 }

@@ -192,9 +192,9 @@ impl Observation {
         channel.map_or(self.frequency_hz, |channel| Some(channel.frequency_hz))
     }
 
-    /// Names of a row's stations.
+    /// Names of a row's stations, `?` where there is none of that number.
     pub fn names(&self, row: &Row) -> [&str; 2] {
-        row.stations.map(|k| self.stations[usize::from(k)].name.as_str())
+        row.stations.map(|k| self.stations.get(usize::from(k)).map_or("?", |s| s.name.as_str()))
     }
 
     /// Lines of the history which say that the data are not calibrated, or have no errors or frequencies of their own.

@@ -113,6 +113,23 @@ impl FitData {
     }
 }
 
+/// Refuses rows of stations that there are none of, and numbers that are none: files have neither, observations that a caller
+/// has made may.
+fn check_rows(observation: &Observation) -> Result<()> {
+    for (k, row) in observation.rows.iter().enumerate() {
+        let station = row.stations.iter().find(|n| usize::from(**n) >= observation.stations.len());
+        if let Some(n) = station {
+            refuse!("row {k} is of station {n}, and there are {}", observation.stations.len());
+        }
+        let is_finite = [row.time_h, row.uv[0], row.uv[1]].iter().all(|x| x.is_finite());
+        let mut products = (0..4).filter_map(|product| row.product(product));
+        if !is_finite || products.any(|product| !product.visibility.is_finite()) {
+            refuse!("row {k}: its time, (u, v) or a visibility is not finite");
+        }
+    }
+    Ok(())
+}
+
 /// Refuses a field across which no baseline sees the phase turn: to these data the source is a point whatever its shape.
 fn check_resolved(sky: ImageGrid, observation: &Observation) -> Result<()> {
     const LEAST_TURNS: f64 = 0.05;
@@ -160,6 +177,7 @@ impl Reduction {
                  or fit total intensity"
             );
         }
+        check_rows(&observation).within(name)?;
         let mut observation = observation;
         if !is_polarized(losses) {
             // Rows without Stokes I take no part in its times and (u, v).

@@ -25,6 +25,7 @@ impl FitData {
         else {
             refuse!("{name} holds a light curve, and there is no [data.light-curve]")
         };
+        check_samples(&curve).within(name)?;
         let curve = prepared(curve, settings).within(name)?;
         let hours: Vec<f64> = curve.samples.iter().map(|sample| sample.time_h).collect();
         let data = curve.samples.iter().flat_map(|sample| {
@@ -39,6 +40,28 @@ impl FitData {
         let curve = Curve { parameters, hours, data, fitted, background: None };
         Ok(Self { times, curve: Some(curve), ..Self::empty() })
     }
+}
+
+/// Refuses samples that are not in order of time, and numbers that are none.
+fn check_samples(curve: &LightCurve) -> Result<()> {
+    let times: Vec<f64> = curve.samples.iter().map(|sample| sample.time_h).collect();
+    if times.iter().any(|time| !time.is_finite()) || times.windows(2).any(|pair| pair[1] < pair[0])
+    {
+        refuse!("times of samples are finite and ascend");
+    }
+    for sample in &curve.samples {
+        for flux in sample.stokes.iter().flatten() {
+            if !flux.jy.is_finite() || flux.sigma_jy.is_some_and(|s| !(s >= 0.0 && s.is_finite())) {
+                refuse!(
+                    "a flux of {} Jy with an error of {:?} at {} h is not allowed: finite, with a finite error",
+                    flux.jy,
+                    flux.sigma_jy,
+                    sample.time_h
+                );
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The flux of a parameter with its error, if it was measured.
