@@ -211,8 +211,8 @@ pub fn best_shape<'a>(shapes: impl Iterator<Item = &'a ShapeFit>) -> Option<&'a 
 
 /// A width of this logarithm in a picture: nothing is narrower than its pixels tell.
 fn drawn(ln: f64, pixel: f64) -> f64 {
-    // Line searches may try any length: its square and those of ratios stay finite, whatever the unit of the field.
-    ln.clamp(-100.0, 100.0).exp().hypot(pixel)
+    // Line searches may try any length: its exponential stays finite, and far beyond the field.
+    ln.clamp(-5.0, 9f64.max(pixel.ln() + 8.0)).exp().hypot(pixel)
 }
 
 /// Fits all shapes; none if `go_on` said no.

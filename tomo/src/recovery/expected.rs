@@ -123,6 +123,11 @@ fn term(part: &Observation, loss: &Loss) -> Option<Box<dyn DataTerm<f64>>> {
         LossKind::Amplitudes => Some(Box::new(AmplitudeTerm::<f64>::new(part).ok()?)),
         LossKind::ClosurePhases => closures(ClosureKind::Phase),
         LossKind::LogClosureAmplitudes => closures(ClosureKind::LogAmplitude),
-        _ => None,
+        // Their residuals are Gaussian.
+        LossKind::Image
+        | LossKind::Visibilities
+        | LossKind::PolarizedVisibilities
+        | LossKind::PolarimetricRatios
+        | LossKind::LightCurve => None,
     }
 }

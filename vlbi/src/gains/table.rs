@@ -72,14 +72,13 @@ pub struct GainsByStation<'a> {
 }
 
 impl GainsByStation<'_> {
-    /// The gain of a station at a time: the nearest one that is not farther than its span.
+    /// The gain of a station at a time: the nearest of those that are not farther than their spans.
     pub fn at(&self, station: &str, time_h: f64) -> Option<Complex64> {
         let gains = self.stations.get(station)?;
-        let after = gains.partition_point(|gain| gain.time_h < time_h);
-        let away = |gain: &&&StationGain| (gain.time_h - time_h).abs();
-        let around = &gains[after.saturating_sub(1)..(after + 1).min(gains.len())];
-        let nearest = around.iter().min_by(|a, b| away(a).total_cmp(&away(b)))?;
-        (away(&nearest) * 3600.0 <= nearest.span_s.max(SAME_S)).then_some(nearest.gain)
+        let away_s = |gain: &StationGain| 3600.0 * (gain.time_h - time_h).abs();
+        // A long span may hold where a nearer gain does not.
+        let holding = gains.iter().filter(|gain| away_s(gain) <= gain.span_s.max(SAME_S));
+        Some(holding.min_by(|a, b| away_s(a).total_cmp(&away_s(b)))?.gain)
     }
 }
 

@@ -86,7 +86,7 @@ pub struct MeasuredCurve {
     /// First and last hour of UTC, hours; all without it.
     #[schemars(inner(range(min = -1e4, max = 1e4)), extend("unit" = "hours of UTC"))]
     pub utc_h: Option<[f64; 2]>,
-    /// Samples that are averaged.
+    /// Samples that are averaged; the last average has the rest.
     #[schemars(range(min = 1, max = 1_000_000_000), extend("unit" = "samples"))]
     pub average: Option<usize>,
     /// Time over which samples are averaged, s.

@@ -199,7 +199,8 @@ impl FitData {
             }
             (LossKind::Amplitudes, None) => return Ok(Some(Box::new(AmplitudeTerm::new(part)?))),
             (LossKind::ClosurePhases, _) => ClosureKind::Phase,
-            _ => ClosureKind::LogAmplitude,
+            (LossKind::LogClosureAmplitudes, _) => ClosureKind::LogAmplitude,
+            (other, _) => refuse!("{} are not made of visibilities of Stokes I", other.label()),
         };
         match ClosureTerm::new(part, kind, least) {
             Err(VlbiError::DataTerm(DataTermError::Empty)) => Ok(None),

@@ -54,6 +54,12 @@ const LARGEST_TURN: f64 = 0.5;
 /// Longest piece that is summed by one rule, in units of σ.
 const LONGEST: f64 = 3.0;
 
+/// The same where matter cannot turn with the spot at one end of it.
+const TORN: f64 = 0.02;
+
+/// Longest piece over the radius.
+const PART: f64 = 0.5;
+
 /// Gauss–Legendre rules for pieces of at most 1, 1.5, 2, 2.5 and 3 σ, with 4 to 8 nodes. The error of n nodes on a
 /// piece of h σ of a Gaussian is below (2n − 1)!! h^(2n + 1) (n!)⁴ / ((2n + 1) ((2n)!)³) of σ: 6e-8 or less.
 static RULES: LazyLock<[Vec<(f64, f64)>; 5]> =
@@ -160,7 +166,13 @@ impl<'a> SpotLight<'a> {
         if self.spot.is_missed(carried, length) {
             return;
         }
-        if length > LONGEST * self.spot.sigma() && depth < DEEPEST {
+        let longest = match self.is_torn([start, end]) {
+            true => TORN * self.spot.sigma(),
+            false => LONGEST * self.spot.sigma(),
+        };
+        // Redshifts change with the radius as the spot does over its width.
+        let nearest = start.point.radius().min(end.point.radius());
+        if length > longest.min(PART * nearest) && depth < DEEPEST {
             let middle = self.node(0.5 * (from + to));
             self.add_piece([start, &middle], depth + 1, light);
             self.add_piece([&middle, end], depth + 1, light);
@@ -170,6 +182,16 @@ impl<'a> SpotLight<'a> {
             let node = self.node(from + (to - from) * part);
             self.add_node(&node, (to - from) * weight, light);
         }
+    }
+
+    /// Returns whether matter can turn with the spot at one end alone.
+    fn is_torn(&self, ends: [&SpotNode; 2]) -> bool {
+        let optics = self.seen.optics;
+        let shines = |node: &SpotNode| {
+            let omega = self.spot.angular_velocity(node.point.radius());
+            rotating_redshift(&optics.hole, &node.point, omega).is_some()
+        };
+        optics.spectral_index.is_some() && shines(ends[0]) != shines(ends[1])
     }
 
     /// One node of the quadrature.
