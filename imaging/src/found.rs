@@ -193,8 +193,15 @@ impl Survey {
         // The method adds to images of the image as well: what is taken off is no error of the rest.
         let draws: Vec<f64> = self.draws.iter().filter_map(of).collect();
         let others = self.apart(&mut self.alternatives(), of)?;
-        let error = scatter(&draws).map(|scatter| (scatter.powi(2) + others).sqrt());
+        let error = scatter(&draws).filter(|_| self.are_at_minimum());
+        let error = error.map(|scatter| (scatter.powi(2) + others).sqrt());
         Some((here - added, error.map(|error| error.hypot(of_added))))
+    }
+
+    /// Returns whether half of the draws have come to a minimum.
+    fn are_at_minimum(&self) -> bool {
+        let there = self.draws.iter().filter(|draw| draw.solution.has_converged).count();
+        2 * there >= self.draws.len()
     }
 
     /// Images of a known sky, if they say what the method has done to the image: it came to a minimum.
@@ -208,8 +215,12 @@ impl Survey {
     }
 
     /// Error of a number of the image: root mean square distance of the draws from it, and of the images that data do not tell
-    /// from it, added in quadrature, over those that have the number; none with less than two such draws.
+    /// from it, added in quadrature, over those that have the number; none with less than two such draws, and where most draws
+    /// stopped on their way: they stay near where they started, and near each other.
     pub fn error(&self, number: impl Fn(&Candidate) -> Option<f64>) -> Option<f64> {
+        if !self.are_at_minimum() {
+            return None;
+        }
         let count = self.draws.iter().filter_map(&number).count();
         let square = self.apart(&mut self.draws.iter(), &number)?
             + self.apart(&mut self.alternatives(), &number)?;
@@ -284,6 +295,9 @@ mod tests {
         let mut stopped = survey(true);
         stopped.starts[0].solution.has_converged = false;
         near(stopped.flux(), [1.1, off.sqrt()]);
+        // Draws that stopped near their start are near each other whatever the data say.
+        stopped.draws.iter_mut().for_each(|draw| draw.solution.has_converged = false);
+        assert_eq!(stopped.flux().1, None);
     }
 
     /// The same image with a ring that is brightest in a direction.

@@ -153,7 +153,7 @@ pub(super) fn allowed(held: &[Held]) -> Vec<f64> {
 
 /// Drops strengths of which fewer than half of the parts are known, then parts that are not known of all others: NaN stands for
 /// a fit that did not come to a minimum, which says nothing. Nothing is left where fewer than two parts are.
-fn voting(mut held: Vec<Held>) -> Vec<Held> {
+pub(super) fn voting(mut held: Vec<Held>) -> Vec<Held> {
     let known = |held: &Held| held.losses.iter().filter(|loss| loss.is_finite()).count();
     held.retain(|one| 2 * known(one) >= one.losses.len());
     let parts = held.first().map_or(0, |one| one.losses.len());

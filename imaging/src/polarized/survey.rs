@@ -7,7 +7,7 @@ use crate::data::instants;
 use crate::found::Survey;
 use crate::settings::{StaticImageFile, StaticPolarization};
 use crate::solve::minimum;
-use crate::survey::{Stage, SurveyWatch, allowed, held};
+use crate::survey::{Stage, SurveyWatch, allowed, held, voting};
 use kerrlight_tomo::fit::setup::{FitData, Held, SolvedLeakage, best_held};
 use kerrlight_tomo::fit::{FrameTerm, Weighted};
 use kerrlight_vlbi::data_terms::DataTermError;
@@ -199,8 +199,12 @@ impl Search<'_> {
         held(settings, |value, fold| {
             let seen = self.problem(term, light, value, part(fold, true));
             let found = self.solved(Stage::HeldOut, &seen, value, survey)?;
+            if !found.has_converged {
+                return Some(f64::NAN);
+            }
             Some(self.problem(term, light, value, part(fold, false)).chi2(&found.images))
         })
+        .map(voting)
     }
 
     /// Images of the data with their noise once more, each beside the total intensity of a draw.
