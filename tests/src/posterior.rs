@@ -49,7 +49,7 @@ fn exact_draws_of_voxels_resume_to_the_same_bytes() {
         assert!(check[key].as_f64().unwrap() < 1e-3, "{check}");
     }
     assert!(page.contains("Posterior predictive checks"));
-    assert!(page.contains("The visibilities are not what the draws predict"));
+    assert!(page.contains("Data (visibilities) are not what the draws predict"));
     // Two draws again, and the rest found: the same bytes.
     let all = ["mean.npz", "deviation.npz", "posterior.json"].map(of);
     for name in ["sample_0002.json", "sample_0003.npz", "sample_0003.json", "mean.npz"] {
@@ -113,7 +113,7 @@ fn exact_draws_of_a_right_model_predict_the_data() {
     let open = numbers["open_nodes"].as_f64().unwrap();
     assert!((0.0..0.5).contains(&open), "{open}");
     let page = std::fs::read_to_string(folder.path().join("run/posterior/report.html")).unwrap();
-    assert!(page.contains("The visibilities are such as the draws predict"));
+    assert!(page.contains("Data (visibilities) are such as the draws predict"));
     assert!(page.contains("What the data leave open"));
 }
 

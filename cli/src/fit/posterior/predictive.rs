@@ -60,20 +60,20 @@ impl Check {
         let chi2 = self.chi2_per_datum;
         if self.beyond_what_passes >= WRONG && least < WRONG {
             return format!(
-                "The {name} are such as the draws predict, but for an error of the model that is smaller than those of the \
+                "Data ({name}) are such as the draws predict, but for an error of the model that is smaller than those of the \
                  data: by chance alone data would be as far off with a probability of {} (χ² {chi2:.2} per data point).",
                 probability(least)
             );
         }
         if least < WRONG {
             return format!(
-                "The {name} are not what the draws predict: data that are as far off come about with a probability of {} \
+                "Data ({name}) are not what the draws predict: data that are as far off come about with a probability of {} \
                  (χ² {chi2:.2} per data point).",
                 probability(least)
             );
         }
         format!(
-            "The {name} are such as the draws predict: a larger χ² has a probability of {} (χ² {chi2:.2} per data point).",
+            "Data ({name}) are such as the draws predict: a larger χ² has a probability of {} (χ² {chi2:.2} per data point).",
             probability(self.larger_chi2)
         )
     }
