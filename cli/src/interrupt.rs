@@ -199,6 +199,11 @@ pub fn listen() -> anyhow::Result<()> {
     if blocked.thread_block().is_ok() {
         threads::spawn(move || {
             while let Ok(signal) = signals.wait() {
+                // The system repeats it each second: one is one request.
+                let is_repeated = OF_PROCESS.stop.load(Ordering::Relaxed);
+                if signal == Signal::SIGXCPU && is_repeated {
+                    continue;
+                }
                 OF_PROCESS.raise(signal as u8);
             }
         })?;

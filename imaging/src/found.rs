@@ -90,6 +90,12 @@ pub fn mean_with_error(values: &[f64]) -> Option<(f64, f64)> {
     (values.len() >= 2).then(|| (mean, (square / (count * (count - 1.0))).sqrt()))
 }
 
+/// Those of some draws that have come to a minimum; none of them where fewer than half have.
+pub(crate) fn at_minimum<T>(draws: &[T], has_converged: impl Fn(&T) -> bool) -> Vec<&T> {
+    let there: Vec<&T> = draws.iter().filter(|draw| has_converged(draw)).collect();
+    if 2 * there.len() < draws.len() { Vec::new() } else { there }
+}
+
 /// Standard deviation of values; none of fewer than two.
 fn scatter(values: &[f64]) -> Option<f64> {
     mean_with_error(values).map(|(_, error)| error * (values.len() as f64).sqrt())
@@ -191,17 +197,16 @@ impl Survey {
             return Some((here, self.error(of)));
         };
         // The method adds to images of the image as well: what is taken off is no error of the rest.
-        let draws: Vec<f64> = self.draws.iter().filter_map(of).collect();
+        let draws: Vec<f64> = self.draws_at_minimum().into_iter().filter_map(of).collect();
         let others = self.apart(&mut self.alternatives(), of)?;
-        let error = scatter(&draws).filter(|_| self.are_at_minimum());
-        let error = error.map(|scatter| (scatter.powi(2) + others).sqrt());
+        let error = scatter(&draws).map(|scatter| (scatter.powi(2) + others).sqrt());
         Some((here - added, error.map(|error| error.hypot(of_added))))
     }
 
-    /// Returns whether half of the draws have come to a minimum.
-    fn are_at_minimum(&self) -> bool {
-        let there = self.draws.iter().filter(|draw| draw.solution.has_converged).count();
-        2 * there >= self.draws.len()
+    /// Draws that have come to a minimum, if half of all have: those that stopped on their way stay near where they started, and
+    /// near each other.
+    pub fn draws_at_minimum(&self) -> Vec<&Candidate> {
+        at_minimum(&self.draws, |draw| draw.solution.has_converged)
     }
 
     /// Images of a known sky, if they say what the method has done to the image: it came to a minimum.
@@ -214,15 +219,12 @@ impl Survey {
         self.error(|image| image.ring.as_ref().map(&number))
     }
 
-    /// Error of a number of the image: root mean square distance of the draws from it, and of the images that data do not tell
-    /// from it, added in quadrature, over those that have the number; none with less than two such draws, and where most draws
-    /// stopped on their way: they stay near where they started, and near each other.
+    /// Error of a number of the image: root mean square distance of the [draws](Self::draws_at_minimum) from it, and of the images
+    /// that data do not tell from it, added in quadrature, over those that have the number; none with less than two such draws.
     pub fn error(&self, number: impl Fn(&Candidate) -> Option<f64>) -> Option<f64> {
-        if !self.are_at_minimum() {
-            return None;
-        }
-        let count = self.draws.iter().filter_map(&number).count();
-        let square = self.apart(&mut self.draws.iter(), &number)?
+        let draws = self.draws_at_minimum();
+        let count = draws.iter().filter_map(|draw| number(draw)).count();
+        let square = self.apart(&mut draws.into_iter(), &number)?
             + self.apart(&mut self.alternatives(), &number)?;
         (count >= 2).then(|| square.sqrt())
     }

@@ -212,7 +212,7 @@ pub fn best_shape<'a>(shapes: impl Iterator<Item = &'a ShapeFit>) -> Option<&'a 
 /// A width of this logarithm in a picture: nothing is narrower than its pixels tell.
 fn drawn(ln: f64, pixel: f64) -> f64 {
     // Line searches may try any length: its exponential stays finite, and far beyond the field.
-    ln.clamp(-5.0, 9f64.max(pixel.ln() + 8.0)).exp().hypot(pixel)
+    ln.clamp((pixel.ln() - 8.0).min(-5.0), (pixel.ln() + 8.0).max(9.0)).exp().hypot(pixel)
 }
 
 /// Fits all shapes; none if `go_on` said no.

@@ -112,6 +112,7 @@ pub fn survey(
 pub fn image(file: &StaticImageFile, observation: Observation) -> Result<Survey, Error> {
     file.check_all()?;
     let measured = data::total_intensity(file, observation, "the observation")?;
+    measured.check_resolved()?;
     let shapes = fit_shapes(file, &measured, &|| true)?.unwrap_or_default();
     let found = survey(file, &measured, &shapes, &|_, _| true)?;
     found.ok_or_else(|| Error::Failed("the search for an image was told to stop".to_owned()))
@@ -129,7 +130,7 @@ fn expected(
 }
 
 /// The strength in the middle of those to choose from.
-fn middle(settings: &StrengthSettings) -> f64 {
+pub(super) fn middle(settings: &StrengthSettings) -> f64 {
     let mut values = settings.values.clone();
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]

@@ -173,7 +173,7 @@ fn exact_frames_without_visibilities_are_left_out() {
         "simulation.observation.gmst=[0.0,23.9]",
     );
     let said = told(folder.path(), &day);
-    assert!(said.contains("of them with data)"), "{said}");
+    assert!(said.contains("of them fitted)"), "{said}");
     assert!(results(&folder.path().join("some"))["loss"].as_f64().unwrap().is_finite());
     let never = of(
         "none",

@@ -46,7 +46,7 @@ const INCOHERENT: f64 = 0.05;
 /// Standard deviations of the power of noise that are chance.
 const BY_CHANCE: f64 = 3.0;
 /// Baselines shorter than this many metres are within a site.
-const SITE_M: f64 = 10e3;
+pub const SITE_M: f64 = 10e3;
 /// The same in wavelengths, where no one tells where the stations are: 10 km at 1.3 mm.
 pub const SITE_WAVELENGTHS: f64 = 8e6;
 
@@ -93,7 +93,8 @@ impl LightCurve {
         self
     }
 
-    /// Means of so many samples at a time; the last has the rest. Those without a parameter have no part in its mean.
+    /// Means of so many samples at a time, by 1/σ² where all have errors; the last has the rest. Those without a parameter have no
+    /// part in its mean.
     #[must_use]
     pub fn averaged(self, count: usize) -> Self {
         Self { samples: self.samples.chunks(count.max(1)).map(mean).collect() }
@@ -186,28 +187,42 @@ fn mixed(x: Flux, a: f64, y: Flux, b: f64) -> Flux {
     Flux { jy: a * x.jy + b * y.jy, sigma_jy: x.sigma_jy.zip(y.sigma_jy).map(sigma) }
 }
 
-/// The mean of some samples, by 1/σ² where all have errors.
+/// Weights of fluxes in their mean: 1/σ² where all have errors.
+fn weights(all: &[Flux]) -> Vec<f64> {
+    let sigmas: Option<Vec<f64>> = all.iter().map(|flux| flux.sigma_jy).collect();
+    let weights: Vec<f64> = match sigmas.filter(|all| all.iter().all(|sigma| *sigma > 0.0)) {
+        Some(sigmas) => sigmas.iter().map(|sigma| sigma.powi(-2)).collect(),
+        None => vec![1.0; all.len()],
+    };
+    let sum: f64 = weights.iter().sum();
+    weights.iter().map(|weight| weight / sum).collect()
+}
+
+/// The mean of some samples, whose time is that of their fluxes.
 fn mean(samples: &[Sample]) -> Sample {
-    let count = samples.len() as f64;
-    let of = |k: usize| -> Option<Flux> {
-        let all: Vec<Flux> = samples.iter().filter_map(|sample| sample.stokes[k]).collect();
+    let mut shares = vec![0.0; samples.len()];
+    let mut of = |k: usize| -> Option<Flux> {
+        let has = |sample: &Sample| sample.stokes[k];
+        let all: Vec<Flux> = samples.iter().filter_map(has).collect();
+        let weights = weights(&all);
+        let places = (0..samples.len()).filter(|place| samples[*place].stokes[k].is_some());
+        places.zip(&weights).for_each(|(place, weight)| shares[place] += weight);
+        let jy = all.iter().zip(&weights).map(|(flux, w)| w * flux.jy).sum::<f64>();
         let sigmas: Option<Vec<f64>> = all.iter().map(|flux| flux.sigma_jy).collect();
-        let errors = sigmas.as_ref().filter(|sigmas| sigmas.iter().all(|sigma| *sigma > 0.0));
-        let weights: Vec<f64> = match errors {
-            Some(sigmas) => sigmas.iter().map(|sigma| sigma.powi(-2)).collect(),
-            None => vec![1.0; all.len()],
-        };
-        let sum: f64 = weights.iter().sum();
-        let jy = all.iter().zip(&weights).map(|(flux, w)| w * flux.jy).sum::<f64>() / sum;
         let of_mean = |sigmas: Vec<f64>| {
-            sigmas.iter().zip(&weights).map(|(s, w)| (s * w).powi(2)).sum::<f64>().sqrt() / sum
+            sigmas.iter().zip(&weights).map(|(s, w)| (s * w).powi(2)).sum::<f64>().sqrt()
         };
         (!all.is_empty()).then(|| Flux { jy, sigma_jy: sigmas.map(of_mean) })
     };
+    let stokes = [of(0), of(1), of(2), of(3)];
+    if shares.iter().all(|share| *share == 0.0) {
+        shares.fill(1.0);
+    }
     let same = samples.iter().all(|sample| sample.by == samples[0].by);
+    let times = samples.iter().zip(&shares).map(|(sample, share)| share * sample.time_h);
     Sample {
-        time_h: samples.iter().map(|sample| sample.time_h).sum::<f64>() / count,
-        stokes: [0, 1, 2, 3].map(of),
+        time_h: times.sum::<f64>() / shares.iter().sum::<f64>(),
+        stokes,
         by: if same { samples[0].by.clone() } else { String::new() },
     }
 }

@@ -5,7 +5,7 @@ use super::labels::RESULTS;
 use crate::Arguments;
 use crate::checksum::is_whole;
 use crate::file_sums::FileSums;
-use crate::fit::{Inputs, from_folder, posterior};
+use crate::fit::{Inputs, SETTINGS, from_folder, posterior};
 use crate::interrupt::SignalGuard;
 use crate::lock::Lock;
 use crate::output::{self, Output};
@@ -144,16 +144,19 @@ impl<'a> Runner<'a> {
     }
 }
 
-/// Makes room for a run. What another version has finished is moved aside, and told; what was cut off before it had settings goes.
+/// Between the name of a case and a number: a run that was moved aside.
+pub const ASIDE: &str = ".old-";
+
+/// Makes room for a run. What another version has begun is moved aside, and told; what was cut off before it had settings goes.
 fn clear(run: &Path) -> anyhow::Result<()> {
     if !run.exists() {
         return Ok(());
     }
     let cannot = || format!("cannot clear {}", run.display());
-    if !run.join("results.json").exists() {
+    if !run.join(SETTINGS).exists() {
         return std::fs::remove_dir_all(run).with_context(cannot);
     }
-    let aside = |k: u32| PathBuf::from(format!("{}.old-{k}", run.display()));
+    let aside = |k: u32| PathBuf::from(format!("{}{ASIDE}{k}", run.display()));
     let free = (1..).map(aside).find(|path| !path.exists());
     let free = free.with_context(cannot)?;
     std::fs::rename(run, &free).with_context(cannot)?;

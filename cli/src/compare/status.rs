@@ -84,17 +84,17 @@ pub fn show(folder: &Path, cases: &[Case], samples: Option<u32>) -> anyhow::Resu
         .with("failed", failed.iter().map(told).collect::<Vec<Value>>()))
 }
 
-/// Refuses a folder whose cases are all of other settings: a report would be of none.
+/// Refuses a folder whose cases are all of other settings than `cases`, all of the experiment: a report would be of none.
 pub fn refuse_others(folder: &Path, cases: &[Case]) -> anyhow::Result<()> {
     let own: HashSet<String> = cases.iter().map(Case::slug).collect();
     let entries = std::fs::read_dir(folder.join(CASES)).into_iter().flatten().flatten();
-    let names = entries.filter(|entry| entry.path().is_dir()).map(|entry| entry.file_name());
-    let mut others = names.filter(|name| name.to_str().is_none_or(|name| !own.contains(name)));
-    match others.next() {
+    let folders = entries.filter(|entry| entry.path().is_dir()).map(|entry| entry.file_name());
+    let names = folders.map(|name| name.to_string_lossy().into_owned());
+    let names: Vec<String> = names.filter(|name| !name.contains(runner::ASIDE)).collect();
+    match names.iter().find(|_| names.iter().all(|name| !own.contains(name))) {
         Some(other) => bail!(
-            "{} holds {} and none of the cases that are asked for: the experiment or its fit file has changed since they ran",
+            "{} holds {other} and none of the cases of the experiment: it or its fit file has changed since they ran",
             folder.display(),
-            other.display()
         ),
         None => Ok(()),
     }

@@ -127,7 +127,7 @@ fn images(file: &FitFile, path: &Path) -> anyhow::Result<WithSize> {
             npy_frames(output::read_through(path)?).with_context(name)
         }
         _ => {
-            let Movie { grid, pixels } = movie(file, &files[0])?;
+            let (Movie { grid, pixels }, _) = movie(file, &files[0])?;
             Ok((Frames::of(pixels, grid.pixels()), [grid.width, grid.height]))
         }
     }
@@ -135,53 +135,73 @@ fn images(file: &FitFile, path: &Path) -> anyhow::Result<WithSize> {
 
 /// An image a file.
 fn sequence(file: &FitFile, files: &[PathBuf]) -> anyhow::Result<WithSize> {
-    let first = movie(file, &files[0])?.grid;
-    let size = [first.width, first.height];
+    let (first, _) = movie(file, &files[0])?;
+    let size = [first.grid.width, first.grid.height];
     // Frames know errors of files alone: what is wrong with an image is kept aside.
-    let mut refused = None;
-    let frames = Frames::made(files.len(), first.pixels(), |sink| {
+    let (mut refused, mut hours) = (None, Vec::new());
+    let frames = Frames::made(files.len(), first.grid.pixels(), |sink| {
         files.iter().try_for_each(|path| match one(file, path, size) {
-            Ok(pixels) => sink(&pixels),
+            Ok((pixels, own)) => {
+                hours.extend(own);
+                sink(&pixels)
+            }
             Err(error) => {
                 refused = Some(error);
                 Err(std::io::Error::other("no image").into())
             }
         })
     });
-    match refused {
-        Some(error) => Err(error),
-        None => Ok((frames?, size)),
+    if let Some(error) = refused {
+        return Err(error);
     }
+    let name = || files[0].display().to_string();
+    // Frames are made twice where they do not fit into memory.
+    let times = match hours.len() == files.len() {
+        true => OwnTimes::Since(hours),
+        false => OwnTimes::Unknown,
+    };
+    movie_files::check_steps(&times).with_context(name)?;
+    check_facts(file, &files[0], None, &times)?;
+    Ok((frames?, size))
 }
 
-/// The image of a file, of this width and height.
-fn one(file: &FitFile, path: &Path, [width, height]: [usize; 2]) -> anyhow::Result<Vec<f64>> {
-    let image = movie(file, path)?;
+/// The image of a file, of this width and height, with its time, where it tells one.
+fn one(
+    file: &FitFile,
+    path: &Path,
+    [width, height]: [usize; 2],
+) -> anyhow::Result<(Vec<f64>, Option<f64>)> {
+    let (image, times) = movie(file, path)?;
     if [image.grid.width, image.grid.height] != [width, height] || image.frames() != 1 {
         let path = path.display();
         bail!("{path}: in a sequence every file is one image of {width} x {height} pixels");
     }
-    Ok(image.pixels)
+    let own = match times {
+        OwnTimes::Since(hours) => hours.first().copied(),
+        _ => None,
+    };
+    Ok((image.pixels, own))
 }
 
-/// The movie of a file, which may know its field.
-fn movie(file: &FitFile, path: &Path) -> anyhow::Result<Movie> {
+/// The movie of a file, which may know its field, and its times.
+fn movie(file: &FitFile, path: &Path) -> anyhow::Result<(Movie, OwnTimes)> {
     let files = [path.to_owned()];
     let (movie, times) = match movie_files::read(&files, None) {
         Ok(known) => known,
         Err(first) => {
-            // Only pixels and their number are used: any field serves where none is given. FITS files and texts of images
-            // have one: of these the first error is the one.
+            // Only pixels and their number are used: any field serves where none is given. Of files that have one, which a field
+            // that is given offends, the first error is the one.
             let field = file.screen.field_uas.unwrap_or(1.0);
-            let knows = path.extension().is_some_and(|e| e == "fits" || e == "fit");
-            let given = movie_files::read(&files, Some(field));
-            return Ok(given.map_err(|second| if knows { first } else { second })?.0.i);
+            let (movie, times) = movie_files::read(&files, Some(field)).map_err(|second| {
+                if second.to_string().starts_with("--fov-uas") { first } else { second }
+            })?;
+            return Ok((movie.i, times));
         }
     };
     let grid = movie.i.grid;
     let field_uas = grid.pixel_rad * grid.width as f64 / MICROARCSECOND;
     check_facts(file, path, Some(field_uas), &times)?;
-    Ok(movie.i)
+    Ok((movie.i, times))
 }
 
 /// Fields and times of a file may differ from those of the fit by this part.
@@ -215,7 +235,7 @@ fn check_facts(
     if differ(own, fit) {
         bail!(
             "{path} says that its images are over {own:.4} hours, and the fit's are over {fit:.4}: data.movie.from and to, M, \
-             at the mass of the hole"
+             at the mass of the hole (`hours` or `times` of an archive: rename what is none)"
         );
     }
     Ok(())

@@ -48,7 +48,7 @@ const RESULTS: [&str; 14] = [
     "axis_scan.csv",
     "gains.csv",
     "leakage.csv",
-    SETTINGS,
+    "quiescent.exr",
 ];
 
 /// Words for another process in a folder.
@@ -58,7 +58,11 @@ impl Folder {
     /// A new folder, in which the data may lie.
     pub fn create(path: &Path, settings: &str, inputs: Inputs) -> anyhow::Result<Self> {
         let is_data = |file: &Path| inputs.holds(file);
-        if let Some(name) = RESULTS.iter().find(|name| is_data(&path.join(name))) {
+        // Those of further files have numbers.
+        let of_files = (2..=inputs.files.len())
+            .flat_map(|k| ["gains", "leakage"].map(|name| format!("{name}_{k}.csv")));
+        let names = RESULTS.iter().map(|name| (*name).to_owned()).chain(of_files);
+        if let Some(name) = names.into_iter().find(|name| is_data(&path.join(name))) {
             bail!(
                 "{} is read, and the run writes a file of that name: give another folder with -o",
                 path.join(name).display()
@@ -141,7 +145,10 @@ impl Folder {
     pub fn file(&self, name: &str) -> anyhow::Result<Output> {
         let path = self.path.join(name);
         if self.inputs.holds(&path) {
-            bail!("{} was read by this run and would be lost: move it", path.display());
+            bail!(
+                "{} was read by this run and would be lost: begin again with -o in another folder",
+                path.display()
+            );
         }
         Output::new(&path, "")
     }

@@ -4,7 +4,6 @@ use super::arguments;
 use super::image_files::{self, OwnTimes};
 use crate::{output, paths};
 use anyhow::{Context, anyhow, bail};
-use kerrlight_render::image::exr;
 use kerrlight_vlbi::simulate::StokesMovie;
 use std::path::{Path, PathBuf};
 
@@ -59,22 +58,7 @@ pub fn files(argument: &Path) -> anyhow::Result<Vec<PathBuf>> {
     if names.is_empty() {
         bail!("{shown}: there are no files {}*{}", pattern.start, pattern.end);
     }
-    let files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
-    check_film(argument, &files)?;
-    Ok(files)
-}
-
-/// Refuses a part of the frames of a film that kerrlight has rendered: equal steps between them would be none.
-fn check_film(argument: &Path, files: &[PathBuf]) -> anyhow::Result<()> {
-    let attributes = |path: &PathBuf| exr::decode_attributes(output::open(path).ok()?).ok();
-    let Some(first) = attributes(&files[0]) else { return Ok(()) };
-    let Some(all) = first.get("frames").and_then(|all| all.parse::<usize>().ok()) else {
-        return Ok(());
-    };
-    if files.len() != all {
-        bail!("{}: {} frames of a film of {all}", argument.display(), files.len());
-    }
-    Ok(())
+    Ok(names.iter().map(|name| folder.join(name)).collect())
 }
 
 /// Common parts of the names of a sequence.
@@ -223,6 +207,7 @@ pub fn times(
         }
         Some(FrameTimes::Own) => own_hours(own, scans_h[0])?,
         Some(FrameTimes::Hours([from, to])) => {
+            check_steps(own)?;
             (0..frames).map(|k| from + (to - from) * k as f64 / (frames - 1) as f64).collect()
         }
         Some(FrameTimes::File(path)) => file_hours(path)?,
@@ -232,6 +217,22 @@ pub fn times(
     }
     let (from, to) = (times[0], times[frames - 1]);
     Ok((times, format!("{frames} images from {from} to {to} h UTC, linear between")))
+}
+
+/// Refuses images whose own times are not at equal steps, where equal steps are assumed: some are missing.
+pub fn check_steps(own: &OwnTimes) -> anyhow::Result<()> {
+    let (OwnTimes::Utc(hours) | OwnTimes::Since(hours)) = own else { return Ok(()) };
+    let steps: Vec<f64> = hours.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let Some(first) = steps.first() else { return Ok(()) };
+    match steps.iter().position(|step| (step - first).abs() > 0.01 * first.abs()) {
+        Some(k) => bail!(
+            "images {} and {} are {:.4} h apart by their own times, the first two {first:.4} h: some are missing",
+            k + 1,
+            k + 2,
+            steps[k]
+        ),
+        None => Ok(()),
+    }
 }
 
 /// Image k at scan k, unless numbers or the images' own times speak against it.

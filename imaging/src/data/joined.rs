@@ -37,6 +37,7 @@ pub fn joined(
     in_order(&mut all);
     let instants = instants(&all.times, &all.files).last().map_or(0, |last| last + 1);
     check_folds(table, strength, instants)?;
+    all.check_resolved()?;
     Ok(all)
 }
 
@@ -169,7 +170,12 @@ fn contradiction(a: &Observation, b: &Observation) -> Option<String> {
     let (here, there) = match (mean(a), mean(b)) {
         (Some(here), Some(there)) => (here, there),
         (None, None) => return None,
-        _ => return Some("the frequency of one of them is not known".to_owned()),
+        _ => {
+            return Some(
+                "the frequency of one of them is not known (`# frequency_hz: 230e9` above a table)"
+                    .to_owned(),
+            );
+        }
     };
     ((there / here).ln().abs() > SAME_FREQUENCY)
         .then(|| format!("they are of {:.1} and {:.1} GHz", here * 1e-9, there * 1e-9))

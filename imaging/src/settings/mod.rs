@@ -296,9 +296,6 @@ impl StaticImageFile {
         check_losses(&self.loss)?;
         for (k, loss) in self.loss.iter().enumerate() {
             loss_of_visibilities(loss).within(format!("loss {k}"))?;
-            if let Some(first) = self.loss[..k].iter().position(|other| other.data == loss.data) {
-                refuse!("loss {k}: the same data as loss {first}; each kind is allowed once");
-            }
         }
         self.check_penalties()?;
         self.check_ring()?;

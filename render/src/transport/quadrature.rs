@@ -129,11 +129,10 @@ pub(super) fn integrate(
         }
         let absorption = emission.absorption.get(start..start + order);
         let miss = absorption.and_then(|absorption| {
-            let before = light.depth;
             let (miss, of_depth) =
                 shade(quadrature, [weights, absorption], gains, &mut light.depth, depths);
             // Of a panel that is opaque itself nothing behind is seen.
-            *transmission_error += of_depth * (-light.depth.max(before)).exp();
+            *transmission_error += of_depth * (-light.depth).exp();
             miss
         });
         for (i, (gain, g)) in gains.iter().zip(redshift).enumerate() {

@@ -40,7 +40,8 @@ impl GainTable {
             stations.entry(&gain.station).or_default().push(gain);
         }
         stations.values_mut().for_each(|gains| gains.sort_by(|a, b| a.time_h.total_cmp(&b.time_h)));
-        GainsByStation { stations }
+        let longest_s = self.gains.iter().fold(SAME_S, |most, gain| most.max(gain.span_s));
+        GainsByStation { stations, longest_s }
     }
 
     /// Takes the gains out of visibilities: V becomes V/(g₁ ḡ₂), σ becomes σ/|g₁ g₂|. Rows without a gain for both of
@@ -69,6 +70,8 @@ impl GainTable {
 #[derive(Debug, Clone)]
 pub struct GainsByStation<'a> {
     stations: HashMap<&'a str, Vec<&'a StationGain>>,
+    /// No gain holds for longer before or after its time, s.
+    longest_s: f64,
 }
 
 impl GainsByStation<'_> {
@@ -76,8 +79,10 @@ impl GainsByStation<'_> {
     pub fn at(&self, station: &str, time_h: f64) -> Option<Complex64> {
         let gains = self.stations.get(station)?;
         let away_s = |gain: &StationGain| 3600.0 * (gain.time_h - time_h).abs();
+        let ends = [-1.0, 1.0].map(|side| time_h + side * 1.001 * self.longest_s / 3600.0);
+        let [from, to] = ends.map(|end| gains.partition_point(|gain| gain.time_h < end));
         // A long span may hold where a nearer gain does not.
-        let holding = gains.iter().filter(|gain| away_s(gain) <= gain.span_s.max(SAME_S));
+        let holding = gains[from..to].iter().filter(|gain| away_s(gain) <= gain.span_s.max(SAME_S));
         Some(holding.min_by(|a, b| away_s(a).total_cmp(&away_s(b)))?.gain)
     }
 }

@@ -3,11 +3,11 @@
 use super::sources::{Seen, Source, is_simulated};
 use super::template::{complete, digits, plain_words};
 use anyhow::bail;
-use kerrlight_common::units::{gravitational_angle, gravitational_time};
+use kerrlight_common::units::{SPEED_OF_LIGHT, gravitational_angle, gravitational_time};
 use kerrlight_tomo::fit::setup;
 use kerrlight_vlbi::data_terms::ClosureTerm;
 use kerrlight_vlbi::gains::prior_table;
-use kerrlight_vlbi::light_curve::SITE_WAVELENGTHS;
+use kerrlight_vlbi::light_curve::{SITE_M, SITE_WAVELENGTHS};
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::products::ClosureKind;
 use std::collections::BTreeSet;
@@ -127,7 +127,8 @@ pub fn short_baselines(observation: &Observation) -> anyhow::Result<f64> {
         .collect();
     // The shortest resolve least; their median does not hang on a single datum.
     let shortest = all.iter().fold(f64::INFINITY, |least, [length, _]| least.min(*length));
-    all.retain(|[length, _]| *length <= SITE_WAVELENGTHS.max(1.5 * shortest));
+    let site = observation.frequency_hz.map_or(SITE_WAVELENGTHS, |hz| SITE_M * hz / SPEED_OF_LIGHT);
+    all.retain(|[length, _]| *length <= site.max(1.5 * shortest));
     all.sort_by(|a, b| a[1].total_cmp(&b[1]));
     match all.get(all.len() / 2) {
         Some([_, flux]) if *flux > 0.0 => Ok(*flux),

@@ -261,7 +261,11 @@ struct Results {
 impl Results {
     fn read(folder: &Folder) -> anyhow::Result<Self> {
         let text = output::read_text(&folder.path().join("results.json"))?;
-        ensure!(is_whole(&text), "results.json is damaged");
+        let name = plain::path(folder.path());
+        ensure!(
+            is_whole(&text),
+            "{name}/results.json is damaged: remove it and resume the fit with kerrlight fit --resume"
+        );
         serde_json::from_str(&text).context("results.json is damaged")
     }
 

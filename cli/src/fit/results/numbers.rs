@@ -24,6 +24,9 @@ use std::collections::BTreeMap;
 /// Error over the truth above which a truth that changes is dark at the reference time.
 const NEARLY_DARK: f64 = 1e3;
 
+/// Words on a truth that changes, at a time at which it is dark.
+const DARK_NOW: &str = "the truth is dark, or nearly so, at the reference time: PSNR, relative error and correlation there are not defined";
+
 /// Words on a truth without emission.
 pub const DARK: &str =
     "the truth is dark on all nodes: PSNR, relative error and correlation are not defined";
@@ -226,7 +229,11 @@ impl Estimate<'_> {
         Ok(Some(Closeness {
             axis_dot_truth: found.state.now.axis.dot(truth.axis()),
             is_axis_known: matches!(self.file.axis, AxisSearch::Known {}),
-            note: lit(all.psnr_db).is_none().then_some(DARK),
+            note: match (all.psnr_db, is_lit) {
+                (None, _) => Some(DARK),
+                (_, false) => Some(DARK_NOW),
+                _ => None,
+            },
             psnr_db: lit(all.psnr_db),
             psnr_inside_db: lit(inside.psnr_db),
             nrmse: lit(all.nrmse),

@@ -28,8 +28,9 @@ impl Found<'_> {
             panel("the image", image.clone(), None),
             panel("blurred to 20 µas", self.seen(image, BEAM_UAS), Some(BEAM_UAS)),
         ];
-        if self.survey.draws.len() > 1 {
-            let scatter = scatter(&self.survey.draws);
+        let draws = self.survey.draws_at_minimum();
+        if draws.len() > 1 {
+            let scatter = scatter(&draws);
             all.push(panel("standard deviation of the draws", scatter, None));
         }
         let what = "The static image, linear between the centres of its pixels as in the fit.";
@@ -71,7 +72,7 @@ impl Found<'_> {
 }
 
 /// Standard deviation of each pixel.
-fn scatter(draws: &[Candidate]) -> Vec<f64> {
+fn scatter(draws: &[&Candidate]) -> Vec<f64> {
     let count = draws.len() as f64;
     let pixels = draws.first().map_or(0, |draw| draw.solution.image.len());
     let of = |k: usize| {

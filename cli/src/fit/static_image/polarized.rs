@@ -185,10 +185,10 @@ impl Polarized {
             with_error(100.0 * value, error.map(|error| 100.0 * error), 1)
         };
         // A direction of what may be zero is none.
-        let is_seen = beta.1.is_none_or(|error| beta.0 >= 2.0 * error);
+        let is_seen = beta.1.is_some_and(|error| beta.0 >= 2.0 * error);
         let argument = match is_seen {
             true => format!("the argument {}°", with_error(angle.0, angle.1, 0)),
-            false => "no measured argument: it is less than two errors from 0".to_owned(),
+            false => "no argument that is measured: it is not two errors from 0".to_owned(),
         };
         format!(
             "Seen with a beam of {} µas, {} % of the light is linearly polarised, {} % where polarised light is brightest ({}° east \
@@ -205,6 +205,7 @@ impl Polarized {
     /// Describes the assumptions.
     pub fn model(&self) -> Vec<String> {
         let StaticPolarization { leakage_left, smoothness, variability, .. } = &self.settings;
+        let tried = self.settings.strength.iter().flat_map(|s| s.values.iter().copied());
         let mut text = vec![format!(
             "Linear polarisation was found after total intensity, which was held: a fraction and a position angle in every pixel, \
              from {} {}. {} % of Stokes I from each station were added to errors of RL and LR for leakage. Slopes of the \
@@ -213,8 +214,14 @@ impl Polarized {
             self.settings.data.label(),
             100.0 * leakage_left,
             self.survey.found.strength,
-            told_end(self.survey.held.iter().map(|held| held.value), self.survey.found.strength)
+            told_end(tried, self.survey.found.strength)
         )];
+        if self.settings.strength.is_some() && self.survey.held.is_empty() {
+            text.push(
+                "Held-out frames choose no factor for polarisation: too few fits came to a minimum, and the middle factor is taken."
+                    .to_owned(),
+            );
+        }
         if let Some(law) = variability {
             text.push(format!(
                 "What polarised light varies: {} Jy/(1 + (|u|/{:e})²)^{} was added to errors of RL and LR in quadrature.",

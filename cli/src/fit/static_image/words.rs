@@ -28,7 +28,10 @@ fn ring(survey: &Survey, shapes: &[ShapeFit], between: &RingSettings) -> String 
         RING.map(|(name, number)| of_ring(survey, &ring, name, number));
     let bright = match angle.1 {
         Some(error) if error > EVEN_DEG => "as bright on all sides within the errors".to_owned(),
-        error => format!("brightest at {}° east of north", with_error(angle.0, error, 0)),
+        Some(error) => {
+            format!("brightest at {}° east of north", with_error(angle.0, Some(error), 0))
+        }
+        None => format!("brightest at {:.0}° east of north, without an error", angle.0),
     };
     let [with, all] = survey.with_ring();
     let others = match with == all {
@@ -200,7 +203,7 @@ impl Found<'_> {
                 values.len() * folds
             ));
         }
-        let tried = self.survey.held.iter().map(|held| held.value);
+        let tried = values.iter().copied();
         Some(format!(
             "The factor is the largest of {} that predicts frames which were not fitted as well as the best, within a standard error{}.",
             self.survey.held.len(),
@@ -212,6 +215,11 @@ impl Found<'_> {
         let (draws, others) = (self.survey.draws.len(), self.survey.alternatives().count());
         if draws < 2 {
             return vec!["No draws were asked for: numbers have no errors.".to_owned()];
+        }
+        if self.survey.draws_at_minimum().len() < 2 {
+            return vec![
+                "Most draws did not come to a minimum: numbers have no errors.".to_owned(),
+            ];
         }
         let known_sky = self.survey.known_sky.as_ref();
         let flux = match self.survey.calibration().is_some_and(|known| known.explains) {
@@ -253,9 +261,13 @@ impl Found<'_> {
                  are unfinished."
             ));
         }
+        let effect = match self.survey.draws_at_minimum().len() {
+            0 | 1 => "numbers have no errors",
+            _ => "errors are those of the others",
+        };
         (count > 0).then(|| {
             format!(
-                "{count} of {} draws did not come to a minimum in image.iterations = {of}: errors may be wrong.",
+                "{count} of {} draws did not come to a minimum in image.iterations = {of}: {effect}.",
                 draws.len()
             )
         })

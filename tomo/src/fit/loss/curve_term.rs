@@ -115,8 +115,11 @@ impl<T: Float> FrameTerm<T> for StokesCurveTerm {
 
     fn residuals(&self, frame: usize, image: &[T]) -> Vec<Residual> {
         if self.correlations[frame] != 0.0 {
-            let all = self.whitened(frame, [0, 1].map(|k| image[k].double()));
-            return all.map(|(residual, _)| plain(residual, 0.0, 1.0)).to_vec();
+            let image = [0, 1].map(|k| image[k].double());
+            let [model, none] = [image, [0.0; 2]].map(|image| self.whitened(frame, image));
+            // What a model of nothing leaves is the data.
+            let pairs = model.into_iter().zip(none);
+            return pairs.map(|((r, _), (d, _))| plain(r - d, -d, 1.0)).collect();
         }
         let pairs = image.iter().zip(self.of(frame));
         pairs

@@ -84,6 +84,7 @@ impl FitData {
         let per_m = hours_per_m(file)?;
         let sky = sky(file)?;
         let mut all = Self::of_frames(sky, observation, &file.loss, file.instrument.as_ref())?;
+        all.check_resolved()?;
         let first = all.times[0];
         all.times.iter_mut().for_each(|time| *time = first_time + (*time - first) / per_m);
         let pulse = file.screen.pulse.unwrap_or(PixelShape::Delta).pulse();
@@ -95,21 +96,43 @@ impl FitData {
     /// UTC.
     ///
     /// # Errors
-    /// If the sky is a point to all baselines, losses do not tell gains, a station has no prior, or leakage is asked of data
-    /// without circular feeds.
+    /// If losses do not tell gains, a station has no prior, or leakage is asked of data without circular feeds.
     pub fn of_frames(
         sky: ImageGrid,
         mut observation: Observation,
         losses: &[Loss],
         instrument: Option<&InstrumentSettings>,
     ) -> Result<Self> {
-        check_resolved(sky, &observation)?;
         let (times, of_rows) = frames_of(&mut observation);
         let gains = gains::priors(instrument, losses, &observation)?;
         let leakage = leakage::unknown(instrument, &observation)?;
         let visibilities = Some((observation, of_rows));
         let sky = Some(sky);
         Ok(FitData { times, visibilities, sky, gains, leakage, ..FitData::empty() })
+    }
+
+    /// Refuses a field across which no baseline sees the phase turn: to these data the source is a point whatever its shape.
+    ///
+    /// # Errors
+    /// Tells the field and the longest baseline.
+    pub fn check_resolved(&self) -> Result<()> {
+        const LEAST_TURNS: f64 = 0.05;
+        let (Some(sky), Some((observation, _))) = (self.sky, &self.visibilities) else {
+            return Ok(());
+        };
+        let field_rad = sky.pixel_rad * sky.width.max(sky.height) as f64;
+        let lengths = observation.rows.iter().map(|row| row.uv[0].hypot(row.uv[1]));
+        let longest = lengths.fold(0.0, f64::max);
+        if field_rad * longest < LEAST_TURNS {
+            refuse!(
+                "the field is {:.2e} microarcseconds wide, and the longest baseline {longest:.2e} wavelengths: phases turn by {:.1e} \
+                 of a circle across it, so that nothing of its shape is in the data; look at the mass (solar masses), the distance \
+                 (kpc) or the field, and whether (u, v) are wavelengths",
+                field_rad / MICROARCSECOND,
+                field_rad * longest,
+            );
+        }
+        Ok(())
     }
 }
 
@@ -126,23 +149,6 @@ fn check_rows(observation: &Observation) -> Result<()> {
         if !is_finite || products.any(|product| !product.visibility.is_finite()) {
             refuse!("row {k}: its time, (u, v) or a visibility is not finite");
         }
-    }
-    Ok(())
-}
-
-/// Refuses a field across which no baseline sees the phase turn: to these data the source is a point whatever its shape.
-fn check_resolved(sky: ImageGrid, observation: &Observation) -> Result<()> {
-    const LEAST_TURNS: f64 = 0.05;
-    let field_rad = sky.pixel_rad * sky.width.max(sky.height) as f64;
-    let longest = observation.rows.iter().map(|row| row.uv[0].hypot(row.uv[1])).fold(0.0, f64::max);
-    if field_rad * longest < LEAST_TURNS {
-        refuse!(
-            "the field is {:.2e} microarcseconds wide, and the longest baseline {longest:.2e} wavelengths: phases turn by {:.1e} \
-             of a circle across it, so that nothing of its shape is in the data; look at the mass (solar masses), the distance \
-             (kpc) or the field, and whether (u, v) are wavelengths",
-            field_rad / MICROARCSECOND,
-            field_rad * longest,
-        );
     }
     Ok(())
 }
@@ -275,7 +281,8 @@ mod tests {
             observation.stations = ["A", "B"].map(Station::named).to_vec();
             observation.rows =
                 vec![Row::total_intensity(4.0, [0, 1], [0.6 * longest, 0.8 * longest], i)];
-            FitData::of_frames(sky, observation, &[], None).map(|_| ()).map_err(|e| e.to_string())
+            let data = FitData::of_frames(sky, observation, &[], None).unwrap();
+            data.check_resolved().map_err(|e| e.to_string())
         };
         assert_eq!(data(8e9), Ok(()));
         let refused = data(8.0).unwrap_err();

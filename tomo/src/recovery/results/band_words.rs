@@ -32,11 +32,14 @@ impl BandResults {
         let likeliest = factors.iter().max_by(|a, b| a[1].total_cmp(&b[1]));
         if let Some([factor, probability]) = likeliest.filter(|_| factors.len() > 1) {
             let sense = self.forward();
-            all.push(match *probability {
-                p if p < TOLD => format!(
-                    "The data do not tell how it turns: {factor:.2} times as fast as the law of motion says has a probability of {p:.3}, the law's sense one of {sense:.3}."
+            all.push(match (*probability < TOLD, sense.max(1.0 - sense) < TOLD) {
+                (true, true) => format!(
+                    "The data do not tell how it turns: in the law's sense with a probability of {sense:.3}."
                 ),
-                _ => format!(
+                (true, false) => format!(
+                    "It turns in the law's sense with a probability of {sense:.3}; how fast, the data do not tell."
+                ),
+                (false, _) => format!(
                     "Most probably it turns {factor:.2} times as fast as the law of motion says, in the law's sense with a probability of {sense:.3}."
                 ),
             });
@@ -77,7 +80,7 @@ fn flare(ln: f64) -> String {
 /// ln of 20, above which a Bayes factor is called strong (Kass & Raftery 1995).
 const SEEN: f64 = 3.0;
 
-/// Probability from which on one of several velocities is called the most probable.
+/// Probability from which on one of several is called the most probable.
 const TOLD: f64 = 0.6;
 
 /// Width from which on an interval of azimuths is the whole circle, degrees: 95 % of it.

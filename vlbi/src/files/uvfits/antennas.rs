@@ -43,7 +43,7 @@ impl AntennaTables {
                 check_position(&station.name, station.position.unwrap_or_default())
                     .map_err(|error| fail(row, &error.to_string()))?;
                 remarks.extend(unknown_mount(&table, row, &station.name));
-                // A subarray may list it again, at the place where it stands.
+                // Another subarray may list it again, at the same place; within one a name is of one antenna.
                 let twice = names.known(&station.name).filter(|k| {
                     let places = [&names.stations[usize::from(*k)], &station].map(|s| s.position);
                     let is_here = numbers.iter().any(|((of, _), at)| *of == subarray && at == k);
