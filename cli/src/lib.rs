@@ -140,7 +140,7 @@ pub const BUSY: u8 = 75;
 
 impl Program {
     /// Does what the command line says; 0 is success, 2 an error, 1 a fit that failed while it ran or a comparison of which
-    /// a part did, 75 a case that another process runs, 128 and the number of the signal what a signal has stopped: 130 after Ctrl-C, 143 after SIGTERM.
+    /// a part did, 75 a case that another process runs, 128 and the number of the signal what a signal has stopped: 130 after Ctrl-C, 143 after SIGTERM, 152 after SIGXCPU.
     pub fn run(self) -> ExitCode {
         ExitCode::from(self.run_with(std::env::args_os()))
     }

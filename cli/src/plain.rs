@@ -22,6 +22,11 @@ pub fn path(path: &Path) -> String {
     line(&path.to_string_lossy()).into_owned()
 }
 
+/// A path as a shell reads it.
+pub fn word(path: &Path) -> String {
+    quoted(&path.to_string_lossy())
+}
+
 /// A word as a shell reads it.
 pub fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_=./:,+@%".contains(c);

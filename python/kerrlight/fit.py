@@ -196,7 +196,15 @@ class Fit:
 
     def _bring(self) -> list[Path]:
         """Writes data in memory into a folder that is new or empty; what it makes, if that is to be removed again."""
-        if self.folder.exists() and any(of.name != "lock" for of in self.folder.iterdir()):
+        # What a run has left that was cut off before it had settings is nothing.
+        name, content = self._given or ("", b"")
+        left = {"lock", "inputs.json"}
+
+        def is_left(of: Path) -> bool:
+            same = of.name == name and of.is_file() and of.read_bytes() == content
+            return of.name in left or of.name.startswith(".kerrlight-") or same
+
+        if self.folder.exists() and not all(is_left(of) for of in self.folder.iterdir()):
             raise ValueError(f"{self.folder} exists and is not an empty folder: give another one")
         made = [] if self.folder.exists() else [self.folder]
         self.folder.mkdir(parents=True, exist_ok=True)

@@ -3,7 +3,7 @@
 use crate::fit::results;
 use crate::support::{cramped, fail, fail_with, json, kerrlight, message, root, succeed, told};
 use serde_json::Value;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Two grids of different rates, with changes of the words.
 pub fn experiment(folder: &Path, changes: &[(&str, &str)]) {
@@ -122,6 +122,8 @@ fn exact_cases_are_whole_and_not_done_twice() {
     std::fs::write(&file, found.replace(&version, "\"version\": \"0.0.1\"")).unwrap();
     assert!(told(at, &resume).contains("4 cases, 1 of them to be run"));
     assert!(std::fs::read_to_string(&file).unwrap().contains(&version));
+    let aside = PathBuf::from(format!("{}.old-1", lost.display())).join("results.json");
+    assert!(std::fs::read_to_string(aside).unwrap().contains("\"version\": \"0.0.1\""));
     // What is chosen to be run does not hide what is known.
     succeed(at, &[&resume[..], &["--only", "rate=0.1", "--seeds", "3"]].concat());
     let more = results(&at.join("out"));

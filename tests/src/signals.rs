@@ -43,7 +43,7 @@ fn exact_fits_that_are_stopped_end_in_the_same_bytes() {
         ["training.steps=600", "training.log_every=10", "training.checkpoint_seconds=1000.0"];
     let words = with(&small, &sets(&long));
     succeed(folder.path(), &[&words[..], &["-o", "whole"]].concat());
-    for (name, code) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
+    for (name, code) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129), ("-XCPU", 152)] {
         let run = folder.path().join(name);
         let child = start(folder.path(), &[&words[..], &["-o", &format!("./{name}")]].concat());
         until("a logged step", || holds(&run.join("log.jsonl"), "\"step\":10"));

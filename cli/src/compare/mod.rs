@@ -320,7 +320,7 @@ fn end(tables: &str, summary: &Summary, folder: &Path, is_early: bool) -> Answer
 /// Returns the error of a command whose cases are not done or failed.
 fn failure(summary: &Summary, folder: &Path) -> Option<anyhow::Error> {
     if summary.open() > 0 {
-        let (open, folder) = (summary.open(), folder.display());
+        let (open, folder) = (summary.open(), plain::word(folder));
         let how = format!("resume with the same command, --resume and -o {folder}");
         return Some(Interrupted(format!("stopped: {open} cases are not done; {how}")).into());
     }

@@ -2,6 +2,7 @@
 
 use super::folder::Folder;
 use crate::devices::FitDevice;
+use crate::plain;
 use anyhow::anyhow;
 use kerrlight_tomo::fit::settings::FitFile;
 use kerrlight_tomo::fit::{DeviceError, DeviceRunner, Trainer, checkpoint};
@@ -37,7 +38,7 @@ pub fn failed(error: DeviceError, folder: &Folder) -> anyhow::Error {
 
 /// Explains how to go on without the device.
 fn elsewhere(folder: &Folder) -> String {
-    format!("on the processor: kerrlight fit --resume {}", folder.path().display())
+    format!("on the processor: kerrlight fit --resume {}", plain::word(folder.path()))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use super::device_runner;
 use super::folder::Folder;
 use crate::interrupt::Interrupted;
+use crate::plain;
 use kerrlight_tomo::Error;
 use kerrlight_tomo::recovery::Stopped;
 
@@ -18,7 +19,7 @@ pub fn told(error: anyhow::Error, folder: &Folder) -> anyhow::Error {
         Ok(Error::Stopped(Stopped::Kept)) => Interrupted(folder.stopped()).into(),
         Ok(Error::Stopped(stopped @ Stopped::Lost(_))) => Interrupted(stopped.to_string()).into(),
         Ok(Error::Stopped(stopped @ Stopped::After(_))) => {
-            let path = folder.path().display();
+            let path = plain::word(folder.path());
             Interrupted(format!("{stopped}; resume with: kerrlight fit --resume {path}")).into()
         }
         Ok(Error::Device(error)) => device_runner::failed(error, folder),

@@ -198,7 +198,7 @@ impl Folder {
 
     /// Explains what to do about work that was interrupted and is kept.
     pub fn stopped(&self) -> String {
-        let folder = plain::quoted(&self.path.to_string_lossy());
+        let folder = plain::word(&self.path);
         format!("stopped; resume with: kerrlight fit --resume {folder}")
     }
 

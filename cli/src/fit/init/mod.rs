@@ -67,7 +67,7 @@ pub fn write(
 }
 
 fn head(path: &Path, plain: &str) -> String {
-    let run = format!("#   kerrlight fit {}\n", path.display());
+    let run = format!("#   kerrlight fit {}\n", plain::word(path));
     let left = if plain.contains("#? ") {
         "# Settings marked FILL IN decide the result, and the data do not determine them. The fit names the first one\n# that is missing.\n"
     } else {

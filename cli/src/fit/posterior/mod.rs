@@ -68,7 +68,7 @@ impl Posterior {
 
     fn prepared(&self, text: &str, registry: &Registry) -> anyhow::Result<Problem> {
         if !self.run.join("results.json").is_file() {
-            let run = self.run.display();
+            let run = plain::word(&self.run);
             bail!(
                 "{run} is not finished: there is no results.json in it; resume it with `kerrlight fit --resume {run}`"
             );
@@ -208,7 +208,7 @@ fn add_up(
 }
 
 fn again(folder: &Folder, samples: u32) -> String {
-    let folder = plain::quoted(&folder.path().to_string_lossy());
+    let folder = plain::word(folder.path());
     format!("kerrlight posterior {folder} --samples {samples}")
 }
 
