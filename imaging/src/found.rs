@@ -90,12 +90,6 @@ pub fn mean_with_error(values: &[f64]) -> Option<(f64, f64)> {
     (values.len() >= 2).then(|| (mean, (square / (count * (count - 1.0))).sqrt()))
 }
 
-/// Those of some draws that have come to a minimum; none of them where fewer than half have.
-pub(crate) fn at_minimum<T>(draws: &[T], has_converged: impl Fn(&T) -> bool) -> Vec<&T> {
-    let there: Vec<&T> = draws.iter().filter(|draw| has_converged(draw)).collect();
-    if 2 * there.len() < draws.len() { Vec::new() } else { there }
-}
-
 /// Standard deviation of values; none of fewer than two.
 fn scatter(values: &[f64]) -> Option<f64> {
     mean_with_error(values).map(|(_, error)| error * (values.len() as f64).sqrt())
@@ -206,7 +200,9 @@ impl Survey {
     /// Draws that have come to a minimum, if half of all have: those that stopped on their way stay near where they started, and
     /// near each other.
     pub fn draws_at_minimum(&self) -> Vec<&Candidate> {
-        at_minimum(&self.draws, |draw| draw.solution.has_converged)
+        let there = self.draws.iter().filter(|draw| draw.solution.has_converged);
+        let there: Vec<&Candidate> = there.collect();
+        if 2 * there.len() < self.draws.len() { Vec::new() } else { there }
     }
 
     /// Images of a known sky, if they say what the method has done to the image: it came to a minimum.

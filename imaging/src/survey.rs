@@ -130,7 +130,7 @@ fn expected(
 }
 
 /// The strength in the middle of those to choose from.
-pub(super) fn middle(settings: &StrengthSettings) -> f64 {
+fn middle(settings: &StrengthSettings) -> f64 {
     let mut values = settings.values.clone();
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]
@@ -154,7 +154,7 @@ pub(super) fn allowed(held: &[Held]) -> Vec<f64> {
 
 /// Drops strengths of which fewer than half of the parts are known, then parts that are not known of all others: NaN stands for
 /// a fit that did not come to a minimum, which says nothing. Nothing is left where fewer than two parts are.
-pub(super) fn voting(mut held: Vec<Held>) -> Vec<Held> {
+fn voting(mut held: Vec<Held>) -> Vec<Held> {
     let known = |held: &Held| held.losses.iter().filter(|loss| loss.is_finite()).count();
     held.retain(|one| 2 * known(one) >= one.losses.len());
     let parts = held.first().map_or(0, |one| one.losses.len());

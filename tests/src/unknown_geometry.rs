@@ -183,7 +183,10 @@ fn exact_same_bytes_after_kills_of_an_unknown_geometry() {
 fn exact_impossible_priors_are_refused_before_anything_is_written() {
     let folder = folder_with("fit.toml", settings(50));
     for (change, expected) in [
-        ("observer.inclination_deg={uniform=[50.0,20.0]}", "high = 20 is not allowed: above low"),
+        (
+            "observer.inclination_deg={uniform=[50.0,20.0]}",
+            "last value of the prior = 20 is not allowed: above its first",
+        ),
         ("hole.spin={uniform=[0.0,1.5]}", "hole.spin.uniform.1 = 1.5 is not allowed: -1 to 1"),
         ("hole.spin={uniform=[0.0,1.0]}", "hole.spin = 1 is not allowed: -0.999 to 0.999"),
         (

@@ -15,8 +15,8 @@ pub fn delegate(
     folder: &Folder,
 ) -> anyhow::Result<DeviceRunner> {
     let taken = take(&trainer.objective, trainer.representation, &trainer.training);
-    let device = taken
-        .map_err(|error| anyhow!("{}; {}", crate::plain::reasons(&error), elsewhere(folder)))?;
+    let device =
+        taken.map_err(|error| anyhow!("{}; {}", plain::reasons(&error), elsewhere(folder)))?;
     let rest = match &trainer.objective.data.others[..] {
         others if !device.makes_residuals() => {
             let names: Vec<&str> = others.iter().map(|other| other.term.name()).collect();

@@ -5,10 +5,9 @@ use super::{LinearPolarization, PolarizedProblem};
 use crate::Error;
 use crate::data::instants;
 use crate::found::Survey;
-use crate::found::at_minimum;
 use crate::settings::{StaticImageFile, StaticPolarization};
 use crate::solve::minimum;
-use crate::survey::{Stage, SurveyWatch, allowed, held, middle, voting};
+use crate::survey::{Stage, SurveyWatch, allowed, held};
 use kerrlight_tomo::fit::setup::{FitData, Held, SolvedLeakage, best_held};
 use kerrlight_tomo::fit::{FrameTerm, Weighted};
 use kerrlight_vlbi::data_terms::DataTermError;
@@ -58,7 +57,7 @@ impl PolarizedSurvey {
         period: Option<f64>,
     ) -> Option<f64> {
         let here = number(&self.found.numbers);
-        let square = |images: &[&PolarizedCandidate]| {
+        let square = |images: &[PolarizedCandidate]| {
             let apart = images.iter().map(|image| number(&image.numbers) - here);
             let short = apart.map(|x| match period {
                 Some(period) => (x + 0.5 * period).rem_euclid(period) - 0.5 * period,
@@ -66,9 +65,7 @@ impl PolarizedSurvey {
             });
             short.map(|x| x * x).sum::<f64>() / images.len().max(1) as f64
         };
-        let draws = at_minimum(&self.draws, |draw| draw.has_converged);
-        let strengths: Vec<&PolarizedCandidate> = self.strengths.iter().collect();
-        (draws.len() > 1).then(|| (square(&draws) + square(&strengths)).sqrt())
+        (self.draws.len() > 1).then(|| (square(&self.draws) + square(&self.strengths)).sqrt())
     }
 }
 
@@ -93,8 +90,7 @@ pub fn survey_polarized(
     let Some(losses) = search.hold_out(&*term.term, light, survey, &instants) else {
         return Ok(None);
     };
-    let middle = settings.strength.as_ref().map_or(1.0, middle);
-    let best = best_held(&losses).map_or(middle, |best| best.value);
+    let best = best_held(&losses).map_or(1.0, |best| best.value);
     let strength = |value: f64| {
         let problem = search.problem(&*term.term, light, value, frames.clone());
         search.solved(Stage::Strengths, &problem, value, survey)
@@ -203,12 +199,8 @@ impl Search<'_> {
         held(settings, |value, fold| {
             let seen = self.problem(term, light, value, part(fold, true));
             let found = self.solved(Stage::HeldOut, &seen, value, survey)?;
-            if !found.has_converged {
-                return Some(f64::NAN);
-            }
             Some(self.problem(term, light, value, part(fold, false)).chi2(&found.images))
         })
-        .map(voting)
     }
 
     /// Images of the data with their noise once more, each beside the total intensity of a draw.

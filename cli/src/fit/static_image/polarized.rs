@@ -185,10 +185,10 @@ impl Polarized {
             with_error(100.0 * value, error.map(|error| 100.0 * error), 1)
         };
         // A direction of what may be zero is none.
-        let is_seen = beta.1.is_some_and(|error| beta.0 >= 2.0 * error);
+        let is_seen = beta.1.is_none_or(|error| beta.0 >= 2.0 * error);
         let argument = match is_seen {
             true => format!("the argument {}°", with_error(angle.0, angle.1, 0)),
-            false => "no argument that is measured: it is not two errors from 0".to_owned(),
+            false => "no measured argument: it is less than two errors from 0".to_owned(),
         };
         format!(
             "Seen with a beam of {} µas, {} % of the light is linearly polarised, {} % where polarised light is brightest ({}° east \
@@ -216,12 +216,6 @@ impl Polarized {
             self.survey.found.strength,
             told_end(tried, self.survey.found.strength)
         )];
-        if self.settings.strength.is_some() && self.survey.held.is_empty() {
-            text.push(
-                "Held-out frames choose no factor for polarisation: too few fits came to a minimum, and the middle factor is taken."
-                    .to_owned(),
-            );
-        }
         if let Some(law) = variability {
             text.push(format!(
                 "What polarised light varies: {} Jy/(1 + (|u|/{:e})²)^{} was added to errors of RL and LR in quadrature.",

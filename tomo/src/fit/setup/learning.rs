@@ -246,7 +246,6 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     let (_, axis_rate) = axis(file)?;
     afford(file, registry)?;
     file.check_unknowns()?;
-    check_losses(&file.loss)?;
     // Of any length: those of the data are known once rays are traced.
     let training = training(file, axis_rate, [0.0, 0.0])?;
     change::check(file)?;
@@ -262,6 +261,7 @@ pub fn check(file: &FitFile, registry: &Registry) -> Result<()> {
     if matches!(training.batch, BatchSize::Pixels(_)) && !images_only {
         refuse!("training.batch: pixels work with images only; use frames = N");
     }
+    check_losses(&file.loss)?;
     if file.representation.kind == Kind::LinearGrid || file.training.start != Start::Drawn {
         linear(file)?;
     }
