@@ -76,15 +76,13 @@ impl Detail<'_> {
             && (seen.is_images() || seen.view.file.screen.pixels == self.file.screen.pixels)
     }
 
-    /// Adds the errors that the model has of itself, where data are of another one.
+    /// Adds the errors that the model has of itself: those of its voxels, and of the rest where data are of another model.
     pub fn beside_its_own(&self, place: &Place, sure: Sure) -> Result<Sure> {
         let Some(spread) = &sure.spread else { return Ok(sure) };
-        if !self.is_foreign()? {
-            return Ok(sure);
-        }
+        let is_foreign = self.is_foreign()?;
         let own = self.through(place, |problem| {
             let reduced = sure.reduced_chi2;
-            discretisation::errors(self.unknown, place, problem, spread, reduced)
+            discretisation::errors(self.unknown, (place, is_foreign), problem, spread, reduced)
         })?;
         let spread = sure.spread.map(|spread| spread.beside(&self.unknown.free, own));
         Ok(Sure { spread, ..sure })
