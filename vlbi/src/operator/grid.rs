@@ -16,7 +16,7 @@ pub struct ImageGrid {
 }
 
 /// The shape of a pixel, normalised to a flux of 1.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Pulse {
     /// A point.
@@ -24,6 +24,7 @@ pub enum Pulse {
     /// A square as wide as the pixel.
     Rectangle,
     /// A pyramid twice as wide as the pixel, of linear interpolation: eht-imaging's default.
+    #[default]
     Triangle,
     /// The pyramid of pixels with this side, radians: images of other pixels that such data are compared with.
     TriangleOf(f64),

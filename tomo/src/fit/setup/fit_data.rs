@@ -11,7 +11,7 @@ use kerrlight_vlbi::operator::{ImageGrid, Pulse};
 use kerrlight_vlbi::polarimetry::LeakageTable;
 
 /// The data of a fit, and what is known to be true.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct FitData {
     /// Times of the frames, M.
     pub times: Vec<f64>,
@@ -44,25 +44,6 @@ pub struct FitData {
 }
 
 impl FitData {
-    pub(super) fn empty() -> Self {
-        Self {
-            times: Vec::new(),
-            files: Vec::new(),
-            movie: None,
-            visibilities: None,
-            average_s: 0.0,
-            has_intrinsic_variability: false,
-            curve: None,
-            sky: None,
-            pulse: Pulse::Triangle,
-            truth: None,
-            gains: None,
-            true_gains: None,
-            leakage: None,
-            true_leakage: None,
-        }
-    }
-
     /// A light curve before a background in the order of its data, which the emission does not explain.
     #[must_use]
     pub fn before(&self, background: Vec<BackgroundDatum>) -> Self {

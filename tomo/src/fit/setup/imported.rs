@@ -59,7 +59,7 @@ impl FitData {
             refuse!("{name} has {width} x {height} pixels, but screen.pixels says {n} x {n}");
         }
         let (movie, sky) = (Some(movie), sky(file).ok());
-        Ok(FitData { times, movie, sky, ..FitData::empty() })
+        Ok(FitData { times, movie, sky, ..FitData::default() })
     }
 
     /// Takes measured visibilities as the data. `name` is what they are called in messages.
@@ -108,7 +108,7 @@ impl FitData {
         let leakage = leakage::unknown(instrument, &observation)?;
         let visibilities = Some((observation, of_rows));
         let sky = Some(sky);
-        Ok(FitData { times, visibilities, sky, gains, leakage, ..FitData::empty() })
+        Ok(FitData { times, visibilities, sky, gains, leakage, ..FitData::default() })
     }
 
     /// Refuses a field across which no baseline sees the phase turn: to these data the source is a point whatever its shape.

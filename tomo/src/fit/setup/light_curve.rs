@@ -38,7 +38,7 @@ impl FitData {
         let fitted = fitted(&hours, settings.validate_after_min)?;
         let times = times(file, &hours, settings.first_time)?;
         let curve = Curve { parameters, hours, data, fitted, background: None };
-        Ok(Self { times, curve: Some(curve), ..Self::empty() })
+        Ok(Self { times, curve: Some(curve), ..Self::default() })
     }
 }
 
@@ -187,7 +187,7 @@ pub(super) fn simulate(
     let movie = Some(truth.movie(file, instrument, &times)?);
     let fitted = fitted(&hours, settings.validate_after_min)?;
     let curve = Some(Curve { parameters, hours, data, fitted, background: None });
-    Ok(FitData { times, movie, curve, truth: Some(truth), ..FitData::empty() })
+    Ok(FitData { times, movie, curve, truth: Some(truth), ..FitData::default() })
 }
 
 /// Adds a draw of a background to Q and U.

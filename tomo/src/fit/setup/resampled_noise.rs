@@ -102,7 +102,8 @@ mod tests {
         };
         observation.rows = frames.iter().map(row).collect();
         let gains = Some(GainPriors { free_phases: false, amplitude_sigma: vec![0.3; 2] });
-        let data = FitData { visibilities: Some((observation, frames)), gains, ..FitData::empty() };
+        let visibilities = Some((observation, frames));
+        let data = FitData { visibilities, gains, ..FitData::default() };
         let drawn = data.perturbed(&[], 1.0, 5).unwrap().visibilities.unwrap().0;
         let squares = drawn.rows.iter().map(|row| row.products[0].norm().ln().powi(2));
         let scatter = (squares.sum::<f64>() / 2000.0).sqrt();
@@ -117,7 +118,7 @@ mod tests {
     fn exact_noise_of_a_flux_is_that_of_all_pixels() {
         let (pixels, frames, sigma) = (256, 400, 0.02);
         let movie = Some(Frames::of(vec![0.0; frames * pixels], pixels));
-        let data = FitData { movie, ..FitData::empty() };
+        let data = FitData { movie, ..FitData::default() };
         let loss =
             |data| Loss { data, weight: 1.0, sigma: Some(sigma), stokes: None, least_snr: None };
         let scatter = |losses: &[Loss]| {

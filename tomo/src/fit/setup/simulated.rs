@@ -77,7 +77,7 @@ fn simulate(
         };
         let movie = Some(lit(&truth, movie)?);
         let sky = sky(file).ok();
-        return Ok(FitData { times, movie, sky, truth: Some(truth), ..FitData::empty() });
+        return Ok(FitData { times, movie, sky, truth: Some(truth), ..FitData::default() });
     };
     let sky = sky(file)?;
     let (mut observation, hours) = schedule_of(seen, array)?;
@@ -119,7 +119,7 @@ fn simulate(
         true_gains,
         leakage,
         true_leakage,
-        ..FitData::empty()
+        ..FitData::default()
     })
 }
 
