@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
 /// Data that are simulated in place of measured ones. All that is not given here is as the fit assumes it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Simulation {
     /// The simulated emission.
@@ -57,22 +57,7 @@ pub struct Simulation {
 impl Simulation {
     /// Images of emission, in the geometry that the fit assumes.
     pub fn movie(truth: Truth, movie: Movie) -> Self {
-        let [hole, observer, region, effects, motion, polarization] =
-            core::array::from_fn(|_| Table::new());
-        let (movie, observation, light_curve) = (Some(movie), None, None);
-        Self {
-            truth,
-            movie,
-            observation,
-            light_curve,
-            drawn: false,
-            hole,
-            observer,
-            region,
-            effects,
-            motion,
-            polarization,
-        }
+        Self { truth, movie: Some(movie), ..Self::default() }
     }
 
     /// Number of kinds of data.
@@ -269,8 +254,7 @@ impl Tube {
                 center: [self.radius * cos, self.radius * sin, 0.0],
                 sigma: self.sigma,
                 amplitude: self.amplitude * share,
-                wound_for: 0.0,
-                shines: None,
+                ..Spot::default()
             }
         };
         (0..count as usize).map(spot).collect()
