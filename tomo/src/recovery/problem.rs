@@ -1,7 +1,7 @@
 //! Problem of a fit: settings with their data.
 
 use crate::Error;
-use crate::fit::settings::{AxisSearch, FitError, FitFile, refuse};
+use crate::fit::settings::{AxisSearch, FitFile, refuse};
 use crate::fit::setup::{self, FitData, Instrument, RaySampling};
 use crate::fit::{Motion, Objective};
 use crate::representation::Registry;
@@ -127,8 +127,9 @@ impl Problem {
             setup::check_folds(held_out, seen)?;
         }
         if matches!(settings.axis, AxisSearch::Scan(_)) && seen < 2 {
-            let why = "axis.scan needs at least 2 frame times: a single frame does not constrain the axis";
-            return Err(FitError::Conflict(why.to_owned()).into());
+            refuse!(
+                "axis.scan needs at least 2 frame times: a single frame does not constrain the axis"
+            );
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! A setting that is chosen by data that are held out.
 
-use super::{AxisSearch, FitError, FitFile, Kind, Linear, Start};
+use super::{AxisSearch, FitError, FitFile, Kind, Linear, Start, refuse};
 use crate::Error;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -105,7 +105,7 @@ impl HeldOutSettings {
             }
             _ => return Ok(()),
         };
-        Err(FitError::Conflict(format!("held_out {why}")).into())
+        refuse!("held_out {why}")
     }
 
     /// Refuses values that a prior cannot have.

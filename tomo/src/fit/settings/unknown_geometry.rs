@@ -1,6 +1,6 @@
 //! Parameters of the geometry that are not known, and the search for them.
 
-use super::{FitError, FitFile, PriorSettings, Quantity, Within};
+use super::{FitError, FitFile, PriorSettings, Quantity, Within, refuse};
 use crate::Error;
 use crate::fit::geometry::{Free, Parameter, Prior};
 use rand::{RngExt, SeedableRng};
@@ -70,8 +70,7 @@ fn free(
     settings.prior(1.0).checked().within(key)?;
     let prior = settings.prior(parameter.unit());
     if matches!(prior, Prior::Isotropic { .. }) && parameter != Parameter::Inclination {
-        let why = format!("{key}: isotropic is a prior of inclinations; take uniform or normal");
-        return Err(FitError::Conflict(why).into());
+        refuse!("{key}: isotropic is a prior of inclinations; take uniform or normal");
     }
     let ([low, high], [least, most], unit) = (parameter.range(), prior.bounds(), parameter.unit());
     let outside = [least, most]
@@ -98,7 +97,7 @@ impl FitFile {
         if free.is_empty() {
             return match given {
                 None => Ok(None),
-                Some(_) => Err(FitError::Conflict(NOTHING.to_owned()).into()),
+                Some(_) => refuse!("{NOTHING}"),
             };
         }
         Ok(Some(UnknownGeometry { free, search: given.unwrap_or_default() }))

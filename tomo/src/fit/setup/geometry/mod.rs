@@ -19,7 +19,7 @@ pub use search::{FoundGeometry, SearchWatch, find_geometry};
 use super::instrument::ring;
 use super::{FitData, Instrument, Result, axis, motion, spacing};
 use crate::fit::geometry::{Geometry, GeometryModel, Law, Parameter};
-use crate::fit::settings::{AxisSearch, FitError, FitFile};
+use crate::fit::settings::{AxisSearch, FitFile, refuse};
 use crate::fit::{Motion, Sampling};
 use kerrlight_geodesic::Kerr;
 use kerrlight_render::dynamics::Velocity;
@@ -93,25 +93,27 @@ fn follows_spin<N>(velocity: &Velocity<N>) -> bool {
 /// Returns the properties that all geometries share.
 fn model(file: &FitFile, instrument: &Instrument, motion: &Motion) -> Result<GeometryModel> {
     let Sampling::Gauss { order, split } = file.region.nodes else {
-        let why = "a number with a prior needs region.nodes = { gauss = { order, split } }: nodes equidistant in Mino time \
-                   have no derivatives";
-        return Err(FitError::Conflict(why.to_owned()).into());
+        refuse!(
+            "a number with a prior needs region.nodes = {{ gauss = {{ order, split }} }}: nodes equidistant in Mino time \
+             have no derivatives"
+        );
     };
     if file.effects.absorption.is_some() {
-        let why = "a number with a prior and effects.absorption exclude each other".to_owned();
-        return Err(FitError::Conflict(why).into());
+        refuse!("a number with a prior and effects.absorption exclude each other");
     }
     if !matches!(file.axis, AxisSearch::Known {}) {
-        let why = "a number with a prior needs [axis.known]: matter turns about motion.axis, in the frame of the hole";
-        return Err(FitError::Conflict(why.to_owned()).into());
+        refuse!(
+            "a number with a prior needs [axis.known]: matter turns about motion.axis, in the frame of the hole"
+        );
     }
     let law = match &file.motion.velocity {
         Velocity::Perturbed(perturbed)
             if file.hole.spin.prior().is_some() && follows_spin(&perturbed.of) =>
         {
-            let why = "a spin with a prior needs a number for `drag` in motion.velocity.perturbed.of: rates that were perturbed \
-                       stay the same in every trial";
-            return Err(FitError::Conflict(why.to_owned()).into());
+            refuse!(
+                "a spin with a prior needs a number for `drag` in motion.velocity.perturbed.of: rates that were perturbed \
+                 stay the same in every trial"
+            );
         }
         Velocity::Keplerian { drag: None } => Law::CircularOrbits,
         Velocity::Infall { drag, .. } => Law::Infall(*drag),
