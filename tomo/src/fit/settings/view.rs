@@ -201,6 +201,15 @@ impl Motion {
     pub fn law(&self) -> Velocity {
         self.velocity.clone().map(&|quantity: Quantity| quantity.value())
     }
+
+    /// Returns whether the velocity is another one where the hole spins otherwise.
+    pub fn follows_spin(&self) -> bool {
+        let mut law = &self.velocity;
+        while let Velocity::Perturbed(by) = law {
+            law = &by.of;
+        }
+        matches!(law, Velocity::Keplerian { drag: None } | Velocity::Infall { drag: None, .. })
+    }
 }
 
 impl FitFile {

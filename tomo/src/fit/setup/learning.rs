@@ -6,7 +6,7 @@ use super::{Result, axis, linear, motion, polarized};
 use crate::fit::linear::{Change, Voxels};
 use crate::fit::settings;
 use crate::fit::settings::{
-    AxisSearch, FieldKind, FitError, FitFile, Kind, LossKind, Optimiser, Quantity, Start, Within,
+    AxisSearch, FieldKind, FitError, FitFile, Kind, LossKind, Optimiser, Start, Within,
     check_losses, refuse,
 };
 use crate::fit::{BatchSize, ChangePrice, OccupancySettings, Region, Training, WithStaticImage};
@@ -16,7 +16,6 @@ use crate::representation::{
     Knots, Network, NetworkSettings, OwnSettings, Registry, Representation,
 };
 use kerrlight_common::memory;
-use kerrlight_render::dynamics::Velocity;
 
 /// Returns the representation, with the parameters of emission that does not move behind its own; `registry` has what the
 /// program adds to kerrlight's own representations. Where emission may change, `times` are those of the first and the last
@@ -295,14 +294,8 @@ fn check_axis(file: &FitFile, registry: &Registry) -> Result<()> {
             file.representation.kind.name()
         );
     }
-    let follows = |law: &Velocity<Quantity>| {
-        matches!(law, Velocity::Keplerian { drag: None } | Velocity::Infall { drag: None, .. })
-    };
-    let mut law = &file.motion.velocity;
-    while let Velocity::Perturbed(by) = law {
-        law = &by.of;
-    }
-    if file.motion.axis.is_none() && file.hole.spin.value() != 0.0 && follows(law) {
+    let motion = &file.motion;
+    if motion.axis.is_none() && file.hole.spin.value() != 0.0 && motion.follows_spin() {
         refuse!(
             "motion.velocity needs a drag where the axis is not known: flows about different axes are compared, and a ξ_z is another one for each"
         );

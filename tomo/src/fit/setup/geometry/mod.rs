@@ -81,15 +81,6 @@ fn seen_through(file: &FitFile, model: GeometryModel, rays: RaySampling) -> Resu
     Ok(GeometryModel { parts, ring, ..model }.seen_along(rays.lattice))
 }
 
-/// Returns whether a velocity is another one where the hole spins otherwise.
-fn follows_spin<N>(velocity: &Velocity<N>) -> bool {
-    match velocity {
-        Velocity::Keplerian { drag } | Velocity::Infall { drag, .. } => drag.is_none(),
-        Velocity::Perturbed(perturbed) => follows_spin(&perturbed.of),
-        _ => false,
-    }
-}
-
 /// Returns the properties that all geometries share.
 fn model(file: &FitFile, instrument: &Instrument, motion: &Motion) -> Result<GeometryModel> {
     let Sampling::Gauss { order, split } = file.region.nodes else {
@@ -107,8 +98,8 @@ fn model(file: &FitFile, instrument: &Instrument, motion: &Motion) -> Result<Geo
         );
     }
     let law = match &file.motion.velocity {
-        Velocity::Perturbed(perturbed)
-            if file.hole.spin.prior().is_some() && follows_spin(&perturbed.of) =>
+        Velocity::Perturbed(_)
+            if file.hole.spin.prior().is_some() && file.motion.follows_spin() =>
         {
             refuse!(
                 "a spin with a prior needs a number for `drag` in motion.velocity.perturbed.of: rates that were perturbed \
