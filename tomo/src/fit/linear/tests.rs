@@ -31,9 +31,13 @@ pub(in crate::fit) fn forward_model() -> ForwardModel<f64> {
     forward_model_of(AngularVelocity::bhnerf(), 1.0)
 }
 
-fn falling_model() -> ForwardModel<f64> {
+fn falling() -> AngularVelocity {
     let law = Velocity::Infall { xi: 0.8, beta_r: 0.9, beta_phi: 0.95, drag: None };
-    forward_model_of(law.angular(0, 0.0).unwrap(), 20.0)
+    law.angular(0, 0.0).unwrap()
+}
+
+fn falling_model() -> ForwardModel<f64> {
+    forward_model_of(falling(), 20.0)
 }
 
 /// Times are in units of `unit` M.

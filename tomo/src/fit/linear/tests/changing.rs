@@ -5,7 +5,6 @@ use super::*;
 use crate::fit::Region;
 use crate::fit::linear::StopRule;
 use crate::representation::{Allowed, Carrier, Changing};
-use kerrlight_render::dynamics::{AngularVelocity, Velocity};
 
 const ALLOWED: [Allowed; 2] = [Allowed::Any, Allowed::Births];
 
@@ -13,11 +12,7 @@ fn knots(allowed: Allowed) -> Knots {
     Knots { first: 0.05, spacing: 0.2, count: 4, allowed }
 }
 
-/// Rays with or without delays, in units of time in which the pattern turns once at 3.5 M.
-fn model(delay: bool) -> ForwardModel<f64> {
-    delayed(forward_model(), delay)
-}
-
+/// Rays with or without delays.
 fn delayed(mut model: ForwardModel<f64>, delay: bool) -> ForwardModel<f64> {
     if delay {
         // Light from farther along x comes later: as good as any for what is tested here.
@@ -28,11 +23,7 @@ fn delayed(mut model: ForwardModel<f64>, delay: bool) -> ForwardModel<f64> {
     model
 }
 
-fn changing(voxels: &Voxels, knots: Knots) -> Changing<f64> {
-    changing_of(AngularVelocity::bhnerf(), voxels, knots)
-}
-
-fn changing_of(velocity: AngularVelocity, voxels: &Voxels, knots: Knots) -> Changing<f64> {
+fn changing(velocity: AngularVelocity, voxels: &Voxels, knots: Knots) -> Changing<f64> {
     let carrier = Carrier { axis: axis(), velocity, limits: [0.0, 5.0] };
     Changing::new(Box::new(voxels.field().unwrap()), knots, Some(carrier)).unwrap()
 }
@@ -42,24 +33,26 @@ fn images(model: &ForwardModel<f64>, field: &Changing<f64>, x: &[f64]) -> Vec<f6
     super::images(model, field)
 }
 
+/// Images of a spot that shines with these shares of its brightness at the knots, and its values there.
+fn shining(model: &ForwardModel<f64>, knots: Knots, shares: [f64; 4]) -> (Vec<f64>, Vec<f64>) {
+    let voxels = Voxels::cube(9, 5.0, Degree::Linear);
+    let spot = initial_fields::spot(&voxels);
+    let truth: Vec<f64> = shares.iter().flat_map(|s| spot.iter().map(move |e| s * e)).collect();
+    let field = changing(AngularVelocity::bhnerf(), &voxels, knots);
+    (images(model, &field, &truth), truth)
+}
+
 /// ‖A x‖² by the sparse matrix, where all nodes or some count, is that of the representation's images; so is its transpose.
+/// The same of matter that falls.
 #[test]
 fn exact_sparse_operator_is_the_changing_field_and_sums() {
     let voxels = Voxels { nodes: [7, 6, 8], ..Voxels::cube(2, 5.0, Degree::Linear) };
     for (allowed, delay) in ALLOWED.into_iter().flat_map(|a| [(a, false), (a, true)]) {
         let knots = knots(allowed);
-        compare_with_images(&model(delay), &changing(&voxels, knots), voxels, knots);
-    }
-}
-
-/// The same of matter that falls.
-#[test]
-fn exact_sparse_operator_is_the_changing_field_of_a_falling_flow() {
-    let voxels = Voxels { nodes: [7, 6, 8], ..Voxels::cube(2, 5.0, Degree::Linear) };
-    let law = Velocity::Infall { xi: 0.8, beta_r: 0.9, beta_phi: 0.95, drag: None };
-    for (allowed, delay) in ALLOWED.into_iter().flat_map(|a| [(a, false), (a, true)]) {
-        let knots = Knots { first: 1.0, spacing: 4.0, count: 4, allowed };
-        let field = changing_of(law.angular(0, 0.0).unwrap(), &voxels, knots);
+        let field = changing(AngularVelocity::bhnerf(), &voxels, knots);
+        compare_with_images(&delayed(forward_model(), delay), &field, voxels, knots);
+        let knots = Knots { first: 1.0, spacing: 4.0, ..knots };
+        let field = changing(falling(), &voxels, knots);
         compare_with_images(&delayed(falling_model(), delay), &field, voxels, knots);
     }
 }
@@ -103,16 +96,14 @@ fn solve(model: &ForwardModel<f64>, pixels: Vec<f64>, change: Change) -> LinearS
 /// price that is too high leaves such a field.
 #[test]
 fn exact_between_a_field_that_is_carried_and_one_that_is_free() {
-    let (model, voxels) = (model(false), Voxels::cube(9, 5.0, Degree::Linear));
-    let spot = initial_fields::spot(&voxels);
+    let (model, voxels) = (forward_model(), Voxels::cube(9, 5.0, Degree::Linear));
     for allowed in ALLOWED {
         let knots = knots(allowed);
-        let shares: &[f64] = match allowed {
-            Allowed::Births => &[0.1, 0.0, 1.0, 0.0],
-            _ => &[0.1, 0.1, 1.0, 0.2],
+        let shares = match allowed {
+            Allowed::Births => [0.1, 0.0, 1.0, 0.0],
+            _ => [0.1, 0.1, 1.0, 0.2],
         };
-        let truth: Vec<f64> = shares.iter().flat_map(|s| spot.iter().map(move |e| s * e)).collect();
-        let pixels = images(&model, &changing(&voxels, knots), &truth);
+        let (pixels, _) = shining(&model, knots, shares);
         let value = |weight: f64| {
             let found = solve(&model, pixels.clone(), Change { knots, weight, ..births() });
             let certificate = found.certificate.unwrap();
@@ -140,34 +131,25 @@ fn exact_between_a_field_that_is_carried_and_one_that_is_free() {
 /// cost less, they keep it.
 #[test]
 fn exact_sharpened_births_keep_their_light() {
-    let (model, voxels) = (model(false), Voxels::cube(9, 5.0, Degree::Linear));
-    let spot = initial_fields::spot(&voxels);
-    let truth: Vec<f64> =
-        [0.0, 0.0, 1.0, 0.0].iter().flat_map(|s| spot.iter().map(move |e| s * e)).collect();
-    let pixels = images(&model, &changing(&voxels, knots(Allowed::Births)), &truth);
+    let (model, voxels) = (forward_model(), Voxels::cube(9, 5.0, Degree::Linear));
+    let (pixels, truth) = shining(&model, knots(Allowed::Births), [0.0, 0.0, 1.0, 0.0]);
     let term = ImageTerm::new(pixels, model.pixels(), 1e-3).unwrap();
     let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f64> }];
-    let found = |sharpen| {
+    let problem = |sharpen| {
         let change = Change { weight: 100.0, sharpen, ..births() };
-        let problem = LinearProblem { change, upper: 2.0, ..of_images(&model, &terms, voxels) };
-        let least = problem.settled(None, StopRule::looking(150)).unwrap();
-        // What is there from the beginning has no price.
-        let light: f64 = least.x[voxels.count()..].iter().sum();
-        (light / truth.iter().sum::<f64>(), problem.misfit(&least.x).unwrap())
+        LinearProblem { change, upper: 2.0, ..of_images(&model, &terms, voxels) }
     };
+    // What is there from the beginning has no price.
+    let light = |x: &[f64]| x[voxels.count()..].iter().sum::<f64>() / truth.iter().sum::<f64>();
     // A first round that ends by itself knows no prices: there is a second one.
-    let rounds = |sharpen| {
-        let change = Change { weight: 100.0, sharpen, ..births() };
-        let problem = LinearProblem { change, upper: 2.0, ..of_images(&model, &terms, voxels) };
-        let settings =
-            LinearSettings { iterations: 400, coarse: None, ..LinearSettings::default() };
-        let found = solved(&problem, settings);
-        let light: f64 = found.emission[voxels.count()..].iter().sum();
-        light / truth.iter().sum::<f64>()
-    };
-    let (plain, sharp) = (rounds(None), rounds(Some(0.02)));
+    let settings = LinearSettings { iterations: 400, coarse: None, ..LinearSettings::default() };
+    let [plain, sharp] =
+        [None, Some(0.02)].map(|sharpen| light(&solved(&problem(sharpen), settings).emission));
     assert!(plain < 0.85 && sharp > plain + 0.05 && sharp < 1.0, "{plain} {sharp}");
-    let ((plain, left), (sharp, rest)) = (found(None), found(Some(0.02)));
+    let [(plain, left), (sharp, rest)] = [None, Some(0.02)].map(problem).map(|problem| {
+        let least = problem.settled(None, StopRule::looking(150)).unwrap();
+        (light(&least.x), problem.misfit(&least.x).unwrap())
+    });
     assert!(plain < 0.85 && sharp > 0.9 && sharp < 1.0, "{plain} {sharp}");
     assert!(rest < 0.2 * left, "{rest} {left}");
 }
@@ -175,12 +157,8 @@ fn exact_sharpened_births_keep_their_light() {
 /// Births are found where emission may be and nowhere else, and the certificate is one of such fields.
 #[test]
 fn exact_births_are_within_their_region() {
-    let (model, voxels) = (model(false), Voxels::cube(9, 5.0, Degree::Linear));
-    let truth: Vec<f64> = [0.2, 0.0, 1.0, 0.0]
-        .iter()
-        .flat_map(|s| initial_fields::spot(&voxels).into_iter().map(move |e| s * e))
-        .collect();
-    let pixels = images(&model, &changing(&voxels, knots(Allowed::Births)), &truth);
+    let (model, voxels) = (forward_model(), Voxels::cube(9, 5.0, Degree::Linear));
+    let (pixels, _) = shining(&model, knots(Allowed::Births), [0.2, 0.0, 1.0, 0.0]);
     let region = Region { r_min: 3.0, r_max: 4.5, z_width: 1.0 };
     for within in [None, Some(region)] {
         let change = Change { weight: 0.0, within, ..births() };
