@@ -79,6 +79,7 @@ fn least(all: impl Iterator<Item = f64>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::verdict::tests::residual;
     use kerrlight_vlbi::data_terms::Residual;
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
@@ -119,12 +120,9 @@ mod tests {
     /// Noise of 20 frames of 6 baselines, with `offset` in the data of one baseline.
     fn tested(seed: u64, offset: f64) -> Tested {
         let mut random = Pcg64::seed_from_u64(seed);
-        let mut datum = |pair: [u16; 2]| Residual {
-            value: random.sample::<f64, _>(StandardNormal)
-                + if pair == [0, 1] { offset } else { 0.0 },
-            datum: 0.0,
-            freedom: 1.0,
-            stations: pair.to_vec(),
+        let mut datum = |pair: [u16; 2]| {
+            let off = if pair == [0, 1] { offset } else { 0.0 };
+            residual(random.sample::<f64, _>(StandardNormal) + off, 0.0, &pair)
         };
         let pairs = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
         let frame = |_| pairs.into_iter().map(&mut datum).collect();

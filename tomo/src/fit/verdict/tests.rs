@@ -6,16 +6,19 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
+pub(super) fn residual(value: f64, datum: f64, stations: &[u16]) -> Residual {
+    Residual { value, datum, freedom: 1.0, stations: stations.to_vec() }
+}
+
 /// Baselines of four stations, real and imaginary part, in so many frames: (frame, number, noise) to a residual.
 fn baselines(frames: usize, of: impl Fn(usize, usize, f64) -> f64) -> Statistics {
     let mut random = Pcg64Mcg::seed_from_u64(3);
     let mut frame = |k: usize| -> Vec<Residual> {
-        let pairs = (0..4u16).flat_map(|a| (a + 1..4).flat_map(move |b| [vec![a, b], vec![a, b]]));
-        let noise = pairs.enumerate().map(|(at, stations)| {
-            let value = of(k, at, StandardNormal.sample(&mut random));
-            Residual { value, datum: 10.0, freedom: 1.0, stations }
-        });
-        noise.collect()
+        let pairs = (0..4u16).flat_map(|a| (a + 1..4).flat_map(move |b| [[a, b], [a, b]]));
+        let noise = |(at, pair): (usize, [u16; 2])| {
+            residual(of(k, at, StandardNormal.sample(&mut random)), 10.0, &pair)
+        };
+        pairs.enumerate().map(noise).collect()
     };
     let frames: Vec<_> = (0..frames).map(&mut frame).collect();
     Statistics::of(frames, 1)
@@ -35,9 +38,7 @@ fn exact_noise_about_the_truth_is_explained() {
     }
     let pixels = (0..20).map(|k| {
         let mut random = Pcg64Mcg::seed_from_u64(k);
-        let value = |_| StandardNormal.sample(&mut random);
-        let plain = |value| Residual { value, datum: 1.0, freedom: 1.0, stations: vec![] };
-        (0..256).map(value).map(plain).collect()
+        (0..256).map(|_| residual(StandardNormal.sample(&mut random), 1.0, &[])).collect()
     });
     let found = verdict(Statistics::of(pixels, 16), Errors::Assumed);
     assert_eq!(found.outcome, Outcome::Explained, "{:?}", found.reasons);
@@ -46,12 +47,7 @@ fn exact_noise_about_the_truth_is_explained() {
 /// Sums by hand: two frames of three baselines, one of them not there in the second.
 #[test]
 fn exact_statistics_are_sums() {
-    let one = |value: f64, stations: [u16; 2]| Residual {
-        value,
-        datum: 2.0,
-        freedom: 1.0,
-        stations: stations.to_vec(),
-    };
+    let one = |value: f64, stations: [u16; 2]| residual(value, 2.0, &stations);
     let frames = [
         vec![one(1.0, [0, 1]), one(2.0, [0, 2]), one(-3.0, [1, 2])],
         vec![one(4.0, [0, 1]), one(-1.0, [1, 2])],
@@ -65,7 +61,7 @@ fn exact_statistics_are_sums() {
     assert_eq!(found.frames[1], Part { freedom: 2.0, chi2: 17.0 });
     // (1, 4) and (−3, −1).
     assert_eq!(found.in_time.correlation(), Some(7.0 / (10.0f64 * 17.0).sqrt()));
-    let plain = |value| Residual { value, datum: 0.0, freedom: 1.0, stations: vec![] };
+    let plain = |value| residual(value, 0.0, &[]);
     let image = Statistics::of([[1.0, 2.0, 3.0, 4.0].map(plain).to_vec()], 2);
     assert_eq!((image.in_space.count(), image.misfit()), (2, None));
     assert_eq!(image.in_space.correlation(), Some(14.0 / (10.0f64 * 20.0).sqrt()));
@@ -99,6 +95,13 @@ fn exact_what_is_wrong_is_named() {
     assert_eq!(verdict(Statistics::default(), Errors::Known).outcome, Outcome::Unexplained);
 }
 
+/// The verdict on single baselines, triangles and frames alone.
+fn of_groups(tested: &Tested) -> Verdict {
+    let mut found = Verdict { outcome: Outcome::Explained, reasons: vec![] };
+    judge_groups(0, tested, &mut found);
+    found
+}
+
 /// A baseline with few data, within what chance gives it, hides none with many that is beyond.
 #[test]
 fn exact_each_baseline_is_judged_by_its_own_limit() {
@@ -106,8 +109,7 @@ fn exact_each_baseline_is_judged_by_its_own_limit() {
     statistics.groups.insert(vec![0, 1], Part { freedom: 30.0, chi2: 30.0 * 2.25 });
     statistics.groups.insert(vec![0, 2], Part { freedom: 500.0, chi2: 500.0 * 2.1 });
     statistics.all = Part { freedom: 530.0, chi2: 530.0 };
-    let mut found = Verdict { outcome: Outcome::Explained, reasons: vec![] };
-    judge_groups(0, &Tested::gaussian(statistics, Errors::Known), &mut found);
+    let found = of_groups(&Tested::gaussian(statistics, Errors::Known));
     let faults: Vec<&Fault> = found.reasons.iter().map(|reason| &reason.fault).collect();
     assert_eq!(faults, [&Fault::Group(vec![0, 2], 2.1)]);
 }
@@ -128,9 +130,7 @@ fn exact_each_triangle_is_expected_to_be_as_its_draws_are() {
     let draws = [of(2.8, 0.95), of(3.1, 1.0), of(3.1, 1.05)];
     let judged = |weak: f64, strong: f64| {
         let tested = Tested::gaussian(of(weak, strong), Errors::Known).among(&draws);
-        let mut found = Verdict { outcome: Outcome::Explained, reasons: vec![] };
-        judge_groups(0, &tested, &mut found);
-        (found, tested.predicted().unwrap().groups.unwrap())
+        (of_groups(&tested), tested.predicted().unwrap().groups.unwrap())
     };
     let (right, probability) = judged(3.2, 0.98);
     assert!(right.reasons.is_empty() && probability > 0.1, "{right:?} {probability}");
@@ -190,12 +190,11 @@ fn exact_what_parameters_take_is_expected() {
 fn exact_a_fit_and_its_draws_are_judged_alike() {
     let frames = |size: f64| {
         let mut random = Pcg64Mcg::seed_from_u64(8);
-        let mut value = move || {
+        let mut pixel = move || {
             let noise: f64 = StandardNormal.sample(&mut random);
-            size.sqrt() * noise
+            residual(size.sqrt() * noise, 9.0, &[])
         };
-        let plain = move |value| Residual { value, datum: 9.0, freedom: 1.0, stations: vec![] };
-        (0..100).map(move |_| (0..1470).map(|_| plain(value())).collect::<Vec<_>>())
+        (0..100).map(move |_| (0..1470).map(|_| pixel()).collect::<Vec<_>>())
     };
     for (size, outcome) in [(1.05, Outcome::Explained), (1.3, Outcome::Unexplained)] {
         let tested = Tested::gaussian(Statistics::of(frames(size), 42), Errors::Assumed);
