@@ -52,15 +52,11 @@ pub(super) fn covariance(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::geometry::{Parameter, Prior, Span};
+    use crate::fit::geometry::tests::{ANY_INCLINATION, uniform};
+    use crate::fit::geometry::{Parameter, Span};
 
     fn free() -> [Free; 2] {
-        let prior = Prior::Uniform { low: -0.9, high: 0.9 };
-        let turn = Prior::Isotropic { low: 0.0, high: core::f64::consts::PI };
-        [
-            Free { parameter: Parameter::Spin, prior },
-            Free { parameter: Parameter::Inclination, prior: turn },
-        ]
+        [uniform(Parameter::Spin, -0.9, 0.9), ANY_INCLINATION]
     }
 
     fn sigma(covariance: &DMatrix<f64>, k: usize) -> f64 {
@@ -88,11 +84,8 @@ mod tests {
     /// Spin and position angle that only together are known: each has the spread that the sum leaves it.
     #[test]
     fn exact_a_degenerate_pair_is_bounded_by_its_priors() {
-        let uniform = |low, high| Prior::Uniform { low, high };
         let parameters = [(Parameter::Spin, 0.9), (Parameter::PositionAngle, 0.3)];
-        let free = parameters
-            .map(|(parameter, half)| Free { parameter, prior: uniform(-half, half) })
-            .to_vec();
+        let free = parameters.map(|(parameter, half)| uniform(parameter, -half, half));
         let (a, b) = (0.9 / 3f64.sqrt(), 0.3 / 3f64.sqrt());
         // (x + y)² / (2 · 0.02²), in units of the scales.
         let scale = [0, 1].map(|k| free[k].parameter.scale());

@@ -191,7 +191,8 @@ fn beyond_chance(slopes: &DVector<f64>, finer: &DMatrix<f64>, other: &DMatrix<f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::geometry::{Parameter, Prior};
+    use crate::fit::geometry::Parameter;
+    use crate::fit::geometry::tests::uniform;
 
     /// Returns a bowl in which the data leave the spin a standard deviation of 0.001.
     fn standing(excess: f64) -> Standing {
@@ -205,8 +206,7 @@ mod tests {
     /// Standard deviations by a step of 0.01 of a refinement with this gain and excess, and by what of the first excess it does not
     /// explain.
     fn errors(excess: f64, gain: f64, finer_excess: f64) -> Vec<f64> {
-        let prior = Prior::Uniform { low: -0.9, high: 0.9 };
-        let free = [Free { parameter: Parameter::Spin, prior }];
+        let free = [uniform(Parameter::Spin, -0.9, 0.9)];
         let kind = Refinement { source: "voxels", onwards: 1.5 };
         let step = DVector::from_element(1, 0.01 / Parameter::Spin.scale());
         let refined = Refined { kind, step, certain: 1.0, gain, excess: finer_excess };
@@ -278,10 +278,7 @@ mod tests {
     fn exact_no_discrepancy_moves_a_parameter_farther_than_its_chi2_allows() {
         use rand::{RngExt, SeedableRng};
         let mut random = rand_pcg::Pcg64::seed_from_u64(5);
-        let free = [Parameter::Spin, Parameter::Xi].map(|parameter| Free {
-            parameter,
-            prior: Prior::Uniform { low: -500.0, high: 500.0 },
-        });
+        let free = [Parameter::Spin, Parameter::Xi].map(|of| uniform(of, -500.0, 500.0));
         let mut worst = 0.0f64;
         for round in 0..400 {
             let mut drawn = || random.random::<f64>() - 0.5;

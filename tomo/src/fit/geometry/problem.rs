@@ -331,6 +331,7 @@ fn mirrored(x: f64, low: f64, high: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::geometry::tests::uniform;
 
     /// A direction is a direction: −319.55° is 40.45°, and as probable.
     #[test]
@@ -359,8 +360,7 @@ mod tests {
         }
         assert!((free(40.0, 0.01).width().to_degrees() - 0.01).abs() < 1e-12);
         assert_eq!(free(40.0, 50.0).width(), Parameter::PositionAngle.scale());
-        let whole = Prior::Uniform { low: 0.0, high: TAU };
-        let whole = Free { parameter: Parameter::PositionAngle, prior: whole };
+        let whole = uniform(Parameter::PositionAngle, 0.0, TAU);
         assert!((whole.inside(-0.5) - (TAU - 0.5)).abs() < 1e-14);
     }
 
@@ -368,10 +368,7 @@ mod tests {
     /// geometries on their own.
     #[test]
     fn exact_geometries_go_on_beyond_the_pole() {
-        let uniform = |parameter, low: f64, high: f64| Free {
-            parameter,
-            prior: Prior::Uniform { low: low.to_radians(), high: high.to_radians() },
-        };
+        let uniform = |of, low: f64, high: f64| uniform(of, low.to_radians(), high.to_radians());
         let (angle, tilt) = (Parameter::PositionAngle, Parameter::Inclination);
         let all = [uniform(tilt, 0.0, 180.0), uniform(angle, -180.0, 180.0)];
         let known = [uniform(tilt, 0.0, 180.0), uniform(angle, 0.0, 90.0)];

@@ -10,6 +10,7 @@ use crate::fit::{
 };
 use crate::representation::{Degree, Representation};
 use core::f64::consts::{FRAC_PI_2, PI};
+use kerrlight_geodesic::{Inclination, Kerr, Observer};
 use kerrlight_render::dynamics::{AngularVelocity, Axis};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -18,6 +19,15 @@ use rand_pcg::Pcg64;
 mod beside_births;
 mod beside_prior;
 mod mirror_solution;
+
+/// A parameter that is known to lie between two values.
+pub(super) fn uniform(parameter: Parameter, low: f64, high: f64) -> Free {
+    Free { parameter, prior: Prior::Uniform { low, high } }
+}
+
+/// A direction to the observer of which nothing is known.
+pub(super) const ANY_INCLINATION: Free =
+    Free { parameter: Parameter::Inclination, prior: Prior::Isotropic { low: 0.0, high: PI } };
 
 fn model(law: Law) -> GeometryModel {
     // Rays that stay where gas on circular orbits is slower than light: beyond, weights have a kink.
@@ -102,18 +112,10 @@ fn exact_pixels_of_the_ring_are_means_over_rays() {
     let ring = RingRays { count: 8, spacing: 0.5, lattice: 3 };
     let geometry = Geometry::new(0.3, 0.9);
     let (blobs, parameters) = parameters(Blobs::STEADY);
-    let field = Field {
-        representation: &blobs,
-        parameters: &parameters,
-        axis: model.axis,
-        occupancy: None,
-    };
-    let (hole, observer) = (
-        kerrlight_geodesic::Kerr::new(0.3).unwrap(),
-        kerrlight_geodesic::Observer::at_infinity(
-            kerrlight_geodesic::Inclination::from_radians(0.9).unwrap(),
-        ),
-    );
+    let (representation, parameters) = (&blobs, &parameters[..]);
+    let field = Field { representation, parameters, axis: model.axis, occupancy: None };
+    let inclination = Inclination::from_radians(0.9).unwrap();
+    let (hole, observer) = (Kerr::new(0.3).unwrap(), Observer::at_infinity(inclination));
     let rays = PixelRays::new(ring, &hole, &observer, [&model.x, &model.y], |place| place);
     assert_eq!(rays.starts, [0, 8, 16, 17]);
     let (x, y) = rays.places.iter().map(|[x, y]| (*x, *y)).unzip();
@@ -160,8 +162,6 @@ fn of_hot_spot<'a>(
 fn exact_bounds_shorten_steps() {
     let model = screen(20, 12);
     let part = |low: f64, turns: f64| {
-        let uniform =
-            |parameter, low, high| Free { parameter, prior: Prior::Uniform { low, high } };
         let free = [
             uniform(Parameter::Inclination, low, 1.5),
             uniform(Parameter::PositionAngle, -PI * turns, PI * turns),
@@ -228,10 +228,7 @@ fn exact_steps_lead_to_the_best_geometry() {
     let count = data.len() as f64;
     let term = ImageTerm::new(data, side * side, sigma).unwrap();
     let terms = [Weighted { weight: count, term: &term as &dyn FrameTerm<f32> }];
-    let free = [
-        Free { parameter: Parameter::Inclination, prior: Prior::Isotropic { low: 0.0, high: PI } },
-        Free { parameter: Parameter::PositionAngle, prior: Prior::Uniform { low: -PI, high: PI } },
-    ];
+    let free = [ANY_INCLINATION, uniform(Parameter::PositionAngle, -PI, PI)];
     let patience = StopRule { looking: 60, rounds: 1, settling: 200 };
     let effort = Effort { nodes: 18, degree: Degree::Linear, patience };
     let problem = GeometryProblem { known: truth, effort, ..of_hot_spot(&model, &free, &terms) };
@@ -279,11 +276,10 @@ fn exact_geometry_of_a_hot_spot_is_found_from_everywhere() {
     let count = data.len() as f64;
     let term = ImageTerm::new(data, side * side, sigma).unwrap();
     let terms = [Weighted { weight: count, term: &term as &dyn FrameTerm<f32> }];
-    let all_round = Prior::Uniform { low: -PI, high: PI };
     let free = [
-        Free { parameter: Parameter::Spin, prior: Prior::Uniform { low: -0.95, high: 0.95 } },
-        Free { parameter: Parameter::Inclination, prior: Prior::Isotropic { low: 0.0, high: PI } },
-        Free { parameter: Parameter::PositionAngle, prior: all_round },
+        uniform(Parameter::Spin, -0.95, 0.95),
+        ANY_INCLINATION,
+        uniform(Parameter::PositionAngle, -PI, PI),
     ];
     let problem = of_hot_spot(&model, &free, &terms);
     let apart = |geometry: &Geometry| {
@@ -306,11 +302,6 @@ fn exact_geometry_of_a_hot_spot_is_found_from_everywhere() {
     // Voxels of 1.2 M represent a spot of 0.7 M only so well.
     let best = ends.iter().min_by(|a, b| a.value.total_cmp(&b.value)).unwrap();
     assert!(apart(&best.geometry).iter().all(|apart| *apart < 0.1), "{:?}", best.geometry);
-    let none = problem.explore(
-        truth,
-        None,
-        &Exploration { width: 1.0, trials: 99, seed: 1 },
-        &mut |_, _| false,
-    );
-    assert!(none.unwrap().is_none());
+    let how = Exploration { width: 1.0, trials: 99, seed: 1 };
+    assert!(problem.explore(truth, None, &how, &mut |_, _| false).unwrap().is_none());
 }

@@ -193,7 +193,8 @@ impl Form {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::geometry::{Parameter, Prior};
+    use crate::fit::geometry::Parameter;
+    use crate::fit::geometry::tests::uniform;
     use core::f64::consts::PI;
 
     /// A step along the first parameter widens it alone; one along both makes errors that are nearly those of the step.
@@ -221,12 +222,7 @@ mod tests {
     }
 
     fn free() -> [Free; 2] {
-        let spin = Prior::Uniform { low: -0.9, high: 0.9 };
-        let inclination = Prior::Uniform { low: 0.0, high: 3.0 };
-        [
-            Free { parameter: Parameter::Spin, prior: spin },
-            Free { parameter: Parameter::Inclination, prior: inclination },
-        ]
+        [uniform(Parameter::Spin, -0.9, 0.9), uniform(Parameter::Inclination, 0.0, 3.0)]
     }
 
     #[test]
@@ -261,8 +257,7 @@ mod tests {
     /// A lowest point beyond south lies on the other side of it, not at the end of the prior.
     #[test]
     fn exact_lowest_points_go_on_around_the_circle() {
-        let whole = Prior::Uniform { low: -PI, high: PI };
-        let free = [Free { parameter: Parameter::PositionAngle, prior: whole }];
+        let free = [uniform(Parameter::PositionAngle, -PI, PI)];
         let sample = |k: usize| {
             let angle = PI - 0.03 + 5e-4 * f64::from(k as u32);
             let geometry = Geometry::new(0.0, 1.0).with(Parameter::PositionAngle, angle);

@@ -22,8 +22,7 @@ fn exact_inclination_is_found_beside_births() {
     let count = movie.len() as f64;
     let term = ImageTerm::new(movie, side * side, sigma).unwrap();
     let terms = [Weighted { weight: count, term: &term as &dyn FrameTerm<f32> }];
-    let prior = Prior::Isotropic { low: 0.0, high: PI };
-    let free = [Free { parameter: Parameter::Inclination, prior }];
+    let free = [ANY_INCLINATION];
     let knots = Knots { first: 0.0, spacing: 10.0, count: 12, allowed: Allowed::Births };
     let within = Some(model.region);
     let change = Change { knots, weight: 0.01 * count, within, sharpen: None };

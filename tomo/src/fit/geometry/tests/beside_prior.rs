@@ -15,8 +15,7 @@ fn exact_a_prior_of_voxels_is_part_of_the_value() {
     let data: Vec<f32> = movie.iter().map(|x| *x as f32).collect();
     let term = ImageTerm::new(data, side * side, sigma).unwrap();
     let terms = [Weighted { weight: 1.0, term: &term as &dyn FrameTerm<f32> }];
-    let prior = Prior::Isotropic { low: 0.0, high: PI };
-    let free = [Free { parameter: Parameter::Inclination, prior }];
+    let free = [ANY_INCLINATION];
     let plain = of_hot_spot(&model, &free, &terms);
     let voxels = Voxels::cube(plain.effort.nodes, plain.half_width, plain.effort.degree);
     let roughness = Roughness::FiveHalves;
@@ -35,7 +34,7 @@ fn exact_a_prior_of_voxels_is_part_of_the_value() {
     let of_prior = field.value_and_gradient(&found.x, 1.0, &mut vec![0.0; found.x.len()]);
     assert!(of_prior > 1.0 && chi2 > 1.0, "{of_prior} {chi2}");
     assert!((found.chi2 / (chi2 + of_prior) - 1.0).abs() < 1e-3, "{} {chi2}", found.chi2);
-    let penalty = prior.penalty(1.05);
+    let penalty = free[0].penalty(1.05);
     assert!((found.value - 0.5 * found.chi2 - penalty).abs() < 1e-9 * found.value);
     let count = 12.0 * (side * side) as f64;
     assert!((problem.reduced(found.chi2) / (found.chi2 / count) - 1.0).abs() < 1e-12);

@@ -6,11 +6,10 @@ use super::*;
 #[test]
 fn exact_the_mirror_solution_of_a_geometry_is_seen_from_below() {
     let model = screen(6, 2);
-    let prior = |low: f64, high: f64| Prior::Uniform { low, high };
     let free = [
-        Free { parameter: Parameter::Spin, prior: prior(-0.95, 0.95) },
-        Free { parameter: Parameter::Inclination, prior: prior(0.0, PI) },
-        Free { parameter: Parameter::PositionAngle, prior: prior(-PI, PI) },
+        uniform(Parameter::Spin, -0.95, 0.95),
+        uniform(Parameter::Inclination, 0.0, PI),
+        uniform(Parameter::PositionAngle, -PI, PI),
     ];
     let geometry = Geometry::new(0.6, 1.05).with(Parameter::PositionAngle, 0.7);
     let mirror = of_hot_spot(&model, &free, &[]).mirror_solution(&geometry).unwrap();
