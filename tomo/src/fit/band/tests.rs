@@ -5,6 +5,9 @@ use super::*;
 use crate::fit::linear::Roughness;
 use core::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector};
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
 
 const GRID: PolarGrid = PolarGrid { radius: 9.0, rings: 13, azimuths: 25, height: 2.0, layers: 3 };
 
@@ -46,9 +49,8 @@ fn band(radius: f64) -> Band {
 
 /// A field that is drawn from the prior, its emission positive in sum, as data with noise.
 fn drawn(curve: &CurveRows, band: &Band, seed: u64) -> Vec<f64> {
-    use rand::{RngExt, SeedableRng};
-    let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
-    let mut normal = || -> f64 { random.sample(rand_distr::StandardNormal) };
+    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    let mut normal = || -> f64 { random.sample(StandardNormal) };
     let seen = curve.seen(band).unwrap();
     let n = curve.data();
     let mut rest = curve.of_background(&band.background);
@@ -140,7 +142,6 @@ fn exact_covariances_are_sums_over_pairs_of_nodes() {
 /// Moments of draws from the prior lie about those that are expected as far as their deviations say.
 #[test]
 fn exact_places_of_draws_from_the_prior() {
-    use rand::{RngExt, SeedableRng};
     let (curve, truth) = (curve(60), band(5.0));
     let (seen, n) = (curve.seen(&truth).unwrap(), curve.data());
     let uniform = &seen.uniform * seen.uniform.transpose() * truth.mean * truth.mean;
@@ -150,10 +151,10 @@ fn exact_places_of_draws_from_the_prior() {
     joint.view_mut((4, 4), (n, n)).copy_from(&((&seen.covariance + uniform) * truth.power));
     (4..n + 4).for_each(|k| joint[(k, k)] += 1.0);
     let lower = joint.cholesky().unwrap().unpack();
-    let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(5);
+    let mut random = Pcg64Mcg::seed_from_u64(5);
     let (mut squares, draws) = ([0.0; 2], 300);
     for _ in 0..draws {
-        let white = DVector::from_fn(n + 4, |_, _| random.sample(rand_distr::StandardNormal));
+        let white = DVector::from_fn(n + 4, |_, _| random.sample(StandardNormal));
         let drawn: DVector<f64> = &lower * white;
         let (q, p) = ([drawn[0], drawn[1]], [drawn[2], drawn[3]]);
         let data: Vec<f64> = drawn.as_slice()[4..].to_vec();
@@ -289,7 +290,6 @@ fn exact_flares_before_a_background_are_found_and_none_where_there_is_none() {
 /// The expected background is off by as much as its distribution given the data says.
 #[test]
 fn exact_expected_background() {
-    use rand::{RngExt, SeedableRng};
     let (curve, truth) = (curve(40), Band { background: BACKGROUND, ..band(5.0) });
     let (own, n) = (curve.of_background(&BACKGROUND), 40);
     let rest = curve.seen(&truth).unwrap().full(&truth) + DMatrix::identity(n, n);
@@ -302,10 +302,10 @@ fn exact_expected_background() {
     let across = part(&own, &all, &used);
     let inverse = part(&(&own + &rest), &used, &used).try_inverse().unwrap();
     let left = &own - &across * inverse * across.transpose();
-    let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(7);
+    let mut random = Pcg64Mcg::seed_from_u64(7);
     let (mut sum, draws) = (0.0, 200);
     for _ in 0..draws {
-        let mut white = || DVector::from_fn(n, |_, _| random.sample(rand_distr::StandardNormal));
+        let mut white = || DVector::from_fn(n, |_, _| random.sample(StandardNormal));
         let [background, other] = [&roots[0] * white(), &roots[1] * white()];
         let data: Vec<f64> = (&background + other).as_slice().to_vec();
         let expected = expected_background(&curve, &data, &truth).unwrap();

@@ -193,6 +193,9 @@ mod tests {
     use super::*;
     use crate::fit::geometry::Parameter;
     use crate::fit::geometry::tests::uniform;
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+    use rand_pcg::Pcg64;
 
     /// Returns a bowl in which the data leave the spin a standard deviation of 0.001.
     fn standing(excess: f64) -> Standing {
@@ -242,10 +245,8 @@ mod tests {
     /// at most. Of a discrepancy far above the noise nearly all does.
     #[test]
     fn exact_noise_makes_no_model_error() {
-        use rand::{RngExt, SeedableRng};
-        use rand_distr::StandardNormal;
         const N: usize = 60;
-        let mut random = rand_pcg::Pcg64::seed_from_u64(9);
+        let mut random = Pcg64::seed_from_u64(9);
         let mut normal = || random.sample::<f64, _>(StandardNormal);
         let tangents = DMatrix::from_fn(N, 2, |_, _| normal());
         let volume = DMatrix::from_fn(N, 50, |_, _| normal());
@@ -276,8 +277,7 @@ mod tests {
     /// come of its χ².
     #[test]
     fn exact_no_discrepancy_moves_a_parameter_farther_than_its_chi2_allows() {
-        use rand::{RngExt, SeedableRng};
-        let mut random = rand_pcg::Pcg64::seed_from_u64(5);
+        let mut random = Pcg64::seed_from_u64(5);
         let free = [Parameter::Spin, Parameter::Xi].map(|of| uniform(of, -500.0, 500.0));
         let mut worst = 0.0f64;
         for round in 0..400 {

@@ -226,6 +226,9 @@ pub(super) fn fitted(seen: &[Evaluations], n: usize) -> Option<Form> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+    use rand_pcg::Pcg64;
 
     fn places(n: usize) -> Vec<DVector<f64>> {
         let middles = (0..n).flat_map(|k| [-0.5, 0.5].map(|x| along(n, k, x)));
@@ -262,8 +265,7 @@ mod tests {
     /// Ripples of a known deviation that are independent of each other move the middle as often as stated.
     #[test]
     fn exact_ripples_move_the_middle_by_what_is_stated() {
-        use rand::{RngExt, SeedableRng};
-        let mut random = rand_pcg::Pcg64::seed_from_u64(3);
+        let mut random = Pcg64::seed_from_u64(3);
         let (mut pulls, rounds) = (0.0, 4000);
         for _ in 0..rounds {
             let mut noise = || 1.7320508 * (2.0 * random.random::<f64>() - 1.0);
@@ -281,9 +283,7 @@ mod tests {
     /// Student's t of five degrees of freedom has the variance 5/3, which is stated.
     #[test]
     fn exact_six_places_tell_the_error_of_their_mean() {
-        use rand::{RngExt, SeedableRng};
-        use rand_distr::StandardNormal;
-        let mut random = rand_pcg::Pcg64::seed_from_u64(11);
+        let mut random = Pcg64::seed_from_u64(11);
         let mut place =
             || DVector::from_fn(1, |_, _| 5.0 * random.sample::<f64, _>(StandardNormal));
         let rounds = 4000;
@@ -299,12 +299,10 @@ mod tests {
     /// rise about them tells (Neyman & Scott 1948, Econometrica 16, 1), and at most by what is stated.
     #[test]
     fn exact_noise_that_is_followed_moves_the_middle_as_stated() {
-        use rand::{RngExt, SeedableRng};
-        use rand_distr::StandardNormal;
         const DATA: usize = 120;
         const NUMBERS: usize = 60;
         const REACH: f64 = 0.15;
-        let mut random = rand_pcg::Pcg64::seed_from_u64(7);
+        let mut random = Pcg64::seed_from_u64(7);
         let mut normal = |rows, columns| {
             DMatrix::from_fn(rows, columns, |_, _| random.sample::<f64, _>(StandardNormal))
         };
