@@ -47,9 +47,7 @@ pub(super) fn slope(h: f64, mut at: impl FnMut(f64) -> f64) -> f64 {
 /// All images of a field.
 pub(super) fn images(model: &ForwardModel<f64>, field: Field<'_, f64>) -> Vec<f64> {
     let frames: Vec<usize> = (0..model.frames()).collect();
-    let mut movie = vec![0.0; frames.len() * model.pixels()];
-    model.movie(field, &frames, &mut Batch::default(), &mut Workspace::new(), &mut movie);
-    movie
+    model.images(field, &frames)
 }
 
 /// Settings with changes.

@@ -9,8 +9,8 @@ use crate::fit::linear::{Ending, LinearProblem, LinearProgress, LinearSolution};
 use crate::fit::scan::{AxisLoss, AxisSettings, refine_axis, scan_axis};
 use crate::fit::settings::{AxisScan as AxisScanSettings, AxisSearch, FitFile, Kind, Start};
 use crate::fit::setup::{self, CoarseView, FitData, SolvedLeakage};
-use crate::fit::{Batch, Field, ForwardModel, Motion, State, Trainer};
-use crate::representation::{Registry, Workspace};
+use crate::fit::{Field, ForwardModel, Motion, State, Trainer};
+use crate::representation::Registry;
 use core::ops::ControlFlow;
 use kerrlight_render::dynamics::Axis;
 use std::sync::{Mutex, PoisonError};
@@ -141,8 +141,5 @@ fn images_of(
     let parameters = &solution.parameters();
     let field = Field { representation, parameters, axis, occupancy: None };
     let frames: Vec<usize> = (0..model.frames()).collect();
-    let mut movie = vec![0.0; frames.len() * model.pixels()];
-    let (batch, workspace) = (&mut Batch::default(), &mut Workspace::new());
-    model.movie(field, &frames, batch, workspace, &mut movie);
-    Ok(movie)
+    Ok(model.images(field, &frames))
 }

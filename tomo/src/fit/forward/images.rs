@@ -26,6 +26,13 @@ impl<T: Float> ForwardModel<T> {
         }
     }
 
+    /// The same with memory of their own.
+    pub fn images(&self, field: Field<'_, T>, frames: &[usize]) -> Vec<T> {
+        let mut movie = vec![T::zero(); frames.len() * self.pixels];
+        self.movie(field, frames, &mut Batch::default(), &mut Workspace::new(), &mut movie);
+        movie
+    }
+
     /// The image of one frame, whose gradient ([`vjp_recorded`](crate::representation::Representation::vjp_recorded) of the batch) comes next: `image` is
     /// overwritten.
     pub fn image_recorded(

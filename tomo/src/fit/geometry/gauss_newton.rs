@@ -10,8 +10,7 @@ use super::quadratic_form::in_own_units;
 use super::{Geometry, Parameter};
 use crate::Error;
 use crate::fit::linear::{Profile, Voxels};
-use crate::fit::{Batch, Field, ForwardModel};
-use crate::representation::Workspace;
+use crate::fit::{Field, ForwardModel};
 use core::f64::consts::PI;
 use kerrlight_common::simd::Float;
 use nalgebra::{DMatrix, DVector};
@@ -211,17 +210,9 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
     /// If a number is out of its range.
     pub fn images(&self, geometry: Geometry, voxels: &Voxels, x: &[f64]) -> Result<Vec<T>, Error> {
         let forward: ForwardModel<T> = self.model.forward(&geometry)?;
-        let representation = voxels.field()?;
-        let parameters: Vec<T> = x.iter().map(|x| T::of(*x)).collect();
-        let field = Field {
-            representation: &representation,
-            parameters: &parameters,
-            axis: self.model.axis,
-            occupancy: None,
-        };
-        let mut movie = vec![T::zero(); self.frames.len() * forward.pixels()];
-        let (mut batch, mut workspace) = (Batch::default(), Workspace::new());
-        forward.movie(field, self.frames, &mut batch, &mut workspace, &mut movie);
-        Ok(movie)
+        let representation = &voxels.field()?;
+        let parameters = &x.iter().map(|x| T::of(*x)).collect::<Vec<T>>();
+        let field = Field { representation, parameters, axis: self.model.axis, occupancy: None };
+        Ok(forward.images(field, self.frames))
     }
 }

@@ -5,10 +5,9 @@ use super::instrument::{opacity, upright};
 use super::{Instrument, Result, Truth, observer, spacing};
 use crate::fit::settings::FitFile;
 use crate::fit::{
-    Batch, ForwardModel, Motion, Observable, PolarizedView, Sampling, SightlineRequest, Sightlines,
-    State, Trainer,
+    ForwardModel, Motion, Observable, PolarizedView, Sampling, SightlineRequest, Sightlines, State,
+    Trainer,
 };
-use crate::representation::Workspace;
 use kerrlight_render::picture::{RingStrata, Stratum};
 use kerrlight_render::transport::View;
 
@@ -66,7 +65,9 @@ impl PreviewView<'_> {
             let rays = self.rays(first)?;
             first += rays.count.len();
             let mut model = self.forward_model(&rays, &motion, unit)?;
-            still.recovered.extend(rays.pixels(&recovered(&mut model, trainer, state)));
+            model.weigh(state.now.axis);
+            let image = model.images(state.now.field(trainer.representation), &[0]);
+            still.recovered.extend(rays.pixels(&image));
             if let Some(truth) = self.truth {
                 let image = truth.movie_through(&mut model);
                 let image: Vec<f32> = image.into_iter().map(|x| x as f32).collect();
@@ -164,17 +165,4 @@ impl Rays {
         };
         self.count.iter().map(|count| mean(count) as f32).collect()
     }
-}
-
-fn recovered(
-    model: &mut ForwardModel<f32>,
-    trainer: &Trainer<'_, f32>,
-    state: &State<f32>,
-) -> Vec<f32> {
-    let now = &state.now;
-    model.weigh(now.axis);
-    let field = now.field(trainer.representation);
-    let mut image = vec![0.0; model.pixels()];
-    model.movie(field, &[0], &mut Batch::default(), &mut Workspace::new(), &mut image);
-    image
 }
