@@ -75,6 +75,7 @@ pub fn scan_band(
     watch: &BandWatch<'_>,
 ) -> Result<Option<BandScan>> {
     let curve = check_band(file, measured, settings)?;
+    let scanner = Scanner { file, measured, settings, curve };
     let flows = flows(settings);
     let done = std::sync::atomic::AtomicUsize::new(0);
     let one = |flow: &Flow| -> Result<Option<Vec<BandGeometry>>> {
@@ -89,7 +90,7 @@ pub fn scan_band(
         if kept.is_some() {
             return Ok(kept);
         }
-        let found = weighed(file, measured, settings, curve, *flow)?;
+        let found = scanner.weighed(*flow)?;
         journal.keep(key, &BandGeometry::numbers(&found));
         Ok(Some(found))
     };
@@ -99,9 +100,9 @@ pub fn scan_band(
     let better =
         |a: &usize, b: &usize| geometries[*a].ln_posterior.total_cmp(&geometries[*b].ln_posterior);
     let best = (0..geometries.len()).max_by(better).unwrap_or(0);
-    let [azimuth, radius] = placed(file, measured, settings, curve, &geometries, best)?;
+    let [azimuth, radius] = scanner.placed(&geometries, best)?;
     let geometry = &geometries[best];
-    let rows = rows(file, measured, settings, curve, geometry.flow())?;
+    let rows = scanner.rows(geometry.flow())?;
     let data = turned(curve, geometry.position_angle_deg);
     let validation = validation(&rows, &data, &geometry.band)?;
     // Against noise alone anything that varies is a flare.
@@ -110,7 +111,7 @@ pub fn scan_band(
     let ln_bayes_factor = has_background.then(ln_bayes_factor).transpose()?;
     let background = has_background.then(|| expected(&rows, curve, &data, geometry)).transpose()?;
     let radii = settings.radii.values();
-    let period = |geometry: &BandGeometry| periods(file, measured, geometry, &radii);
+    let period = |geometry: &BandGeometry| scanner.periods(geometry, &radii);
     let periods_min = geometries.iter().map(period).collect::<Result<_>>()?;
     Ok(Some(BandScan {
         geometries,
@@ -125,17 +126,79 @@ pub fn scan_band(
     }))
 }
 
-/// Periods of orbits at some radii in a geometry, minutes.
-fn periods(
-    file: &FitFile,
-    measured: &FitData,
-    geometry: &BandGeometry,
-    radii: &[f64],
-) -> Result<Vec<f64>> {
-    let velocity = band_motion(file, measured, geometry.rotation_factor)?.velocity;
-    let minutes = 60.0 * hours_per_m(file)?;
-    let of = |radius: &f64| core::f64::consts::TAU / velocity.rate(*radius).abs() * minutes;
-    Ok(radii.iter().map(of).collect())
+/// A light curve, and the settings by which it weighs geometries.
+struct Scanner<'a> {
+    file: &'a FitFile,
+    measured: &'a FitData,
+    settings: &'a BandSettings,
+    curve: &'a Curve,
+}
+
+impl Scanner<'_> {
+    /// Periods of orbits at some radii in a geometry, minutes.
+    fn periods(&self, geometry: &BandGeometry, radii: &[f64]) -> Result<Vec<f64>> {
+        let velocity = band_motion(self.file, self.measured, geometry.rotation_factor)?.velocity;
+        let minutes = 60.0 * hours_per_m(self.file)?;
+        let of = |radius: &f64| core::f64::consts::TAU / velocity.rate(*radius).abs() * minutes;
+        Ok(radii.iter().map(of).collect())
+    }
+
+    /// Azimuth and radius of the emission, in all geometries that are likely.
+    fn placed(&self, geometries: &[BandGeometry], best: usize) -> Result<[Interval; 2]> {
+        let most = geometries[best].ln_posterior;
+        let likely: Vec<&BandGeometry> =
+            geometries.iter().filter(|geometry| geometry.ln_posterior > most - UNLIKELY).collect();
+        let one = |geometry: &&BandGeometry| {
+            let rows = self.rows(geometry.flow())?;
+            let of = |(band, ln): &(Band, f64)| (*band, ln + direction(geometry.inclination_deg));
+            let bands: Vec<(Band, f64)> = geometry.likely.iter().map(of).collect();
+            places(&rows, &turned(self.curve, geometry.position_angle_deg), &bands)
+        };
+        let all = likely.par_iter().map(one).collect::<Result<Vec<_>>>()?.concat();
+        let none =
+            || FitError::Conflict("band: the data do not say where any emission is".to_owned());
+        Ok(together(&all).ok_or_else(none)?)
+    }
+
+    /// All position angles of a geometry.
+    fn weighed(&self, flow: Flow) -> Result<Vec<BandGeometry>> {
+        let rows = self.rows(flow)?;
+        let angles = &self.settings.position_angles_deg;
+        let data: Vec<Vec<f64>> = angles.iter().map(|angle| turned(self.curve, *angle)).collect();
+        let weighed = evidence(&rows, &data, &prior(self.settings))?;
+        let Flow { inclination_deg, rotation_factor } = flow;
+        let one = |(angle, weighed): (&f64, Weighed)| BandGeometry {
+            inclination_deg,
+            rotation_factor,
+            position_angle_deg: *angle,
+            ln_posterior: weighed.ln_evidence + direction(inclination_deg),
+            by_radius: weighed.by_radius,
+            band: weighed.best,
+            likely: weighed.likely,
+        };
+        Ok(angles.iter().zip(weighed).map(one).collect())
+    }
+
+    /// The rows of a geometry, over the errors of the data.
+    fn rows(&self, flow: Flow) -> Result<CurveRows> {
+        // All position angles share the rows: data are turned in place of them.
+        let file = in_band_geometry(self.file, flow.inclination_deg, 0.0);
+        let instrument = Instrument::new(&file)?;
+        let mut model: ForwardModel<f32> =
+            instrument.forward(&band_motion(&file, self.measured, flow.rotation_factor)?)?;
+        let axis = axis(&file)?.0;
+        model.weigh(axis);
+        let Curve { parameters, hours, data, fitted, .. } = self.curve;
+        let scale = |datum: &Option<[f64; 2]>| datum.map_or(0.0, |[_, sigma]| 1.0 / sigma);
+        let scales = data.iter().map(scale).collect();
+        let minutes = hours.iter().map(|hour| 60.0 * (hour - hours[0])).collect();
+        let sampling = Sampling { minutes, scales };
+        // What was not measured has a row and a value of 0: used, it changes no probability; unused, it
+        // would count among the data that judge.
+        let used = |k: usize| fitted[k / parameters.len()] || data[k].is_none();
+        let used = (0..data.len()).map(used).collect();
+        Ok(CurveRows::of(&model, axis, grid(&file, self.settings), sampling, used))
+    }
 }
 
 /// ln of the probability of the data with a flare over that without one: the mean over the prior of the geometries.
@@ -155,29 +218,6 @@ fn ln_bayes_factor(
     let without = without_flare(rows, &[data.to_vec()], &backgrounds(settings))?[0];
     // sin i in both sums: their ratio is the mean evidence over the prior.
     Ok(most + (with / prior).ln() - without)
-}
-
-/// Azimuth and radius of the emission, in all geometries that are likely.
-fn placed(
-    file: &FitFile,
-    measured: &FitData,
-    settings: &BandSettings,
-    curve: &Curve,
-    geometries: &[BandGeometry],
-    best: usize,
-) -> Result<[Interval; 2]> {
-    let most = geometries[best].ln_posterior;
-    let likely: Vec<&BandGeometry> =
-        geometries.iter().filter(|geometry| geometry.ln_posterior > most - UNLIKELY).collect();
-    let one = |geometry: &&BandGeometry| {
-        let rows = rows(file, measured, settings, curve, geometry.flow())?;
-        let of = |(band, ln): &(Band, f64)| (*band, ln + direction(geometry.inclination_deg));
-        let bands: Vec<(Band, f64)> = geometry.likely.iter().map(of).collect();
-        places(&rows, &turned(curve, geometry.position_angle_deg), &bands)
-    };
-    let all = likely.par_iter().map(one).collect::<Result<Vec<_>>>()?.concat();
-    let none = || FitError::Conflict("band: the data do not say where any emission is".to_owned());
-    Ok(together(&all).ok_or_else(none)?)
 }
 
 impl BandGeometry {
@@ -305,31 +345,6 @@ fn flows(settings: &BandSettings) -> Vec<Flow> {
     settings.rotation_factors.iter().flat_map(of).collect()
 }
 
-/// All position angles of a geometry.
-fn weighed(
-    file: &FitFile,
-    measured: &FitData,
-    settings: &BandSettings,
-    curve: &Curve,
-    flow: Flow,
-) -> Result<Vec<BandGeometry>> {
-    let rows = rows(file, measured, settings, curve, flow)?;
-    let data: Vec<Vec<f64>> =
-        settings.position_angles_deg.iter().map(|angle| turned(curve, *angle)).collect();
-    let weighed = evidence(&rows, &data, &prior(settings))?;
-    let Flow { inclination_deg, rotation_factor } = flow;
-    let one = |(angle, weighed): (&f64, Weighed)| BandGeometry {
-        inclination_deg,
-        rotation_factor,
-        position_angle_deg: *angle,
-        ln_posterior: weighed.ln_evidence + direction(inclination_deg),
-        by_radius: weighed.by_radius,
-        band: weighed.best,
-        likely: weighed.likely,
-    };
-    Ok(settings.position_angles_deg.iter().zip(weighed).map(one).collect())
-}
-
 /// The settings of a geometry.
 pub fn in_band_geometry(file: &FitFile, inclination_deg: f64, position_angle_deg: f64) -> FitFile {
     let mut file = file.clone();
@@ -350,33 +365,6 @@ pub fn band_motion(file: &FitFile, measured: &FitData, factor: f64) -> Result<Mo
         law => AngularVelocity::Scaled { of: Box::new(law), factor },
     };
     Ok(Motion { velocity, ..plain })
-}
-
-/// The rows of a geometry, over the errors of the data.
-fn rows(
-    file: &FitFile,
-    measured: &FitData,
-    settings: &BandSettings,
-    curve: &Curve,
-    flow: Flow,
-) -> Result<CurveRows> {
-    // All position angles share the rows: data are turned in place of them.
-    let file = in_band_geometry(file, flow.inclination_deg, 0.0);
-    let instrument = Instrument::new(&file)?;
-    let mut model: ForwardModel<f32> =
-        instrument.forward(&band_motion(&file, measured, flow.rotation_factor)?)?;
-    let axis = axis(&file)?.0;
-    model.weigh(axis);
-    let scale = |datum: &Option<[f64; 2]>| datum.map_or(0.0, |[_, sigma]| 1.0 / sigma);
-    let scales = curve.data.iter().map(scale).collect();
-    let minutes = curve.hours.iter().map(|hour| 60.0 * (hour - curve.hours[0])).collect();
-    let sampling = Sampling { minutes, scales };
-    let count = curve.parameters.len();
-    // What was not measured has a row and a value of 0: used, it changes no probability; unused, it
-    // would count among the data that judge.
-    let used = |k: usize| curve.fitted[k / count] || curve.data[k].is_none();
-    let used = (0..curve.data.len()).map(used).collect();
-    Ok(CurveRows::of(&model, axis, grid(&file, settings), sampling, used))
 }
 
 /// Three times as many nodes round the axis as away from it, and layers twice as far apart.
