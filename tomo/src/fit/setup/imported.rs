@@ -249,6 +249,16 @@ mod tests {
     use kerrlight_vlbi::observation::{Basis, Measured, Row};
     use kerrlight_vlbi::operator::Pulse;
 
+    /// 1 Jy on one baseline at these hours, with (u, v).
+    fn observed(rows: &[(f64, [f64; 2])]) -> Observation {
+        let mut observation = Observation::empty(Basis::Stokes);
+        observation.stations = ["A", "B"].map(Station::named).to_vec();
+        let i = Measured { visibility: Complex64::new(1.0, 0.0), noise_sigma: 0.1 };
+        let row = |(time_h, uv): &(f64, [f64; 2])| Row::total_intensity(*time_h, [0, 1], *uv, i);
+        observation.rows = rows.iter().map(row).collect();
+        observation
+    }
+
     /// A minute is 60 s/(G M/c³), with 20.4605 s of Sgr A*; pixels are points unless the settings say what they are.
     #[test]
     fn exact_times_and_pixels_of_measured_visibilities() {
@@ -258,11 +268,7 @@ mod tests {
         if let Some(DataFiles::Visibilities { first_time, .. }) = &mut file.data {
             *first_time = 5.0;
         }
-        let mut observation = Observation::empty(Basis::Stokes);
-        observation.stations = ["A", "B"].map(Station::named).to_vec();
-        let i = Measured { visibility: Complex64::new(1.0, 0.0), noise_sigma: 0.1 };
-        let row = |time_h| Row::total_intensity(time_h, [0, 1], [1e9, 0.0], i);
-        observation.rows = vec![row(4.0), row(4.0 + 1.0 / 60.0)];
+        let observation = observed(&[4.0, 4.0 + 1.0 / 60.0].map(|time_h| (time_h, [1e9, 0.0])));
         let data = FitData::of_visibilities(&file, observation.clone(), "a test").unwrap();
         assert_eq!((data.times.len(), data.times[0], data.pulse), (2, 5.0, Pulse::Delta));
         assert!((data.times[1] - 5.0 - 60.0 / 20.460_49).abs() < 1e-5, "{:?}", data.times);
@@ -275,12 +281,8 @@ mod tests {
     #[test]
     fn exact_a_field_that_no_baseline_resolves_is_refused() {
         let sky = ImageGrid::new(8, 8, 120.0 * MICROARCSECOND).unwrap();
-        let i = Measured { visibility: Complex64::new(1.0, 0.0), noise_sigma: 0.1 };
         let data = |longest: f64| {
-            let mut observation = Observation::empty(Basis::Stokes);
-            observation.stations = ["A", "B"].map(Station::named).to_vec();
-            observation.rows =
-                vec![Row::total_intensity(4.0, [0, 1], [0.6 * longest, 0.8 * longest], i)];
+            let observation = observed(&[(4.0, [0.6 * longest, 0.8 * longest])]);
             let data = FitData::of_frames(sky, observation, &[], None).unwrap();
             data.check_resolved().map_err(|e| e.to_string())
         };

@@ -82,7 +82,7 @@ mod tests {
     use kerrlight_common::frames::Frames;
     use kerrlight_vlbi::Complex64;
     use kerrlight_vlbi::array::Station;
-    use kerrlight_vlbi::observation::Basis;
+    use kerrlight_vlbi::observation::{Basis, Measured};
 
     /// Gains of two stations of a prior of 0.3 scatter the amplitudes of a frame by √2 times as much, and σ with them.
     #[test]
@@ -90,16 +90,8 @@ mod tests {
         let mut observation = Observation::empty(Basis::Stokes);
         observation.stations = ["A", "B"].map(Station::named).to_vec();
         let frames: Vec<usize> = (0..2000).collect();
-        let row = |k: &usize| Row {
-            time_h: *k as f64,
-            integration_s: 1.0,
-            stations: [0, 1],
-            uv: [1e9, 0.0],
-            products: [Complex64::new(1.0, 0.0); 4],
-            noise_sigma: [1e-9, f64::NAN, f64::NAN, f64::NAN],
-            opacity: [0.0; 2],
-            channel: 0,
-        };
+        let i = Measured { visibility: Complex64::new(1.0, 0.0), noise_sigma: 1e-9 };
+        let row = |k: &usize| Row::total_intensity(*k as f64, [0, 1], [1e9, 0.0], i);
         observation.rows = frames.iter().map(row).collect();
         let gains = Some(GainPriors { free_phases: false, amplitude_sigma: vec![0.3; 2] });
         let visibilities = Some((observation, frames));
@@ -119,8 +111,7 @@ mod tests {
         let (pixels, frames, sigma) = (256, 400, 0.02);
         let movie = Some(Frames::of(vec![0.0; frames * pixels], pixels));
         let data = FitData { movie, ..FitData::default() };
-        let loss =
-            |data| Loss { data, weight: 1.0, sigma: Some(sigma), stokes: None, least_snr: None };
+        let loss = |data| Loss { sigma: Some(sigma), ..Loss::new(data) };
         let scatter = |losses: &[Loss]| {
             let movie = data.perturbed(losses, 1.5, 7).unwrap().movie.unwrap();
             let fluxes = movie.sums().unwrap();

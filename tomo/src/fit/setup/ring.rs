@@ -84,32 +84,17 @@ fn shape(ring: &Ring, screen: &Screen) -> Result<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::settings::WidthOf;
-
-    fn screen() -> Screen {
-        let (pixels, width, width_of) = (41, 20.0, WidthOf::Centers);
-        Screen {
-            pixels,
-            width,
-            width_of,
-            field_uas: None,
-            ring_rays: None,
-            samples_per_pixel: None,
-            jy_per_pixel: 1.0,
-            pulse: Default::default(),
-        }
-    }
-
-    fn ring() -> Ring {
-        let (radius, sigma, flux_jy) = (5.0, 1.0, 1.0);
-        let (q_jy, u_jy, asymmetry, brightest_deg) = (0.0, 0.0, 0.5, 90.0);
-        Ring { radius, sigma, flux_jy, q_jy, u_jy, asymmetry, brightest_deg }
-    }
+    use crate::fit::settings::{Hole, Kind, WidthOf};
 
     /// East is on the left of an image, north at its top.
     #[test]
     fn exact_rings_are_brightest_where_they_should_be() {
-        let shape = shape(&ring(), &screen()).unwrap();
+        let plain = FitFile::new(Hole::new(0.0), 30.0, [3.0, 9.0], Kind::LinearGrid).screen;
+        let screen = Screen { pixels: 41, width: 20.0, width_of: WidthOf::Centers, ..plain };
+        let (radius, sigma, flux_jy) = (5.0, 1.0, 1.0);
+        let (q_jy, u_jy, asymmetry, brightest_deg) = (0.0, 0.0, 0.5, 90.0);
+        let ring = Ring { radius, sigma, flux_jy, q_jy, u_jy, asymmetry, brightest_deg };
+        let shape = shape(&ring, &screen).unwrap();
         let pixel = |row: usize, column: usize| shape[row * 41 + column];
         // Rows and columns 10 and 30 are 5 M from the middle.
         assert!((pixel(20, 10) - 1.5).abs() < 1e-12 && (pixel(20, 30) - 0.5).abs() < 1e-12);
