@@ -34,10 +34,9 @@ impl Problem {
     /// # Errors
     /// If settings are missing, out of range or contradict each other.
     pub fn simulated(settings: FitFile, array: Option<&Array>) -> Result<Self, Error> {
-        let measure = |settings: &FitFile, instrument: &Instrument| {
+        Self::new(settings, Registry::new(), |settings, instrument| {
             FitData::simulated(settings, instrument, array)
-        };
-        Self::new(settings, Registry::new(), measure)
+        })
     }
 
     /// Takes measured visibilities, whose preparation `settings.data` describes.
@@ -45,10 +44,9 @@ impl Problem {
     /// # Errors
     /// As [`Problem::simulated`], and if visibilities lack errors, mass or distance.
     pub fn of_visibilities(settings: FitFile, observation: Observation) -> Result<Self, Error> {
-        let measure = |settings: &FitFile, _: &Instrument| {
+        Self::new(settings, Registry::new(), |settings, _| {
             FitData::of_visibilities(settings, observation, "the observation")
-        };
-        Self::new(settings, Registry::new(), measure)
+        })
     }
 
     /// Takes images in Jy/pixel, rows from the top.
@@ -56,13 +54,12 @@ impl Problem {
     /// # Errors
     /// As [`Problem::simulated`], and if there are other pixels than the settings say, on another field of the sky.
     pub fn of_movie(settings: FitFile, movie: Movie) -> Result<Self, Error> {
-        let measure = |settings: &FitFile, _: &Instrument| {
+        Self::new(settings, Registry::new(), |settings, _| {
             let Movie { grid, pixels } = movie;
             check_grid(settings, grid, pixels.len())?;
             let frames = kerrlight_common::frames::Frames::of(pixels, grid.pixels());
             FitData::of_movie(settings, frames, [grid.width, grid.height], "the movie")
-        };
-        Self::new(settings, Registry::new(), measure)
+        })
     }
 
     /// Takes the light curve of an unresolved source, which `settings.data` describes.
@@ -70,10 +67,9 @@ impl Problem {
     /// # Errors
     /// As [`Problem::simulated`], and if a Stokes parameter or an error is missing.
     pub fn of_light_curve(settings: FitFile, curve: LightCurve) -> Result<Self, Error> {
-        let measure = |settings: &FitFile, _: &Instrument| {
+        Self::new(settings, Registry::new(), |settings, _| {
             FitData::of_light_curve(settings, curve, "the light curve")
-        };
-        Self::new(settings, Registry::new(), measure)
+        })
     }
 
     /// Checks settings, traces rays and takes the data that `measure` makes.
