@@ -145,9 +145,7 @@ impl<T: Float + Default> GeometryProblem<'_, T> {
             }
         }
     }
-}
 
-impl<T: Float + Default> GeometryProblem<'_, T> {
     /// The value of a geometry that is solved for, or was by an earlier search.
     fn recalled(&self, geometry: Geometry) -> Result<f64, Error> {
         let free: Vec<_> = self.free.iter().map(|free| free.parameter.name()).collect();

@@ -152,9 +152,7 @@ impl FitData {
         let transform = self.transform(&part, sky)?;
         Ok(Some(Scan { transform, term }))
     }
-}
 
-impl FitData {
     /// Returns the transform from an image of the sky to the visibilities of a frame's rows that have
     /// Stokes I.
     pub(super) fn transform<T: Float>(

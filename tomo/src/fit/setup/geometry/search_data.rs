@@ -142,9 +142,7 @@ impl SearchData {
             },
         })
     }
-}
 
-impl SearchData {
     /// Does something with data that change smoothly with the geometry. Single rays meet the narrow images near the critical
     /// curve or miss them: images of such rays are compared without the pixels that are nearer than [`BESIDE_THE_RING`] to the
     /// critical curve of a geometry near by. Other data, emission that changes, and a geometry that is known are compared as they
