@@ -59,7 +59,7 @@ struct Log {
     best: Option<Estimate>,
 }
 
-impl<T: Float + Default> GeometryProblem<'_, T> {
+impl<T: Float> GeometryProblem<'_, T> {
     /// Explores from a start to the best geometry that populations find; none if it was cancelled. The same for the same seed
     /// on any number of threads.
     ///

@@ -67,7 +67,7 @@ pub struct ModelErrors {
 /// Standard deviations of χ², √(2 N) for N data, that count as chance.
 const BY_CHANCE: f64 = 2.0;
 
-impl<T: Float + Default> GeometryProblem<'_, T> {
+impl<T: Float> GeometryProblem<'_, T> {
     /// Returns what χ²/2 becomes lower by, at least, if images change as those of the same volume do through another model: the
     /// residuals r and that change d, in units of errors, leave (r·d)²/(2 d·d) less.
     ///
@@ -122,7 +122,7 @@ impl Standing {
     ///
     /// # Errors
     /// As those of [`polish`](GeometryProblem::polish).
-    pub fn refined<T: Float + Default>(
+    pub fn refined<T: Float>(
         &self,
         kind: Refinement,
         finer: &GeometryProblem<'_, T>,

@@ -112,7 +112,7 @@ impl Reach {
     }
 }
 
-impl<T: Float + Default> GeometryProblem<'_, T> {
+impl<T: Float> GeometryProblem<'_, T> {
     /// Looks along the principal axes of a covariance, farther along those whose rise the ripples hide: these are alike at
     /// neighbouring places, and move the middle of what is seen by more than they seem to. None if the covariance is not
     /// finite.

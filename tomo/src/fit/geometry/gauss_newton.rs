@@ -57,7 +57,7 @@ impl Bowl {
     }
 }
 
-impl<T: Float + Default> GeometryProblem<'_, T> {
+impl<T: Float> GeometryProblem<'_, T> {
     /// Steps from a geometry and its volume to the best one near it.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use super::{Geometry, Parameter};
 use core::f64::consts::PI;
 use kerrlight_common::simd::Float;
 
-impl<T: Float + Default> GeometryProblem<'_, T> {
+impl<T: Float> GeometryProblem<'_, T> {
     /// The mirror solution of a geometry; none if its inclination is not free.
     pub fn mirror_solution(&self, geometry: &Geometry) -> Option<Geometry> {
         let other = |parameter: Parameter, value: f64| match parameter {

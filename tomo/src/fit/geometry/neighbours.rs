@@ -24,10 +24,7 @@ impl Surroundings<'_> {
     ///
     /// # Errors
     /// As those of [`polish`](GeometryProblem::polish).
-    pub fn look<T: Float + Default>(
-        &mut self,
-        other: &GeometryProblem<'_, T>,
-    ) -> Result<(), Error> {
+    pub fn look<T: Float>(&mut self, other: &GeometryProblem<'_, T>) -> Result<(), Error> {
         let Self { polished, reach, voxels, .. } = self;
         let to = other.voxels();
         // Responses that are carried over spare the other voxels a bowl of their own.
@@ -44,7 +41,7 @@ impl Surroundings<'_> {
 
     /// The bowl through all that was looked at; second derivatives of the data count one over `inflation`. None if it has
     /// no middle.
-    pub fn envelope<T: Float + Default>(
+    pub fn envelope<T: Float>(
         &self,
         problem: &GeometryProblem<'_, T>,
         inflation: f64,
@@ -60,7 +57,7 @@ impl Surroundings<'_> {
     }
 }
 
-impl<T: Float + Default> GeometryProblem<'_, T> {
+impl<T: Float> GeometryProblem<'_, T> {
     /// Returns the neighbours of a geometry along the rays of this problem. None if the covariance of the steps that led
     /// there is not finite.
     ///

@@ -188,7 +188,7 @@ pub struct Estimate {
     pub value: f64,
 }
 
-impl<T: Float + Default> GeometryProblem<'_, T> {
+impl<T: Float> GeometryProblem<'_, T> {
     /// Places to begin: shares of the priors by an additive recurrence in all dimensions (Roberts 2018), the first one
     /// in the middle.
     pub fn starts(&self, count: usize) -> Vec<Geometry> {

@@ -45,7 +45,7 @@ pub(super) struct Form {
     pub ripple: f64,
 }
 
-impl<T: Float + Default> GeometryProblem<'_, T> {
+impl<T: Float> GeometryProblem<'_, T> {
     /// The best volume of a geometry at a distance, or at that part of the distance which bounds leave; none if they leave
     /// next to nothing.
     pub(super) fn beside(

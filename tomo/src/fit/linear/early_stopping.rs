@@ -50,7 +50,7 @@ struct Round {
     gradient: Vec<f64>,
 }
 
-impl<T: Float + Default> LinearProblem<'_, T> {
+impl<T: Float> LinearProblem<'_, T> {
     /// The best field after some patience, from a dark field or from one that is given: iterations over all nodes, then,
     /// of convex data, many over those that shine, of which there are few, until the others have no reason to.
     ///

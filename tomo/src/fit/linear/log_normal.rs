@@ -59,7 +59,7 @@ pub(super) struct Posterior<'a, 'b, T: Float> {
     pub upper: f64,
 }
 
-impl<T: Float + Default> Posterior<'_, '_, T> {
+impl<T: Float> Posterior<'_, '_, T> {
     /// Emission at the nodes.
     pub fn emission(&self, white: &[f64]) -> Vec<f64> {
         let logarithm = self.prior.logarithm.of_white(white).into_iter();
@@ -109,7 +109,7 @@ impl Place {
     }
 }
 
-impl<T: Float + Default> LinearProblem<'_, T> {
+impl<T: Float> LinearProblem<'_, T> {
     /// The most probable field beside a log-normal prior, from its median. All threads take part; their number does not
     /// change a bit.
     ///
@@ -155,7 +155,7 @@ impl<T: Float + Default> LinearProblem<'_, T> {
     }
 }
 
-impl<T: Float + Default> Posterior<'_, '_, T> {
+impl<T: Float> Posterior<'_, '_, T> {
     /// Steps until the slope is small enough, none helps, or there have been as many as all rounds have.
     fn descend(
         &mut self,

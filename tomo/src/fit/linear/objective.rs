@@ -100,7 +100,7 @@ pub(super) struct Objective<'a, 'b, T: Float> {
     pub evaluations: usize,
 }
 
-impl<'a, 'b, T: Float + Default> Objective<'a, 'b, T> {
+impl<'a, 'b, T: Float> Objective<'a, 'b, T> {
     pub fn new(operator: &'b Operator<'a, T>, data: &'b Data<'a, T>, terms: Penalised<'b>) -> Self {
         // For products with second derivatives, which only of quadratic data are constant.
         let dark = if data.is_quadratic() { operator.dark(data) } else { None };
@@ -199,7 +199,7 @@ fn rounded<T: Float>(x: &[f64], scale: f64) -> Vec<T> {
     x.iter().map(|x| T::of(scale * x)).collect()
 }
 
-impl<T: Float + Default> Convex for Objective<'_, '_, T> {
+impl<T: Float> Convex for Objective<'_, '_, T> {
     fn value_and_gradient(&mut self, x: &[f64], gradient: &mut Vec<f64>) -> f64 {
         self.evaluations += 1;
         let (value, slopes) =

@@ -34,7 +34,7 @@ struct Scratch<T> {
     slopes: Vec<T>,
 }
 
-impl<'a, T: Float + Default> Operator<'a, T> {
+impl<'a, T: Float> Operator<'a, T> {
     fn image(&self, k: usize, x: &[T], scratch: &mut Scratch<T>) {
         self.carried(k, x, scratch);
         if let Some(quiescent) = &self.walk.model.quiescent {

@@ -40,7 +40,7 @@ pub struct LinearProblem<'a, T: Float> {
     pub change: Change,
 }
 
-impl<T: Float + Default> LinearProblem<'_, T> {
+impl<T: Float> LinearProblem<'_, T> {
     /// Returns the field at which a prior's density is highest: there a descent without a coarse problem begins.
     pub(super) fn center(&self) -> Option<Vec<f64>> {
         let inside = |x: &f64| x.clamp(0.0, self.upper);

@@ -40,7 +40,7 @@ struct Moved<T> {
     bent: Vec<Vec<T>>,
 }
 
-impl<T: Float + Default> LinearProblem<'_, T> {
+impl<T: Float> LinearProblem<'_, T> {
     /// Takes the profile at a field (values at all nodes) that is the best one or near it, with derivatives of the
     /// frames' images with respect to each number, frame after frame.
     ///
@@ -130,7 +130,7 @@ fn moved<T: Float>(
 }
 
 /// M⁻¹ b by conjugate gradients with a diagonal preconditioner, and what M times it leaves of b.
-fn solved<T: Float + Default>(
+fn solved<T: Float>(
     objective: &mut Objective<'_, '_, T>,
     b: &[f64],
     iterations: usize,

@@ -15,7 +15,7 @@ const AT_A_TIME: usize = 8;
 /// Rows that grow take so many times their bytes.
 const GROWTH: usize = 2;
 
-impl<'a, T: Float + Default> Operator<'a, T> {
+impl<'a, T: Float> Operator<'a, T> {
     /// Restricted to these nodes, with at most about `budget` bytes of rows (those of 8 frames more).
     pub fn new(walk: Walk<'a, T>, active: Active, frames: &'a [usize], budget: usize) -> Self {
         Self::within(walk, active, frames, [budget, memory::part(ROWS) as usize])

@@ -54,7 +54,7 @@ pub(super) struct Run<'a, 'p, 'w, T: Float> {
     image: Vec<f64>,
 }
 
-impl<'a, 'p, 'w, T: Float + Default> Run<'a, 'p, 'w, T> {
+impl<'a, 'p, 'w, T: Float> Run<'a, 'p, 'w, T> {
     pub fn new(
         problem: &'a LinearProblem<'p, T>,
         settings: &'a LinearSettings,

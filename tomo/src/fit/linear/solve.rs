@@ -16,7 +16,7 @@ use kerrlight_common::simd::Float;
 /// Images that are made together.
 const TOGETHER: usize = 32;
 
-impl<T: Float + Default> LinearProblem<'_, T> {
+impl<T: Float> LinearProblem<'_, T> {
     /// Solves it. All threads take part; their number does not change a bit.
     ///
     /// # Errors

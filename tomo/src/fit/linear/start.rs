@@ -13,7 +13,7 @@ use kerrlight_common::simd::Float;
 /// Newton steps to the best scale: one is enough where χ² is quadratic in it, as that of amplitudes is.
 const SCALINGS: usize = 3;
 
-impl<T: Float + Default> Run<'_, '_, '_, T> {
+impl<T: Float> Run<'_, '_, '_, T> {
     /// The least of the descents from lit fields; none if the watch wanted no more.
     pub fn lit(
         &mut self,

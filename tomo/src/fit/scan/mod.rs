@@ -114,7 +114,7 @@ struct Scanner<'a, T: Float> {
     cancelled: AtomicBool,
 }
 
-impl<'a, T: Float + Default> Scanner<'a, T> {
+impl<'a, T: Float> Scanner<'a, T> {
     fn new(problem: &'a LinearProblem<'a, T>, watch: &'a ScanWatch<'a>, expected: usize) -> Self {
         let (solved, cancelled) = (AtomicUsize::new(0), AtomicBool::new(false));
         Self { problem, watch, solved, expected, cancelled }
@@ -184,7 +184,7 @@ pub fn scan_axis(
     search(problem, settings, watch)
 }
 
-fn search<T: Float + Default>(
+fn search<T: Float>(
     problem: &LinearProblem<'_, T>,
     settings: &AxisSettings,
     watch: &ScanWatch<'_>,

@@ -8,7 +8,7 @@ use kerrlight_render::dynamics::Axis;
 /// Steps of one length.
 const MOVES: usize = 6;
 
-impl<T: Float + Default> Scanner<'_, T> {
+impl<T: Float> Scanner<'_, T> {
     /// A pattern search: six directions about the best one so far, half as far away when none is better; at the end
     /// the lowest point of the paraboloid through the last seven. None if the scan was cancelled.
     pub(super) fn refined(

@@ -138,7 +138,7 @@ struct Memory<T> {
     pulls: Vec<[T; 3]>,
 }
 
-impl<T: Float + Default> Memory<T> {
+impl<T: Float> Memory<T> {
     fn vjp(
         &mut self,
         field: Field<'_, T>,
@@ -292,7 +292,7 @@ fn share_of(share: usize, points: usize) -> Range<usize> {
     share * SHARE..share * SHARE + points
 }
 
-impl<T: Float + Default> Representation<T> for FeatureGrid {
+impl<T: Float> Representation<T> for FeatureGrid {
     fn dimension(&self) -> usize {
         3
     }

@@ -151,7 +151,7 @@ struct Memory<T> {
     cotangents: Vec<T>,
 }
 
-impl<T: Float + Default> Memory<T> {
+impl<T: Float> Memory<T> {
     fn vjp(
         &mut self,
         grid: &Grid,
@@ -203,7 +203,7 @@ impl<T: Float + Default> Memory<T> {
     }
 }
 
-impl<T: Float + Default> Representation<T> for Grid {
+impl<T: Float> Representation<T> for Grid {
     fn dimension(&self) -> usize {
         3
     }

@@ -33,7 +33,7 @@ pub struct Scatter<T> {
     starts: Vec<usize>,
 }
 
-impl<T: Float + Default> Scatter<T> {
+impl<T: Float> Scatter<T> {
     /// Room for a batch.
     pub fn contributions(&mut self, points: usize) -> &mut [Contribution<T>] {
         self.contributions.resize(points, Contribution::default());

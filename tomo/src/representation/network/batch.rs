@@ -56,7 +56,7 @@ struct Recording<T> {
     tiles: Vec<Vec<Activations<T>>>,
 }
 
-impl<T: Float + Default> Recording<T> {
+impl<T: Float> Recording<T> {
     /// Makes room for the tiles of so many chunks, as far as memory may be taken.
     fn prepare(&mut self, network: &Network, cuts: &Cuts<'_>) {
         let all = cuts.points.div_ceil(cuts.chunks).div_ceil(POINTS);
@@ -72,7 +72,7 @@ impl<T: Float + Default> Recording<T> {
     }
 }
 
-impl<T: Float + Default> Memory<T> {
+impl<T: Float> Memory<T> {
     /// Runs a batch; `groups` are tied to the points as in `eval_vjp`, or empty.
     pub fn run(
         &mut self,
@@ -157,7 +157,7 @@ fn check<T>(
 }
 
 /// sums += all partial sums, each number in the order of the chunks.
-fn add_up<T: Float + Default>(partial: &[Lines<T>], sums: &mut [T]) {
+fn add_up<T: Float>(partial: &[Lines<T>], sums: &mut [T]) {
     sums.par_chunks_mut(SUMMED).enumerate().for_each(|(k, sums)| {
         for partial in partial {
             let partial = &partial.read()[k * SUMMED..];
@@ -240,7 +240,7 @@ struct Batch<'a, T> {
     cuts: &'a Cuts<'a>,
 }
 
-impl<T: Float + Default> Batch<'_, T> {
+impl<T: Float> Batch<'_, T> {
     fn split(&self, job: Job<'_, T>) {
         if job.chunks.len() == 1 {
             return self.chunk(job);

@@ -78,7 +78,7 @@ impl Network {
     }
 }
 
-impl<T: Float + Default> Representation<T> for Network {
+impl<T: Float> Representation<T> for Network {
     fn dimension(&self) -> usize {
         self.settings.dimension
     }

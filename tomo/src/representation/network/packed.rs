@@ -24,7 +24,7 @@ struct Panels<T> {
     encoded: Lines<T>,
 }
 
-impl<T: Float + Default> Packed<T> {
+impl<T: Float> Packed<T> {
     /// Packs what a forward pass needs; what the way back needs if `backward`, as far as the
     /// coordinates if `coordinates`.
     pub fn pack(&mut self, network: &Network, parameters: &[T], backward: bool, coordinates: bool) {
@@ -77,7 +77,7 @@ impl<T: Float + Default> Packed<T> {
     }
 }
 
-fn transpose<T: Float + Default>(kernel: &[T], outputs: usize, width: usize, to: &mut Lines<T>) {
+fn transpose<T: Float>(kernel: &[T], outputs: usize, width: usize, to: &mut Lines<T>) {
     let inputs = kernel.len() / outputs;
     to.resize(inputs.div_ceil(width) * width * outputs);
     pack_transposed(kernel, outputs, width, to.all());

@@ -42,7 +42,7 @@ pub struct Tile<T> {
     output: Lines<T>,
 }
 
-impl<T: Float + Default> Activations<T> {
+impl<T: Float> Activations<T> {
     /// Makes room for `points`.
     pub fn resize(&mut self, network: &Network, points: usize) {
         let points = points.next_multiple_of(BLOCK);
@@ -96,7 +96,7 @@ impl<T: Float + Default> Activations<T> {
     }
 }
 
-impl<T: Float + Default> Tile<T> {
+impl<T: Float> Tile<T> {
     /// Makes room for `points`; of a forward pass alone, or both ways.
     pub fn resize(&mut self, network: &Network, points: usize, backward: bool) {
         self.passed.resize(network, points);
@@ -233,7 +233,7 @@ impl<T: Float + Default> Tile<T> {
     }
 }
 
-fn matrix<T: Float + Default>(lines: &Lines<T>, rows: Rows) -> Matrix<'_, T> {
+fn matrix<T: Float>(lines: &Lines<T>, rows: Rows) -> Matrix<'_, T> {
     Matrix { numbers: lines.read(), stride: rows.stride }
 }
 

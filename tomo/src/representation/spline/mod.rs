@@ -140,7 +140,7 @@ impl Spline {
     }
 }
 
-impl<T: Float + Default> Representation<T> for Spline {
+impl<T: Float> Representation<T> for Spline {
     fn dimension(&self) -> usize {
         3
     }
