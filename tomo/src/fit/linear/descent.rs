@@ -101,10 +101,6 @@ impl<'a, 'b> Descent<'a, 'b> {
         Parts { free, leaving }
     }
 
-    fn look(&mut self) {
-        self.value = self.problem.value_and_gradient(&self.y, &mut self.gradient);
-    }
-
     fn steps(&mut self, stop: Stop) -> Ending {
         let (mut pairs, mut lately) = (Pairs::default(), RecentValues(VecDeque::new()));
         let enough = stop.tolerance * self.violation();
@@ -178,7 +174,7 @@ impl<'a, 'b> Descent<'a, 'b> {
             self.y.clone_from(&from);
             add(&mut self.y, -step, direction);
             self.problem.project(&mut self.y);
-            self.look();
+            self.value = self.problem.value_and_gradient(&self.y, &mut self.gradient);
             if self.value < before {
                 return true;
             }

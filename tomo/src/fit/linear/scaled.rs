@@ -46,20 +46,12 @@ impl<'a> Scaled<'a> {
         }
     }
 
-    fn divide(&self, gradient: &mut [f64]) {
-        gradient.iter_mut().zip(&self.root).for_each(|(g, root)| *g /= root);
-    }
-
     pub fn value_and_gradient(&mut self, y: &[f64], gradient: &mut Vec<f64>) -> f64 {
-        self.fill(y);
-        let value = self.inner.value_and_gradient(&self.unscaled, gradient);
-        self.divide(gradient);
-        value
-    }
-
-    fn fill(&mut self, y: &[f64]) {
         self.unscaled.clear();
         self.unscaled.extend(y.iter().zip(&self.root).map(|(y, root)| y / root));
+        let value = self.inner.value_and_gradient(&self.unscaled, gradient);
+        gradient.iter_mut().zip(&self.root).for_each(|(g, root)| *g /= root);
+        value
     }
 }
 

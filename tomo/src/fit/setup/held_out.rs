@@ -2,7 +2,7 @@
 
 use super::Result;
 use super::change::change;
-use super::linear_problem::{Of, misfit, solve_frames};
+use super::linear_problem::{Of, solve_frames};
 use crate::fit::Objective;
 use crate::fit::journal::{self, Journal};
 use crate::fit::linear::{Ending, LinearProgress, Watch};
@@ -118,10 +118,10 @@ fn loss(of: &Of<'_>, [kept, out]: &[Vec<usize>; 2], watch: &mut Watch<'_>) -> Re
     }
     // Beside a Gaussian prior of the voxels it is a mean over all data already.
     let prior = of.file.linear.as_ref().and_then(|linear| linear.prior_of(FieldKind::Gaussian));
-    let has_prior = prior.is_some();
     let weights: f64 = of.file.loss.iter().map(|loss| loss.weight).sum();
-    let whole = if has_prior { 1.0 } else { weights };
-    misfit(of, out, &solution.parameters()).map(|sum| Some(sum / whole))
+    let whole = if prior.is_some() { 1.0 } else { weights };
+    let sum = of.with(out, |problem| problem.misfit(&solution.parameters()))?;
+    Ok(Some(sum / whole))
 }
 
 #[cfg(test)]

@@ -54,7 +54,11 @@ impl FitData {
         [width, height]: [usize; 2],
         name: &str,
     ) -> Result<Self> {
-        let (times, n) = (times_of_images(file, movie.count())?, file.screen.pixels);
+        let Some(DataFiles::Movie { from, to, .. }) = file.data else {
+            refuse!("images are read, and there is no [data.movie]")
+        };
+        let times = even_times("data.movie", movie.count(), [from, to])?;
+        let n = file.screen.pixels;
         if [width, height] != [n, n] {
             refuse!("{name} has {width} x {height} pixels, but screen.pixels says {n} x {n}");
         }
@@ -220,14 +224,6 @@ impl Reduction {
         }
         Ok(())
     }
-}
-
-/// Times of images that are read, M.
-fn times_of_images(file: &FitFile, frames: usize) -> Result<Vec<f64>> {
-    let Some(DataFiles::Movie { from, to, .. }) = file.data else {
-        refuse!("images are read, and there is no [data.movie]")
-    };
-    even_times("data.movie", frames, [from, to])
 }
 
 /// Times of frames at equal steps, M; `key` is the table that says the first and the last.

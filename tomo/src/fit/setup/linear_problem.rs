@@ -118,11 +118,6 @@ impl Of<'_> {
     }
 }
 
-/// The loss of some frames in a field, without penalties.
-pub(super) fn misfit(of: &Of<'_>, frames: &[usize], emission: &[f32]) -> Result<f64> {
-    of.with(frames, |problem| problem.misfit(emission))
-}
-
 /// Iterations of each round: a start has its own if it says so.
 fn iterations(file: &FitFile, settings: &Linear) -> usize {
     match file.training.start {

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::fit::geometry::{Free, Geometry, ModelError, ModelErrors, Parameter, Span, Spread};
 use crate::fit::settings::{FitFile, Region, UnknownGeometry};
-use crate::fit::setup::{self, FitData, FoundGeometry, RaySampling, Resolution, Trial};
+use crate::fit::setup::{self, FoundGeometry, RaySampling, Resolution, Trial};
 use crate::null::or_nan;
 use crate::recovery::{Problem, settled};
 use serde::{Deserialize, Serialize};
@@ -119,7 +119,7 @@ impl GeometryResults {
         let spread = found.spread.as_ref();
         let sigma = |k: usize| spread.map(|spread| spread.sigma[k]);
         let trials = trials(free, &found.trials, found.noise_factor, &sigma);
-        let truth = true_geometry(settings, measured)?;
+        let truth = measured.truth.as_ref().map(|_| setup::true_geometry(settings)).transpose()?;
         let interval = |span: Span| {
             each(free, |k, parameter| {
                 let ends = free[k].interval(found.geometry.get(parameter), sigma(k), span);
@@ -229,11 +229,6 @@ fn flow_error(file: &FitFile, trials: [&Geometry; 2]) -> Result<Option<f64>, Err
     let error = (away / all).sqrt();
     // No true velocity, no relative error.
     Ok(error.is_finite().then_some(error))
-}
-
-/// The geometry of a simulation.
-fn true_geometry(file: &FitFile, measured: &FitData) -> Result<Option<Geometry>, Error> {
-    measured.truth.as_ref().map(|_| setup::true_geometry(file)).transpose()
 }
 
 /// Returns the errors of each free parameter by the model itself, part by part, in its unit: at most what is known of it before

@@ -197,11 +197,9 @@ impl<'a> Cuts<'a> {
             return point;
         }
         // Empty groups behind the last point belong to the last chunk: the link gets every group.
-        if chunk == self.chunks { self.groups.len() - 1 } else { self.group_from(point) }
-    }
-
-    /// The first group that starts at `point` or later.
-    fn group_from(&self, point: usize) -> usize {
+        if chunk == self.chunks {
+            return self.groups.len() - 1;
+        }
         self.groups.partition_point(|start| *start < point)
     }
 

@@ -82,16 +82,14 @@ impl Modes {
         Self { axes: [0, 1, 2].map(axis) }
     }
 
-    /// One number for each wave, z fastest, from its numbers along the axes.
-    fn each(&self, of: impl Fn([usize; 3]) -> f64) -> Vec<f64> {
-        let [nx, ny, nz] = [0, 1, 2].map(|k| self.axes[k].count);
-        let wave = |k: usize| of([k / (ny * nz), k / nz % ny, k % nz]);
-        (0..nx * ny * nz).map(wave).collect()
-    }
-
-    /// −Δ of each wave, per M².
+    /// −Δ of each wave, per M², z fastest.
     pub fn bends(&self) -> Vec<f64> {
-        self.each(|at| (0..3).map(|c| self.axes[c].bends[at[c]]).sum())
+        let [nx, ny, nz] = [0, 1, 2].map(|k| self.axes[k].count);
+        let bend = |k: usize| {
+            let at = [k / (ny * nz), k / nz % ny, k % nz];
+            (0..3).map(|c| self.axes[c].bends[at[c]]).sum::<f64>()
+        };
+        (0..nx * ny * nz).map(bend).collect()
     }
 
     /// Mean square over all points of the B-splines about the nodes over that of the nodes themselves, far from edges, of a

@@ -37,7 +37,11 @@ impl Detail<'_> {
             return self.steps(place, trials, watch);
         }
         let found = self.through(&place, |problem| match is_convex {
-            true => populated(problem, anchor.geometry, how, watch),
+            // By a population of geometries about the best end of the coarse searches.
+            true => {
+                let explored = quick(problem).explore(anchor.geometry, None, how, watch)?;
+                explored.map(|explored| valued(problem, &explored)).transpose()
+            }
             false => {
                 let looks = Looks { resampled: None, shares_rays: self.shares_rays(&place) };
                 about_volumes(&place.seen, looks, problem, anchor, how, watch)
@@ -112,18 +116,7 @@ impl Detail<'_> {
     }
 }
 
-/// The search about the best end of the coarse ones by a population of geometries, and how sure it is.
-fn populated(
-    problem: &GeometryProblem<'_, f32>,
-    start: Geometry,
-    how: &Exploration,
-    watch: &mut TrialWatch<'_>,
-) -> Result<Option<Sure>> {
-    let explored = quick(problem).explore(start, None, how, watch)?;
-    explored.map(|explored| valued(problem, &explored)).transpose()
-}
-
-/// The same where data are convex about a volume only.
+/// The search about the best end of the coarse ones, and how sure it is, where data are convex about a volume only.
 fn about_volumes(
     seen: &SearchData,
     looks: Looks<'_>,
