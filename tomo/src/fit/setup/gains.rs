@@ -32,14 +32,13 @@ pub(super) fn priors(
              them"
         ),
     }
-    let names: Vec<String> = observation.stations.iter().map(|s| s.name.clone()).collect();
     // A station without Stokes I has no part in losses of total intensity.
     let observing = match is_polarized(losses) {
         true => observing(observation),
         false => observing(&observation.total_intensity()),
     };
-    let kept = names.iter().zip(&observing).filter(|(_, observes)| **observes);
-    let kept: Vec<String> = kept.map(|(name, _)| name.clone()).collect();
+    let kept = observation.stations.iter().zip(&observing).filter(|(_, observes)| **observes);
+    let kept: Vec<String> = kept.map(|(station, _)| station.name.clone()).collect();
     let some = settings.priors(&kept)?;
     let mut sigma = some.amplitude_sigma.iter();
     // Stations that do not observe have no gains.
