@@ -1,7 +1,6 @@
 //! The view of matter whose emission appears while it is seen.
 
 use super::*;
-use crate::fit::linear::LinearProblem;
 use crate::representation::{Allowed, Knots};
 
 /// Two spots, one of which begins to shine half-way: the inclination is found where births are allowed. Without them no view
@@ -44,12 +43,8 @@ fn exact_inclination_is_found_beside_births() {
     let images: f64 = linear.misfit(&x).unwrap() / count;
     let left = problem.left(&best).unwrap();
     assert!((left - images).abs() < 1e-6 * images, "{left} {images}");
-    let cost = linear.change.penalty(&best.x, cell(&linear), 1.0, &[], &mut vec![0.0; x.len()]);
+    let cell = linear.voxels.shape().cell();
+    let cost = linear.change.penalty(&best.x, cell, 1.0, &[], &mut vec![0.0; x.len()]);
     let whole = problem.reduced(best.chi2);
     assert!((whole - left - cost / count).abs() < 1e-3 * whole && cost > 0.01 * best.chi2);
-}
-
-/// Volume of a cell, M³.
-fn cell(problem: &LinearProblem<'_, f32>) -> f64 {
-    problem.voxels.shape().spacing.iter().product()
 }

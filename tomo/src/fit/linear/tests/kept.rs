@@ -79,14 +79,13 @@ fn exact_room_does_not_decide_what_is_walked() {
     let model = forward_model();
     let voxels = Voxels::cube(6, 5.0, Degree::Linear);
     let frames: Vec<usize> = FRAMES.iter().copied().cycle().take(40).collect();
-    let walked = |room, budget| {
+    let within = |room, budget| {
         let active = Active::new(&vec![true; voxels.count()], &voxels.corners(), 0);
         let walk = Walk::new(&model, axis(), voxels, Knots::STEADY);
-        counts(&Operator::within(walk, active, &frames, [budget, room]))
+        Operator::within(walk, active, &frames, [budget, room])
     };
-    let active = Active::new(&vec![true; voxels.count()], &voxels.corners(), 0);
-    let walk = Walk::new(&model, axis(), voxels, Knots::STEADY);
-    let all = Operator::new(walk, active, &frames, usize::MAX).bytes();
+    let all = within(usize::MAX, usize::MAX).bytes();
+    let walked = |room, budget| counts(&within(room, budget));
     assert_eq!(walked(usize::MAX, all / 2), [24, 0, 16]);
     assert_eq!(walked(0, all / 2), [0, 24, 16]);
     let [kept, made, none] = walked(all / 4, all / 2);
