@@ -13,7 +13,7 @@ use crate::fit::{BatchSize, ChangePrice, OccupancySettings, Region, Training, Wi
 use crate::optimise::{LinearDecay, Muon};
 use crate::representation::{
     Activation, Carrier, Changing, Degree, FeatureGrid, FeatureGridSettings, Grid, GridSettings,
-    Knots, Network, NetworkSettings, OwnSettings, Registry, Representation,
+    Network, NetworkSettings, OwnSettings, Registry, Representation,
 };
 use kerrlight_common::memory;
 
@@ -47,7 +47,12 @@ fn over_time(
         return Ok(inner);
     }
     if file.representation.kind == Kind::Bhnerf {
-        return Ok(Box::new(changing_network(file, knots)?));
+        let paper = NetworkSettings::changing([knots.spacing, knots.last() - knots.first]);
+        // Whatever `representation.network.time_scale` is.
+        let time_scale = paper.time_scale;
+        let chosen = chosen_network(&file.representation, paper);
+        let network = Network::new(NetworkSettings { time_scale, ..chosen });
+        return Ok(Box::new(network.within("representation")?));
     }
     let (count, each) = (knots.count, inner.parameters());
     let what = || format!("change.spacing: {count} times of {each} parameters");
@@ -57,14 +62,6 @@ fn over_time(
         _ => None,
     };
     Ok(Box::new(Changing::new(inner, knots, carrier)?))
-}
-
-/// A network of place and time, whatever `representation.network.time_scale` is.
-fn changing_network(file: &FitFile, knots: Knots) -> Result<Network> {
-    let paper = NetworkSettings::changing([knots.spacing, knots.last() - knots.first]);
-    let time_scale = paper.time_scale;
-    let settings = NetworkSettings { time_scale, ..chosen_network(&file.representation, paper) };
-    Network::new(settings).within("representation")
 }
 
 /// The motion that carries voxels, whose births are given at places of several times.

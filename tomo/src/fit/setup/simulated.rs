@@ -30,7 +30,11 @@ impl FitData {
         if simulated == *file {
             return simulate(file, file, instrument, array, None);
         }
-        let seen = if is_drawn(file) { densely(&simulated) } else { simulated.clone() };
+        let mut seen = simulated.clone();
+        if is_drawn(file) {
+            let rays = &mut seen.screen.ring_rays;
+            *rays = rays.map(|rays| (DENSER * rays).min(MOST_RAYS));
+        }
         let instrument = Instrument::new(&seen).within("simulation")?;
         simulate(&simulated, file, &instrument, array, None)
     }
@@ -142,13 +146,6 @@ fn times_of_images(file: &FitFile) -> Result<Vec<f64>> {
 const DENSER: usize = 16;
 /// Largest number of rays of a pixel.
 const MOST_RAYS: usize = 1024;
-
-/// Settings with more rays near the critical curve than a fit has.
-fn densely(file: &FitFile) -> FitFile {
-    let mut dense = file.clone();
-    dense.screen.ring_rays = dense.screen.ring_rays.map(|rays| (DENSER * rays).min(MOST_RAYS));
-    dense
-}
 
 /// Returns the shape of the pixels of a simulation in its visibilities.
 fn pulse(fit: &FitFile) -> Pulse {
