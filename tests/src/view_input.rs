@@ -104,7 +104,9 @@ fn exact_saved_pictures_are_the_view() {
     let bytes = saved(&mut browser, files.path(), "exr", "kerrlight.exr");
     let (picture, _) = exr::decode(&bytes).unwrap();
     let light = measured(&mut browser, "recovered", [saved_png.width(), saved_png.height()]);
-    let expected: Vec<f32> = light.chunks(4).map(|pixel| pixel[3] as f32).collect();
-    assert_eq!(picture.channel("intensity").unwrap(), expected);
+    for (k, name) in ["R", "G", "B", "intensity"].into_iter().enumerate() {
+        let expected: Vec<f32> = light.chunks(4).map(|pixel| pixel[k] as f32).collect();
+        assert_eq!(picture.channel(name).unwrap(), expected, "{name}");
+    }
     assert!(browser.problems().is_empty(), "{:?}", browser.problems());
 }
