@@ -1,22 +1,12 @@
 //! Fits that are resumed: with the data, settings and state they had, alone, or not at all.
 
-use crate::fit::{results, small, with};
+use crate::fit::{results, with};
+use crate::fit_bad_luck::movie;
 use crate::support::{
-    are_the_same, fail, fail_with, holds, kerrlight, kill, killed, replaced, root, sets, start,
-    succeed, told, until,
+    are_the_same, fail, fail_with, holds, kerrlight, kill, killed, root, sets, start, succeed,
+    told, until,
 };
 use std::path::Path;
-
-/// A fit of a movie that a simulation has left, stopped after its first checkpoint: its words and its folder `run`.
-fn of_a_movie(at: &Path) {
-    succeed(at, &with(&small(), &["-o", "source", "--set", "training.steps=5"]));
-    let text = std::fs::read_to_string(at.join("source/fit.toml")).unwrap();
-    // Its paths are this file's own: not those of the run, which the first line names.
-    let (_, text) = text.split_once('\n').unwrap();
-    let data = "[data.movie]\npath = \"movie.csv\"\nfrom = 0.0\nto = 0.0\n\n";
-    let text = replaced(text, "[simulation", "[[loss]]", data);
-    std::fs::write(at.join("movie.toml"), text).unwrap();
-}
 
 /// An array of telescopes as a file, and the words of a fit of what it sees.
 fn of_an_array(at: &Path) -> Vec<&'static str> {
@@ -115,28 +105,26 @@ fn exact_changed_inputs_and_damaged_state_are_refused() {
 fn exact_a_changed_movie_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    of_a_movie(at);
-    let n = 20;
-    let row = (0..n).map(|k| format!("{}", k % 3)).collect::<Vec<_>>().join(",");
-    let image = format!("{row}\n").repeat(n);
-    std::fs::write(at.join("movie.csv"), &image).unwrap();
+    let mut words = movie(at, "0.5");
+    words[1] = "changed.toml".to_owned();
+    let path = at.join("frame.csv");
+    let image = std::fs::read_to_string(&path).unwrap();
     std::fs::create_dir(at.join("run")).unwrap();
     let help = succeed(at, &["fit", "--help"]);
     assert!(help.contains("new or empty"), "{help}");
-    let words = ["fit", "movie.toml", "-o", "run", "--set", "training.batch={pixels=100}"];
-    succeed(at, &words);
-    std::fs::write(at.join("movie.csv"), image.replacen('1', "7", 1)).unwrap();
+    succeed(at, &with(&words, &["-o", "run", "--set", "training.steps=5"]));
+    std::fs::write(&path, image.replacen("0.5", "0.7", 1)).unwrap();
     let message = refused(at);
-    assert!(message.contains("movie.csv has changed since run was begun"), "{message}");
-    std::fs::remove_file(at.join("movie.csv")).unwrap();
-    assert!(refused(at).contains("movie.csv"));
-    std::fs::write(at.join("movie.csv"), &image).unwrap();
+    assert!(message.contains("frame.csv has changed since run was begun"), "{message}");
+    std::fs::remove_file(&path).unwrap();
+    assert!(refused(at).contains("frame.csv"));
+    std::fs::write(&path, &image).unwrap();
     succeed(at, &["fit", "--resume", "run"]);
     // The same words in another folder name another movie.
     let text = std::fs::read_to_string(at.join("run/fit.toml")).unwrap();
     let (_, text) = text.split_once('\n').unwrap();
     std::fs::create_dir(at.join("other")).unwrap();
-    std::fs::write(at.join("other/movie.csv"), image.replacen('1', "7", 1)).unwrap();
+    std::fs::write(at.join("other/frame.csv"), image.replacen("0.5", "0.7", 1)).unwrap();
     for name in ["again.toml", "other/again.toml"] {
         std::fs::write(at.join(name), text).unwrap();
     }
