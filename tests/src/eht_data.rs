@@ -9,6 +9,14 @@ use kerrlight_vlbi::products::{ClosureCount, ClosureKind};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+/// M87*, 2017 April 10: Stokes I.
+pub const M87: &str = "SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits";
+/// Sgr A*, 2017 April 7: Stokes I.
+pub const SGRA: &str = "ER6_SGRA_2017_097_hi_hops_netcal-LMTcal-besttime_StokesI.uvfits";
+/// The same night with all four products.
+pub const SGRA_POLARIZED: &str =
+    "ER6_SGRA_2017_097_hi_hops_netcal_LMTcal_10s_ALMArot_dtermcal.uvfits";
+
 /// Where public files are looked for.
 fn folder() -> PathBuf {
     std::env::var_os("KERRLIGHT_EHT_DATA")
@@ -153,7 +161,7 @@ fn exact_eht_files_survive_a_round_trip() {
 /// within a site.
 #[test]
 fn code_ehtim_averages_keep_closures() {
-    let Some(path) = data("SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits") else { return };
+    let Some(path) = data(M87) else { return };
     let data = decode(&path).1;
     let clock = Averaging::over(300.0);
     let scans = Averaging { seconds: f64::INFINITY, in_scans: true, weighted: true };

@@ -1,7 +1,7 @@
 //! Static images of known skies, through the coverage and the errors of a real night, with the settings that `kerrlight fit --data`
 //! assumes.
 
-use crate::eht_data::data;
+use crate::eht_data::{M87, data};
 use crate::fit::results;
 use crate::fit_start::array;
 use crate::support::{even, succeed, within};
@@ -15,9 +15,8 @@ use kerrlight_vlbi::simulate::{Movie, fill};
 use serde_json::Value;
 use std::f64::consts::PI;
 use std::path::Path;
+use tempfile::TempDir;
 
-/// Night of M87* whose stations, times and errors are taken.
-const NIGHT: &str = "SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits";
 /// Side of a simulated sky, µas and pixels.
 const FIELD_UAS: f64 = 160.0;
 const SIDE: usize = 160;
@@ -176,6 +175,26 @@ fn pull(found: &Value, key: &str, truth: f64, period: Option<f64>) -> Option<f64
     Some(apart / found[format!("{key}_error")].as_f64()?)
 }
 
+/// The fit of a sky in a folder, and the true gains.
+fn fitted(sky: &Sky, night: &Path, seed: u64) -> (TempDir, Value, GainTable) {
+    let folder = tempfile::tempdir().unwrap();
+    let gains = observe(sky, night, seed, &folder.path().join("sky.uvfits"));
+    let words = ["fit", "--data", "sky.uvfits", "--model", "image", "-o", "run"];
+    succeed(folder.path(), &words);
+    let found = results(&folder.path().join("run"));
+    (folder, found, gains)
+}
+
+/// Distances of the flux, and of diameter and angle of the ring.
+fn pulls(found: &Value, sky: &Sky) -> (f64, [Option<f64>; 2]) {
+    let number = |key: &str| found[key].as_f64().unwrap();
+    let flux = (number("flux_jy") - sky.flux) / number("flux_error_jy");
+    let diameter = sky.ring.and_then(|(d, _)| pull(found, "ring_diameter_uas", d, None));
+    let angle =
+        sky.ring.and_then(|(_, angle)| pull(found, "ring_position_angle_deg", angle?, Some(360.0)));
+    (flux, [diameter, angle])
+}
+
 fn told(value: Option<f64>) -> String {
     value.map_or_else(|| "-".to_owned(), |value| format!("{value:.2}"))
 }
@@ -183,7 +202,7 @@ fn told(value: Option<f64>) -> String {
 #[test]
 #[ignore = "an hour"]
 fn exact_known_skies_through_a_real_night() {
-    let Some(night) = data(NIGHT) else { return };
+    let Some(night) = data(M87) else { return };
     let chosen = std::env::var("KERRLIGHT_SKIES").unwrap_or_default();
     let seeds = if chosen.is_empty() { 4 } else { 2 };
     let mut wrong = Vec::new();
@@ -195,24 +214,13 @@ fn exact_known_skies_through_a_real_night() {
         .filter(|sky| chosen.is_empty() || chosen.split(',').any(|name| name == sky.name))
     {
         for seed in 1..=seeds {
-            let folder = tempfile::tempdir().unwrap();
-            let path = folder.path();
-            observe(sky, &night, seed, &path.join("sky.uvfits"));
-            succeed(path, &["fit", "--data", "sky.uvfits", "--model", "image", "-o", "run"]);
-            let found = results(&path.join("run"));
-            let image = array(&path.join("run/image.npz"), "recovered.npy");
-            let side = image.len().isqrt();
-            let field = array(&path.join("run/image.npz"), "field_uas.npy")[0];
+            let (folder, found, _) = fitted(sky, &night, seed);
+            let [image, field] = ["recovered.npy", "field_uas.npy"]
+                .map(|name| array(&folder.path().join("run/image.npz"), name));
+            let (side, field) = (image.len().isqrt(), field[0]);
             let alike = correlation(&image, side, field, &sky.light);
             let has_ring = found["ring_diameter_uas"].is_number();
-            let of_ring = sky.ring.and_then(|(d, _)| pull(&found, "ring_diameter_uas", d, None));
-            let angle = sky.ring.and_then(|(_, angle)| angle);
-            let of_angle =
-                angle.and_then(|angle| pull(&found, "ring_position_angle_deg", angle, Some(360.0)));
-            let flux = Some(
-                (found["flux_jy"].as_f64().unwrap() - sky.flux)
-                    / found["flux_error_jy"].as_f64().unwrap(),
-            );
+            let (of_flux, [of_ring, of_angle]) = pulls(&found, sky);
             eprintln!(
                 "{} | {seed} | {has_ring} | {alike:.3} | {}: {} ± {} ({}) | {} | {}, {} | {:.0}",
                 sky.name,
@@ -222,7 +230,7 @@ fn exact_known_skies_through_a_real_night() {
                 told(of_ring),
                 told(found["ring_width_uas"].as_f64()),
                 told(of_angle),
-                told(flux),
+                told(Some(of_flux)),
                 found["cpu_seconds"].as_f64().unwrap(),
             );
             // The light of a ring that is nearly as wide as its radius may cover the hole.
@@ -316,25 +324,16 @@ fn told_coverage(name: &str, pulls: &[f64]) -> f64 {
 #[test]
 #[ignore = "an hour"]
 fn exact_intervals_hold_on_simulated_nights() {
-    let Some(night) = data(NIGHT) else { return };
+    let Some(night) = data(M87) else { return };
     let count = std::env::var("KERRLIGHT_NIGHTS").map_or(100, |count| count.parse().unwrap());
     let [mut flux, mut diameter, mut angle, mut gains] = [const { Vec::new() }; 4];
     let mut wrong = 0;
     for (k, sky) in drawn_skies(count).iter().enumerate() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path();
-        let truth = observe(sky, &night, k as u64 + 1, &path.join("sky.uvfits"));
-        succeed(path, &["fit", "--data", "sky.uvfits", "--model", "image", "-o", "run"]);
-        let found = results(&path.join("run"));
+        let (folder, found, truth) = fitted(sky, &night, k as u64 + 1);
         let has_ring = found["ring_diameter_uas"].is_number();
         wrong += usize::from(has_ring != sky.ring.is_some());
-        let of_flux = (found["flux_jy"].as_f64().unwrap() - sky.flux)
-            / found["flux_error_jy"].as_f64().unwrap();
-        let of_diameter = sky.ring.and_then(|(d, _)| pull(&found, "ring_diameter_uas", d, None));
-        let of_angle = sky
-            .ring
-            .and_then(|(_, angle)| pull(&found, "ring_position_angle_deg", angle?, Some(360.0)));
-        let of_gains = pulls_of_gains(&path.join("run/gains.csv"), &truth);
+        let (of_flux, [of_diameter, of_angle]) = pulls(&found, sky);
+        let of_gains = pulls_of_gains(&folder.path().join("run/gains.csv"), &truth);
         let inside = of_gains.iter().filter(|pull| pull.abs() <= 1.0).count();
         eprintln!(
             "{} | {has_ring} | {:.3}: {} ± {} ({of_flux:.2}) | {}: {} ± {} ({}) | {}: {} ± {} ({}) | {inside} of {} | {:.0}",

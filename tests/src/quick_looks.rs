@@ -1,33 +1,22 @@
 //! `kerrlight compare --quick` of every experiment that the program carries.
 
 use crate::compare::cases;
-use crate::eht_data::data;
+use crate::eht_data::{M87, SGRA, SGRA_POLARIZED, data};
 use crate::fit::results;
 use crate::support::succeed;
-
-/// Q and U of a night.
-const POLARIZED: &str = "ER6_SGRA_2017_097_hi_hops_netcal_LMTcal_10s_ALMArot_dtermcal.uvfits";
 
 /// Returns the changes for an experiment with public data; none, and says so, where the data are not
 /// there.
 fn on_public_data(name: &str) -> Option<Vec<String>> {
-    let file = match name {
-        "m87-2017" => "SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits",
-        "sgra-2017" | "sgra-2017-motion" => {
-            "ER6_SGRA_2017_097_hi_hops_netcal-LMTcal-besttime_StokesI.uvfits"
-        }
-        "sgra-2017-polarization" => POLARIZED,
-        "sgra-2017-polarimetry" => {
-            let path = data(POLARIZED)?;
-            return Some(vec![
-                "--set".to_owned(),
-                format!("data.light-curve.path={}", path.display()),
-            ]);
-        }
+    let (kind, file) = match name {
+        "m87-2017" => ("visibilities", M87),
+        "sgra-2017" | "sgra-2017-motion" => ("visibilities", SGRA),
+        "sgra-2017-polarization" => ("visibilities", SGRA_POLARIZED),
+        "sgra-2017-polarimetry" => ("light-curve", SGRA_POLARIZED),
         _ => return Some(Vec::new()),
     };
     let path = data(file)?;
-    Some(vec!["--set".to_owned(), format!("data.visibilities.path={}", path.display())])
+    Some(vec!["--set".to_owned(), format!("data.{kind}.path={}", path.display())])
 }
 
 /// Experiments of what the gate looks at: holes, flows and matter that are not known.

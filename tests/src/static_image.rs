@@ -239,8 +239,7 @@ fn exact_the_experiment_of_m87_has_its_tables() {
 #[test]
 #[ignore = "long"]
 fn paper_m87_is_a_ring_of_42_microarcseconds() {
-    let name = "SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits";
-    let Some(data) = eht_data::data(name) else { return };
+    let Some(data) = eht_data::data(eht_data::M87) else { return };
     let folder = tempfile::tempdir().unwrap();
     let file = scene_path("fits/m87_image.toml");
     let path = format!("data.visibilities.path={}", data.display());
@@ -337,8 +336,7 @@ fn exact_polarisation_of_a_ring_is_found() {
 #[test]
 #[ignore = "long"]
 fn paper_sgr_a_is_polarised_by_a_quarter() {
-    let name = "ER6_SGRA_2017_097_hi_hops_netcal_LMTcal_10s_ALMArot_dtermcal.uvfits";
-    let Some(data) = eht_data::data(name) else { return };
+    let Some(data) = eht_data::data(eht_data::SGRA_POLARIZED) else { return };
     let folder = tempfile::tempdir().unwrap();
     let scene = scene_path("fits/sgra_polarized_image.toml");
     let set = format!("data.visibilities.path={}", data.display());

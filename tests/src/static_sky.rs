@@ -1,6 +1,6 @@
 //! Static fits of public EHT data.
 
-use crate::eht_data::data;
+use crate::eht_data::{M87, SGRA, data};
 use crate::fit::results;
 use crate::fit_start::array;
 use crate::support::{scene_path, succeed};
@@ -41,7 +41,7 @@ fn diameter(run: &Path) -> f64 {
 
 #[test]
 fn code_m87_is_a_ring_that_explains_all_its_data() {
-    let Some(data) = data("SR1_M87_2017_100_hi_hops_netcal_StokesI.uvfits") else { return };
+    let Some(data) = data(M87) else { return };
     let folder = tempfile::tempdir().unwrap();
     let chi2 = fitted(folder.path(), "m87_static.toml", &data);
     assert!(chi2.iter().all(|chi2| (0.9..1.3).contains(chi2)), "{chi2:?}");
@@ -51,8 +51,7 @@ fn code_m87_is_a_ring_that_explains_all_its_data() {
 
 #[test]
 fn code_sgra_is_explained_with_variability_in_its_errors() {
-    let name = "ER6_SGRA_2017_097_hi_hops_netcal-LMTcal-besttime_StokesI.uvfits";
-    let Some(data) = data(name) else { return };
+    let Some(data) = data(SGRA) else { return };
     let folder = tempfile::tempdir().unwrap();
     let chi2 = fitted(folder.path(), "sgra_static.toml", &data);
     assert!(chi2.iter().all(|chi2| (0.8..2.0).contains(chi2)), "{chi2:?}");
