@@ -229,12 +229,9 @@ fn exact_an_array_of_slurm_runs_each_case_once() {
     std::fs::write(at.join("cases.sh"), array).unwrap();
     slurm.says(at, "kerrlight compare seeds.toml -o out --list --threads 1 | cut -f 3 > commands");
     let job = slurm.says(at, "sbatch --parsable --array=1-$(wc -l < commands)%2 cases.sh");
-    let clock = Instant::now();
-    while counts_if_begun(at)[1] == 0 {
-        assert!(clock.elapsed() < Duration::from_secs(120));
-        std::thread::sleep(Duration::from_millis(100));
-    }
+    until("a case runs", || counts_if_begun(at)[1] > 0);
     slurm.says(at, &format!("scancel --full -s KILL {job}_1; scontrol requeue {job}_1 || true"));
+    let clock = Instant::now();
     while !slurm.says(at, &format!("squeue -h -j {job}")).is_empty() {
         assert!(clock.elapsed() < Duration::from_secs(500));
         std::thread::sleep(Duration::from_millis(500));
@@ -265,11 +262,10 @@ fn exact_snakemake_runs_each_case_once() {
     );
     let said = std::fs::File::create(at.join("said")).unwrap();
     let mut engine = shell(at, &script).stderr(said).stdout(Stdio::null()).spawn().unwrap();
-    let clock = Instant::now();
-    while counts_if_begun(at)[1] == 0 {
-        assert!(clock.elapsed() < Duration::from_secs(120) && engine.try_wait().unwrap().is_none());
-        std::thread::sleep(Duration::from_millis(100));
-    }
+    until("a case runs", || {
+        assert!(engine.try_wait().unwrap().is_none());
+        counts_if_begun(at)[1] > 0
+    });
     // The command line of the first case that runs, of this folder alone.
     shell(
         at,

@@ -99,7 +99,7 @@ fn exact_an_unknown_axis_is_found() {
 #[test]
 #[ignore = "long"]
 fn exact_same_bytes_after_kills_at_twenty_moments() {
-    killed(&["training.steps=200"], 20);
+    killed_fit(&small(), &["training.steps=200"], 20);
 }
 
 /// A mask that is looked at at several times, and a price that is drawn at each step.
@@ -108,11 +108,7 @@ fn exact_same_bytes_after_kills_at_twenty_moments() {
 fn exact_same_bytes_after_kills_of_emission_that_changes() {
     let change = "change={allowed=\"any\",weight=0.001,spacing=0.3}";
     let mask = "training.occupancy={cells=12,threshold=0.003,memory=0.8,warm_up=0,every=5}";
-    killed(&["training.steps=60", change, mask], 8);
-}
-
-fn killed(set: &[&str], moments: u32) {
-    killed_fit(&small(), set, moments);
+    killed_fit(&small(), &["training.steps=60", change, mask], 8);
 }
 
 /// Kills a run with these settings at that many moments at least; what goes on ends like what was never killed.
