@@ -279,11 +279,10 @@ mod tests {
     fn exact_fluxes_of_circular_feeds() {
         let (i, q, u, v) = (2.5, -0.2, 0.13, 0.01);
         let c = Complex64::new;
-        let zero = Measured { visibility: c(0.0, 0.0), noise_sigma: 0.1 };
         let row = Row {
             products: [c(i + v, 0.0), c(i - v, 0.0), c(q, u), c(q, -u)],
             noise_sigma: [0.3, 0.4, 0.6, 0.8],
-            ..Row::total_intensity(4.0, [0, 1], [1e6, 1e6], zero)
+            ..Row::empty(4.0, [0, 1], [1e6, 1e6])
         };
         let far = Row { uv: [1e9, 0.0], ..row };
         let mut observation = Observation::empty(Basis::Circular);

@@ -1,6 +1,5 @@
 //! Schedules of an array, and the baselines that then see the source.
 
-use super::Complex64;
 use super::array::{Array, ArrayError};
 use super::earth::{Frame, Moment, SourcePosition, Ut1, View, hours_utc_of_gmst};
 use super::observation::{Basis, Observation, Row};
@@ -242,16 +241,12 @@ fn scan(
     for (index, &i) in seeing.iter().enumerate() {
         for &j in &seeing[index + 1..] {
             let sefds = [i, j].map(|k| array.stations[k].sefd);
+            let uv = view.uv(positions[i], positions[j], wavelength);
             rows.push(Row {
-                time_h,
                 integration_s: setup.integration_s,
-                // An array has fewer than 2^16 stations.
-                stations: [i as u16, j as u16],
-                uv: view.uv(positions[i], positions[j], wavelength),
-                products: [Complex64::new(0.0, 0.0); 4],
                 noise_sigma: hand_sigmas(sefds[0], sefds[1], setup),
-                opacity: [0.0; 2],
-                channel: 0,
+                // An array has fewer than 2^16 stations.
+                ..Row::empty(time_h, [i as u16, j as u16], uv)
             });
         }
     }

@@ -297,8 +297,7 @@ mod tests {
     #[test]
     fn exact_all_stokes_parameters_of_a_point() {
         let grid = ImageGrid::new(1, 1, 1e-10).unwrap();
-        let i = Measured { visibility: Complex64::new(0.0, 0.0), noise_sigma: 1.0 };
-        let row = Row { noise_sigma: [1.0; 4], ..Row::total_intensity(1.0, [0, 1], [1e9, 0.0], i) };
+        let row = Row { noise_sigma: [1.0; 4], ..Row::empty(1.0, [0, 1], [1e9, 0.0]) };
         let mut observation =
             Observation { rows: vec![row], ..Observation::empty(Basis::Circular) };
         let mut see = |polarized: [Option<f64>; 3]| {

@@ -188,7 +188,7 @@ fn factors(
 mod tests {
     use super::*;
     use crate::Complex64;
-    use crate::observation::{Basis, Measured};
+    use crate::observation::Basis;
 
     /// A baseline of q wavelengths at an angle from the major axis.
     fn at(q: f64, angle_deg: f64, frequency_hz: f64) -> f64 {
@@ -295,12 +295,8 @@ mod tests {
     fn exact_scattered_products() {
         let kernel = ScatteringKernel::sgr_a();
         let products = [1.0, 2.0, -0.5, 0.25].map(|x| Complex64::new(x, 0.5 - x));
-        let i = Measured { visibility: products[0], noise_sigma: 0.1 };
-        let row = |uv| Row {
-            products,
-            noise_sigma: [0.1, 0.2, 0.3, 0.4],
-            ..Row::total_intensity(4.0, [0, 1], uv, i)
-        };
+        let row =
+            |uv| Row { products, noise_sigma: [0.1, 0.2, 0.3, 0.4], ..Row::empty(4.0, [0, 1], uv) };
         let mut observation = Observation::empty(Basis::Circular);
         observation.frequency_hz = Some(230e9);
         observation.rows = vec![row([2e9, 1e9]), row([-1e9, 5e9])];

@@ -262,12 +262,7 @@ mod tests {
         let row = |time_h: f64, rr: (f64, f64), ll: (f64, f64)| Row {
             products: [hand(rr.0), hand(ll.0), hand(0.0), hand(0.0)],
             noise_sigma: [rr.1, ll.1, 0.0, f64::NAN],
-            ..Row::total_intensity(
-                time_h,
-                [0, 1],
-                [1.0, 0.0],
-                Measured { visibility: hand(0.0), noise_sigma: 1.0 },
-            )
+            ..Row::empty(time_h, [0, 1], [1.0, 0.0])
         };
         let one = row(1.001, (3.0, 0.3), (0.0, 0.0)).stokes_i(Basis::Circular).unwrap();
         assert_eq!((one.visibility.re, one.noise_sigma), (3.0, 0.3));

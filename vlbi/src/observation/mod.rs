@@ -71,19 +71,25 @@ impl Measured {
 }
 
 impl Row {
-    /// A row of Stokes I only: hours of UTC, (u, v) in wavelengths.
-    pub fn total_intensity(time_h: f64, stations: [u16; 2], uv: [f64; 2], i: Measured) -> Self {
-        let none = Complex64::new(0.0, 0.0);
+    /// A row without any product: hours of UTC, (u, v) in wavelengths.
+    pub fn empty(time_h: f64, stations: [u16; 2], uv: [f64; 2]) -> Self {
         Row {
             time_h,
             integration_s: 0.0,
             stations,
             uv,
-            products: [i.visibility, none, none, none],
-            noise_sigma: [i.noise_sigma, f64::NAN, f64::NAN, f64::NAN],
+            products: [Complex64::new(0.0, 0.0); 4],
+            noise_sigma: [f64::NAN; 4],
             opacity: [0.0; 2],
             channel: 0,
         }
+    }
+
+    /// The same with Stokes I alone.
+    pub fn total_intensity(time_h: f64, stations: [u16; 2], uv: [f64; 2], i: Measured) -> Self {
+        let mut row = Row::empty(time_h, stations, uv);
+        (row.products[0], row.noise_sigma[0]) = (i.visibility, i.noise_sigma);
+        row
     }
 
     /// Product `k`, if there is one.
@@ -269,12 +275,7 @@ mod tests {
             products: [c(1.0, 2.0), c(3.0, -4.0), c(5.0, 6.0), c(7.0, 8.0)],
             noise_sigma: [0.1, 0.2, 0.3, 0.4],
             opacity: [0.5, 0.6],
-            ..Row::total_intensity(
-                4.0,
-                [0, 1],
-                [10.0, -20.0],
-                Measured { visibility: c(0.0, 0.0), noise_sigma: 1.0 },
-            )
+            ..Row::empty(4.0, [0, 1], [10.0, -20.0])
         }
     }
 

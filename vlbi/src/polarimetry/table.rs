@@ -135,7 +135,6 @@ mod tests {
     use super::*;
     use crate::array::built_in;
     use crate::noise::apply_leakage;
-    use crate::observation::Measured;
     use crate::source::Source;
 
     fn observation() -> Observation {
@@ -145,16 +144,9 @@ mod tests {
         observation.mjd = Some(57850);
         let products = [2.0, 2.1, 0.3, -0.2].map(|x| Complex64::new(x, 0.4 * x - 0.1));
         let row = |time_h, stations| Row {
-            time_h,
-            stations,
             products,
             noise_sigma: [0.01, 0.02, 0.03, 0.04],
-            ..Row::total_intensity(
-                time_h,
-                stations,
-                [1e9, 2e9],
-                Measured { visibility: products[0], noise_sigma: 0.01 },
-            )
+            ..Row::empty(time_h, stations, [1e9, 2e9])
         };
         observation.rows = vec![row(10.0, [0, 1]), row(12.0, [1, 3]), row(12.0, [0, 3])];
         observation

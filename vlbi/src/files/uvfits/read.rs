@@ -321,14 +321,9 @@ impl Reader<'_> {
         }
         let opacity = layout.opacity.map_or([0.0; 2], |both| both.map(|p| positive(value(p))));
         Ok(Some(Row {
-            time_h,
             integration_s,
-            stations,
-            uv: [0.0; 2],
-            products: [Complex64::new(0.0, 0.0); 4],
-            noise_sigma: [f64::NAN; 4],
             opacity: opacity.map(|tau| tau as f32),
-            channel: 0,
+            ..Row::empty(time_h, stations, [0.0; 2])
         }))
     }
 

@@ -5,7 +5,7 @@ use super::*;
 use crate::Complex64;
 use crate::array::{Station, built_in};
 use crate::earth::{Frame, SourcePosition};
-use crate::observation::{Averaging, Basis, Channel, Measured, Observation, Row};
+use crate::observation::{Averaging, Basis, Channel, Observation, Row};
 use crate::schedule::tests::{SCHEDULE, SETUP};
 use crate::schedule::{Schedule, Setup, observe};
 use rand::{Rng, RngExt, SeedableRng};
@@ -31,12 +31,7 @@ pub(in crate::files) fn small() -> Observation {
         noise_sigma,
         integration_s: 10.0,
         opacity: [0.25, 0.5],
-        ..Row::total_intensity(
-            time_h,
-            stations,
-            [1.5e9, -2e9],
-            Measured { visibility: c(0.0, 0.0), noise_sigma: 0.0 },
-        )
+        ..Row::empty(time_h, stations, [1.5e9, -2e9])
     };
     let zero = c(0.0, 0.0);
     observation.rows = vec![
