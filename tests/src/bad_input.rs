@@ -1,6 +1,8 @@
 //! Bad input gets one clear message, exit code 2, and nothing written.
 
-use crate::support::{fail, fail_with, folder_with, kerrlight, message, root, sets, succeed, told};
+use crate::support::{
+    fail, fail_with, folder_with, kerrlight, message, root, sets, succeed, told, words_of,
+};
 
 #[test]
 fn files_that_cannot_be_read() {
@@ -137,7 +139,7 @@ fn exact_lines_are_those_of_the_file() {
             "f.toml with the settings of the case: hole: unknown",
         ),
     ] {
-        let mut words: Vec<&str> = words.split(' ').collect();
+        let mut words = words_of(words);
         words.extend(["-o", if words[0] == "render" { "x.exr" } else { "x" }]);
         let error = fail(path, &words);
         assert!(error.contains(said), "{words:?}: {error}");

@@ -1,6 +1,6 @@
 //! Fields of files: the same numbers however a file writes them, and none that a file does not tell.
 
-use crate::support::{fail_with, succeed};
+use crate::support::{fail_with, succeed, words_of};
 use std::io::Write;
 use std::path::Path;
 
@@ -48,7 +48,7 @@ fn exact_fields_of_numpy_images() {
     let plain = npy("'<f8'", "False", "(4, 4)", &bytes(&little, &rows));
     let seen = |name: &str, field: &str| {
         let words = format!("observe {name} {field} {SEEN} -o -");
-        succeed(at, &words.split_whitespace().collect::<Vec<_>>())
+        succeed(at, &words_of(&words))
     };
     std::fs::write(at.join("plain.npy"), &plain).unwrap();
     let expected = seen("plain.npy", "--fov-uas 60");
@@ -105,7 +105,7 @@ fn exact_numpy_files_that_are_no_image_are_refused() {
             std::fs::write(at.join(&name), array).unwrap();
         }
         let words = format!("observe {name} --fov-uas 60 {SEEN} -o -");
-        fail_with(at, &words.split_whitespace().collect::<Vec<_>>(), &[&name, said]);
+        fail_with(at, &words_of(&words), &[&name, said]);
     }
 }
 

@@ -1,7 +1,7 @@
 //! `kerrlight fit --data FILE`: settings that are guessed from a file, with every guess told.
 
 use crate::eht_data;
-use crate::support::{fail, fail_with, sets, succeed, told};
+use crate::support::{fail, fail_with, sets, succeed, told, words_of};
 use std::path::Path;
 
 const SEEN: &str = "observe image.csv --fov-uas 100 --array EHT2017 --mjd 57850 --utc 5-7 --frames 6 --tint 60 --noise thermal --seed 1";
@@ -12,8 +12,7 @@ pub const FEW: [&str; 6] =
 /// Writes what an array sees of an image of nine pixels that lies there in the sky.
 pub fn observed(at: &Path, source: &str, data: &str) {
     std::fs::write(at.join("image.csv"), "0.1,0.2,0.1\n".repeat(3)).unwrap();
-    let words: Vec<&str> = SEEN.split(' ').chain(["--source", source, "-o", data]).collect();
-    succeed(at, &words);
+    succeed(at, &[&words_of(SEEN)[..], &["--source", source, "-o", data]].concat());
 }
 
 /// Returns the messages of a fit of data, with the settings in the run's folder.
@@ -156,8 +155,7 @@ fn exact_a_quick_look_tells_what_moves() {
         let seen = "--fov-uas 120 --array EHT2017 --source sgra --mjd 57850 --utc 12.5-13.6 --frames 12 --tint 60 --scatter-sgra --noise thermal --seed 1 --frame-times 12.5-13.6";
         let data = format!("{name}.uvfits");
         let files: Vec<&str> = files.iter().map(String::as_str).collect();
-        let seen: Vec<&str> = seen.split(' ').collect();
-        succeed(path, &[&["observe"], &files[..], &seen[..], &["-o", &data]].concat());
+        succeed(path, &[&["observe"], &files[..], &words_of(seen), &["-o", &data]].concat());
         let text = succeed(path, &["fit", "--data", &data, "--print"]);
         assert_eq!(text.contains("[image]"), name == "still", "{text}");
         let said = if name == "still" { "no motion is needed" } else { "too much for an image" };

@@ -2,7 +2,7 @@
 
 use crate::fit::results;
 use crate::fit_data::{FEW, observed};
-use crate::support::{fail, fail_with, scene_path, sets, succeed};
+use crate::support::{fail, fail_with, scene_path, sets, succeed, words_of};
 use kerrlight_render::image::exr;
 use std::path::Path;
 
@@ -83,18 +83,8 @@ fn scene_of_a_run_is_its_movie(path: &Path) {
 /// Telescopes see a fit's movie with the field and the times that it has.
 fn movie_of_a_run_is_observed(path: &Path) {
     fn see<'a>(more: &[&'a str]) -> Vec<&'a str> {
-        let words = [
-            "observe",
-            "run/movie.npz",
-            "--array",
-            "EHT2017",
-            "--source",
-            "sgra",
-            "--mjd",
-            "57851",
-        ];
-        let times = ["--frames", "3", "--tint", "30", "--elevation", "10-85"];
-        [&words[..], &times, more].concat()
+        let line = "observe run/movie.npz --array EHT2017 --source sgra --mjd 57851 --frames 3 --tint 30 --elevation 10-85";
+        [&words_of(line)[..], more].concat()
     }
     // 65 M of Sgr A* are 22.16 minutes.
     let hours = array(&path.join("run/movie.npz"), "hours.npy");

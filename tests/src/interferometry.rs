@@ -1,7 +1,7 @@
 //! Observing from the command line, against eht-imaging 1.3.2 (the recipe is
 //! tests/reference/ehtim_visibilities.py) and against itself.
 
-use crate::support::{fail, root, succeed};
+use crate::support::{fail, root, succeed, words_of};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::observation::{Observation, Row};
@@ -219,8 +219,7 @@ fn exact_files_of_every_kind_tell_the_same() {
         let more = [more, &["--noise", "thermal", "--seed", "3"]].concat();
         let seen = ["observe", "image.csv", "--fov-uas", "160", "-o", name];
         let when = "--array EHT2017 --source sgra --mjd 57850 --utc 10-12 --frames 120 --tint 60";
-        let when: Vec<&str> = when.split(' ').collect();
-        succeed(path, &[&seen[..], &when, &more].concat());
+        succeed(path, &[&seen[..], &words_of(when), &more].concat());
         let starter = format!("{name}.toml");
         succeed(path, &["fit", "--init", name, "--model", "volume", "-o", &starter]);
         let text = std::fs::read_to_string(path.join(&starter)).unwrap();
@@ -235,8 +234,7 @@ fn exact_files_of_every_kind_tell_the_same() {
     (1..=3).chain([10]).for_each(|k| pixel(k).unwrap());
     let shell = ["f_1.csv", "f_10.csv", "f_2.csv", "f_3.csv"];
     let seen = "--fov-uas 1 --array EHT2017 --source sgra --mjd 57850 --utc 12-13 --frames 4 --tint 60 -o f.csv";
-    let seen: Vec<&str> = seen.split(' ').collect();
-    succeed(path, &[&["observe"], &shell[..], &seen].concat());
+    succeed(path, &[&["observe"], &shell[..], &words_of(seen)].concat());
     let flux = |k: usize| find(&read(path, "f.csv"), 12.0 + k as f64 / 4.0, ["ALMA", "APEX"]).1.re;
     let fluxes: Vec<f64> = (0..4).map(|k| flux(k).round()).collect();
     assert_eq!(fluxes, [1.0, 2.0, 3.0, 10.0]);
@@ -271,20 +269,8 @@ fn write_scene(folder: &Path) {
 }
 
 /// Three scans in half an hour.
-const SHORT: [&str; 12] = [
-    "--array",
-    "EHT2017",
-    "--source",
-    "sgra",
-    "--mjd",
-    "57850",
-    "--utc",
-    "12.0-12.5",
-    "--frames",
-    "3",
-    "--tint",
-    "60",
-];
+const SHORT: &str =
+    "--array EHT2017 --source sgra --mjd 57850 --utc 12.0-12.5 --frames 3 --tint 60";
 
 /// ALMA–`other` at scan k of `SHORT`.
 fn alma(data: &Observation, k: usize, other: &str) -> Complex64 {
@@ -296,7 +282,8 @@ fn alma(data: &Observation, k: usize, other: &str) -> Complex64 {
 fn exact_scene_through_an_array() {
     let folder = tempfile::tempdir().unwrap();
     write_scene(folder.path());
-    succeed(folder.path(), &[&["observe", "scene.toml", "-o", "scene.csv"], &SHORT[..]].concat());
+    let observe = ["observe", "scene.toml", "-o", "scene.csv"];
+    succeed(folder.path(), &[&observe, &words_of(SHORT)[..]].concat());
     let data = read(folder.path(), "scene.csv");
     let flux = |k: usize| alma(&data, k, "APEX").norm();
     assert!((flux(0) - 2.5).abs() < 1e-3, "{}", flux(0));
@@ -326,7 +313,7 @@ fn exact_sequences_of_pictures() {
     write_frames(path);
     let observe = |inputs: &[&str], more: &[&str], output: &str| {
         let end = ["-o", output];
-        succeed(path, &[&["observe"], inputs, &SHORT[..], more, &end[..]].concat());
+        succeed(path, &[&["observe"], inputs, &words_of(SHORT), more, &end[..]].concat());
         read(path, output)
     };
     let expected = observe(&["scene.toml"], &[], "scene.csv");
@@ -357,7 +344,7 @@ fn exact_sequences_of_pictures() {
 
 fn bad_sequences_are_named(path: &Path, each: [&str; 3]) {
     let said = |inputs: &[&str], more: &[&str]| {
-        fail(path, &[&["observe"], inputs, &SHORT[..], more, &["-o", "c.csv"]].concat())
+        fail(path, &[&["observe"], inputs, &words_of(SHORT), more, &["-o", "c.csv"]].concat())
     };
     assert!(said(&each[..2], &[]).contains("--frame-times"));
     assert!(said(&each[..2], &["--frame-times", "own"]).contains("time of a scan = 12.33"));

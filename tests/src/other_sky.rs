@@ -2,7 +2,7 @@
 //! motion in closed form.
 
 use crate::fit_start::array;
-use crate::support::{even, json, root, sets, succeed, within};
+use crate::support::{even, json, root, sets, succeed, within, words_of};
 use kerrlight_render::dynamics::Velocity;
 use kerrlight_tomo::fit::settings::{FitFile, PriorSettings};
 use kerrlight_tomo::fit::setup::{Drawn, FitData, Instrument};
@@ -86,11 +86,10 @@ fn found_by_array(folder: &Path, sky: &(Sky, Vec<Arc>), search: [usize; 2]) -> V
     let hours = LAST * 20.46 / 3600.0 * 1.0027379 * FRAMES as f64 / (FRAMES - 1) as f64;
     let (gmst, frames) = (format!("2.0-{}", 2.0 + hours), FRAMES.to_string());
     let field = format!("{}", SCREEN.width * 5.0127);
-    let mut words: Vec<&str> = observe.split(' ').filter(|word| !word.is_empty()).collect();
+    let mut words = words_of(observe);
     words.extend(["--gmst", &gmst, "--frames", &frames, "--fov-uas", &field]);
     succeed(folder, &words);
-    let init = "fit --init data.uvfits --model volume -o fit.toml";
-    succeed(folder, &init.split(' ').collect::<Vec<_>>());
+    succeed(folder, &words_of("fit --init data.uvfits --model volume -o fit.toml"));
     // Phases are known and stations calibrated, and nothing but the noise is wrong.
     let path = folder.join("fit.toml");
     let text = std::fs::read_to_string(&path).expect("settings");

@@ -4,7 +4,9 @@ use crate::eht_data;
 use crate::fit::results;
 use crate::fit_start::array;
 use crate::known_skies::bell;
-use crate::support::{binary, done, fail, fail_with, message, scene_path, sets, succeed, told};
+use crate::support::{
+    binary, done, fail, fail_with, message, scene_path, sets, succeed, told, words_of,
+};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::noise::add_thermal_noise;
@@ -43,7 +45,7 @@ fn observed(folder: &Path) {
         let turn = east.atan2(north) - 170f64.to_radians();
         bell(east.hypot(north) - 21.0, 16.0) * (1.0 + 0.5 * turn.cos())
     });
-    succeed(folder, &SEEN.split(' ').collect::<Vec<_>>());
+    succeed(folder, &words_of(SEEN));
 }
 
 fn quick<'a>(words: &[&'a str]) -> Vec<&'a str> {
@@ -107,7 +109,7 @@ fn exact_a_ring_is_found_at_once() {
     // What it has found can be observed again.
     let again =
         SEEN.replace("image.csv --fov-uas 120", "run/image.npz").replace("data.uv", "again.uv");
-    succeed(path, &again.split(' ').collect::<Vec<_>>());
+    succeed(path, &words_of(&again));
 }
 
 /// Two bands of a night with gains of their own make one image: all closure phases of both, the ring within three errors, and a
@@ -118,7 +120,7 @@ fn exact_two_bands_make_one_image() {
     let path = folder.path();
     observed(path);
     let low = SEEN.replace("229.1", "227.1").replace("--seed 3 -o data", "--seed 4 -o low");
-    succeed(path, &low.split(' ').collect::<Vec<_>>());
+    succeed(path, &words_of(&low));
     let words = ["--data", "low.uvfits", "data.uvfits", "--model", "image", "-o", "both"];
     let said = told(path, &quick(&words));
     assert!(said.contains("read: low.uvfits: M87*") && said.contains("read: data.uvfits: M87*"));
@@ -145,9 +147,9 @@ fn exact_two_bands_make_one_image() {
     let page = std::fs::read_to_string(path.join("both/report.html")).unwrap();
     assert!(page.contains("nothing closes across them") && page.contains("ALMA (2)"));
     let other = SEEN.replace("m87 --mjd", "sgra --mjd").replace("-o data", "-o other");
-    succeed(path, &other.split(' ').collect::<Vec<_>>());
+    succeed(path, &words_of(&other));
     let far = SEEN.replace("229.1", "86.0").replace("-o data", "-o far");
-    succeed(path, &far.split(' ').collect::<Vec<_>>());
+    succeed(path, &words_of(&far));
     for (second, says) in [
         ("other.uvfits", "cannot be one image: they observe"),
         ("far.uvfits", "they are of 229.1 and 86.0 GHz"),

@@ -105,6 +105,11 @@ pub fn scene_path(name: &str) -> String {
     root().join("scenes").join(name).display().to_string()
 }
 
+/// The words of a command line.
+pub fn words_of(line: &str) -> Vec<&str> {
+    line.split_whitespace().collect()
+}
+
 /// Settings, each behind `--set`.
 pub fn sets<'a>(settings: &[&'a str]) -> Vec<&'a str> {
     settings.iter().flat_map(|setting| ["--set", *setting]).collect()

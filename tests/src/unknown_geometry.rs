@@ -1,7 +1,7 @@
 //! Fits that do not know the geometry.
 
 use crate::fit::killed_fit;
-use crate::support::{fail_with, folder_with, json, root, sets, succeed, told};
+use crate::support::{fail_with, folder_with, json, root, sets, succeed, told, words_of};
 
 /// The built-in flare seen by the ngEHT, few pixels and scans, from another inclination and orientation than its
 /// settings say.
@@ -204,7 +204,7 @@ fn exact_impossible_priors_are_refused_before_anything_is_written() {
         ("observer.inclination_deg=60.0 observer.position_angle_deg=0.0", "there is none"),
         ("linear= representation.kind=grid training.start=drawn", "search: linear is missing"),
     ] {
-        let settings = sets(&change.split(' ').collect::<Vec<_>>());
+        let settings = sets(&words_of(change));
         let words = [&["fit", "fit.toml", "-o", "run"], &settings[..]].concat();
         fail_with(folder.path(), &words, &[expected]);
     }
