@@ -1,6 +1,7 @@
 //! Channels on request, against closed forms and against other pictures.
 
 use crate::support::scene;
+use kerrlight_geodesic::vector::{cross, difference, norm};
 use kerrlight_render::emission::sky::{Catalogue, Panorama};
 use kerrlight_render::image::{Channel, Picture, exr};
 use kerrlight_render::picture::render;
@@ -255,13 +256,8 @@ fn exact_footprint_is_the_solid_angle_between_neighbours() {
         if x.hypot(y) < 12.0 || a[k] == 0.0 {
             continue;
         }
-        let half = |p: usize, q: usize| {
-            let (p, q) = (direction(p), direction(q));
-            core::array::from_fn::<f64, 3, _>(|i| 0.5 * (p[i] - q[i]))
-        };
-        let ([ax, ay, az], [bx, by, bz]) = (half(k + 1, k - 1), half(k + 200, k - 200));
-        let cross = [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
-        let area = cross.iter().map(|c| c * c).sum::<f64>().sqrt();
+        let half = |p: usize, q: usize| difference(direction(p), direction(q)).map(|x| 0.5 * x);
+        let area = norm(cross(half(k + 1, k - 1), half(k + 200, k - 200)));
         assert!(
             (f64::from(footprint[k]) / area - 1.0).abs() < 0.02,
             "{x} {y}: {} {area}",

@@ -4,7 +4,7 @@ use super::Axis;
 use super::infall::{Falling, Origin, Profile};
 use crate::Error;
 use kerrlight_geodesic::Dual;
-use kerrlight_geodesic::vector::rotate;
+use kerrlight_geodesic::vector::{norm, rotate};
 use std::sync::Arc;
 
 /// Angular velocity as a function of the (spherical) radius, in radians a unit of time; positive is
@@ -139,7 +139,7 @@ impl AngularVelocity {
     /// The way that the matter at a point (M) has come, if it moves like this about an axis: what is the same for all
     /// times is looked up once.
     pub fn way_back(&self, axis: Axis, point: [f64; 3]) -> WayBack<'_> {
-        let r = radius(point);
+        let r = norm(point);
         let speed = match self.falling() {
             None => Speed::Circular(self.rate(r)),
             Some(flow) => Speed::Falling(flow, flow.origin(r)),
@@ -190,7 +190,7 @@ impl AngularVelocity {
     /// Angle in radians by which the point at (x, y, z) is turned at time t to where its matter was at
     /// t₀ = `reference`, if it stays at its radius: −Ω(r)(t − t₀).
     pub fn angle(&self, point: [f64; 3], time: f64, reference: f64) -> f64 {
-        -self.rate(radius(point)) * (time - reference)
+        -self.rate(norm(point)) * (time - reference)
     }
 }
 
@@ -217,10 +217,6 @@ impl WayBack<'_> {
         };
         rotate(self.axis, angle, self.point.map(|x| stretch * x))
     }
-}
-
-fn radius([x, y, z]: [f64; 3]) -> f64 {
-    (x * x + y * y + z * z).sqrt()
 }
 
 type Range = (&'static str, f64, bool, &'static str);

@@ -1,7 +1,7 @@
 //! Unit vectors, and steps on the sphere.
 
 use crate::Error;
-use kerrlight_geodesic::vector::{cross, dot};
+use kerrlight_geodesic::vector::{cross, dot, norm};
 
 /// A unit vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +21,7 @@ impl Axis {
         // Scaled, so that no square over- or underflows.
         let largest = vector.iter().fold(0.0f64, |largest, x| largest.max(x.abs()));
         let scaled = vector.map(|x| x / largest);
-        let norm = dot(scaled, scaled).sqrt();
+        let norm = norm(scaled);
         let axis = scaled.map(|x| x / norm);
         if axis.iter().all(|x| x.is_finite()) {
             Ok(Self(axis))

@@ -1,6 +1,6 @@
 use super::*;
 use crate::points::{Coordinates, CoordinatesMut};
-use kerrlight_geodesic::vector::rotate;
+use kerrlight_geodesic::vector::{cross, dot, rotate};
 
 const COUNT: usize = 20_003;
 
@@ -116,10 +116,6 @@ fn exact_adjoint_of_points_angles_and_axis() {
     let axis = case.axis.vector();
     let change = case.axis.tangent([0.2, 0.7, -0.4]);
     let (mut left, mut right, mut size) = (0.0, 0.0, 0.0);
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    };
-    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     for k in 0..COUNT {
         let x = [0, 1, 2].map(|c| case.points[c][k]);
         let g = [0, 1, 2].map(|c| case.gradient[c][k]);

@@ -5,7 +5,7 @@ use super::medium::PathSegment;
 use crate::volume::Volume;
 use core::f64::consts::{PI, TAU};
 use core::ops::Range;
-use kerrlight_geodesic::vector::{cross, dot};
+use kerrlight_geodesic::vector::{cross, dot, norm};
 
 /// Bricks of radius, height along an axis, and azimuth about it, in the frame that turns with the
 /// matter. How many of them shine in a range of each is known from sums over all bricks below.
@@ -215,13 +215,12 @@ impl Occupied {
 const ROUNDING: f64 = 1e-9;
 
 fn unit(x: [f64; 3]) -> [f64; 3] {
-    let norm = dot(x, x).sqrt();
+    let norm = norm(x);
     x.map(|c| c / norm)
 }
 
 /// Radii, heights and azimuths of a box.
 fn extent([low, high]: [[f64; 3]; 2], axis: [f64; 3], across: [[f64; 3]; 2]) -> Extent {
-    let norm = |x: [f64; 3]| dot(x, x).sqrt();
     let nearest: [f64; 3] = core::array::from_fn(|k| 0f64.clamp(low[k], high[k]));
     let farthest: [f64; 3] = core::array::from_fn(|k| low[k].abs().max(high[k].abs()));
     let heights = [0, 1].map(|end| -> f64 {
@@ -241,7 +240,7 @@ fn angles([low, high]: [[f64; 3]; 2], across: [[f64; 3]; 2]) -> [f64; 2] {
     let center = flat(core::array::from_fn(|k| 0.5 * (low[k] + high[k])));
     let half: [f64; 3] = core::array::from_fn(|k| 0.5 * (high[k] - low[k]));
     // From an axis outside of the ball around the box all corners are within a quarter turn.
-    if center[0].hypot(center[1]) <= 1.001 * dot(half, half).sqrt() {
+    if center[0].hypot(center[1]) <= 1.001 * norm(half) {
         return [-PI, PI];
     }
     let middle = center[1].atan2(center[0]);
@@ -290,7 +289,6 @@ mod tests {
                 let middle: [f64; 3] = core::array::from_fn(|c| {
                     x[c] + part(0.437_016) * step[c] + 0.57 * off * (2.0 * part(0.191_487) - 1.0)
                 });
-                let norm = |x: [f64; 3]| dot(x, x).sqrt();
                 let radii = [norm(x), norm(middle), norm(y)];
                 let least = radii.into_iter().fold(f64::INFINITY, f64::min);
                 let most = radii.into_iter().fold(0.0, f64::max);

@@ -6,7 +6,7 @@
 
 use crate::scene::Spot;
 use kerrlight_geodesic::Kerr;
-use kerrlight_geodesic::vector::{cross, distance, dot, rotate};
+use kerrlight_geodesic::vector::{cross, distance, norm, rotate};
 
 /// Radius at which a spot's light is cut off, in units of its σ: exp(−6²/2) = 1.5e-8.
 pub const CUT_OFF: f64 = 6.0;
@@ -30,7 +30,7 @@ pub struct SpotModel {
 impl SpotModel {
     /// A spot of a scene.
     pub fn new(spot: &Spot, hole: &Kerr) -> Self {
-        let norm = dot(spot.axis, spot.axis).sqrt();
+        let norm = norm(spot.axis);
         let axis = spot.axis.map(|x| x / norm);
         let (sin, cos) = spot.phase_deg.to_radians().sin_cos();
         let start = tip(axis, [cos * spot.radius, sin * spot.radius, 0.0]);
@@ -84,14 +84,14 @@ impl SpotModel {
     /// The point `x` at `time` carried along with the matter to where the spot is a round
     /// Gaussian about its starting point.
     pub fn comoving(&self, x: [f64; 3], time: f64) -> Comoving {
-        let angle = self.turned(self.matter_rate(dot(x, x).sqrt()), time);
+        let angle = self.turned(self.matter_rate(norm(x)), time);
         Comoving { position: rotate(self.axis, -angle, x), angle }
     }
 
     /// A bound of the length in M of a short piece of path in comoving coordinates: its chord
     /// and what differential rotation adds.
     pub fn comoving_length(&self, ends: [[f64; 3]; 2], carried: [&Comoving; 2]) -> f64 {
-        let reach = ends.map(|x| dot(x, x).sqrt());
+        let reach = ends.map(norm);
         let wound = (carried[0].angle - carried[1].angle).abs();
         distance(ends[0], ends[1]) + reach[0].max(reach[1]) * wound
     }
@@ -231,7 +231,7 @@ pub struct MatterPoint {
 /// turn about x.
 fn tip(axis: [f64; 3], x: [f64; 3]) -> [f64; 3] {
     let normal = cross([0.0, 0.0, 1.0], axis);
-    let sin = dot(normal, normal).sqrt();
+    let sin = norm(normal);
     if sin == 0.0 {
         return if axis[2] > 0.0 { x } else { [x[0], -x[1], -x[2]] };
     }
@@ -241,7 +241,7 @@ fn tip(axis: [f64; 3], x: [f64; 3]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kerrlight_geodesic::vector::difference;
+    use kerrlight_geodesic::vector::{difference, dot};
 
     fn spot(axis: [f64; 3], sheared_since: Option<f64>) -> SpotModel {
         let config = Spot {
@@ -279,7 +279,7 @@ mod tests {
         for time in [0.0, 33.0, 200.0] {
             let c = s.center(time);
             assert!(dot(c, s.axis).abs() < 1e-12);
-            assert!((dot(c, c).sqrt() - 6.0).abs() < 1e-12);
+            assert!((norm(c) - 6.0).abs() < 1e-12);
         }
     }
 

@@ -138,15 +138,14 @@ impl ChordBound {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use kerrlight_geodesic::vector::{difference, dot, norm};
     use kerrlight_geodesic::{Inclination, Observer, Quantities, Tracer};
 
     fn distance_to_chord(x: [f64; 3], [a, b]: [[f64; 3]; 2]) -> f64 {
-        let d: [f64; 3] = core::array::from_fn(|k| b[k] - a[k]);
-        let s: [f64; 3] = core::array::from_fn(|k| x[k] - a[k]);
-        let dot = |p: [f64; 3], q: [f64; 3]| p.iter().zip(q).map(|(p, q)| p * q).sum::<f64>();
+        let (d, s) = (difference(b, a), difference(x, a));
         let t = (dot(s, d) / dot(d, d)).clamp(0.0, 1.0);
         let miss: [f64; 3] = core::array::from_fn(|k| s[k] - t * d[k]);
-        dot(miss, miss).sqrt()
+        norm(miss)
     }
 
     /// Sampled distances of pieces of many sizes stay below the bound, which is no idle one:

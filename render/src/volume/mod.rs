@@ -16,7 +16,7 @@ use crate::Error;
 use crate::dynamics::Axis;
 pub use ensemble::{Coverage, Ensemble, Feature};
 pub use file::VolumeArrays;
-use kerrlight_geodesic::vector::rotate;
+use kerrlight_geodesic::vector::{norm, rotate};
 pub use over_time::OverTime;
 pub use panels::Shown;
 
@@ -210,8 +210,7 @@ impl Volume {
     pub fn carried(&self, axis: Axis, angle: impl Fn(f64) -> f64) -> Self {
         let value = |k: usize| {
             let x = self.position(k);
-            let r = x.iter().map(|x| x * x).sum::<f64>().sqrt();
-            self.at(rotate(axis.vector(), -angle(r), x)) as f32
+            self.at(rotate(axis.vector(), -angle(norm(x)), x)) as f32
         };
         Self { values: (0..self.values.len()).map(value).collect(), ..self.clone() }
     }

@@ -163,7 +163,7 @@ pub fn check_position(name: &str, position: [f64; 3]) -> Result<(), ArrayError> 
     if let Some(far) = position.iter().find(|x| !(-FARTHEST..=FARTHEST).contains(*x)) {
         return unfit(format!("{far:e} m is not allowed: [-{FARTHEST:e}, {FARTHEST:e}]"));
     }
-    let radius = position.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let radius = kerrlight_geodesic::vector::norm(position);
     if EARTH_KM.contains(&radius) {
         return unfit(format!(
             "{radius:.0} m from the centre of the Earth: kilometres? metres are expected"

@@ -19,7 +19,7 @@ pub use file::{Material, MeshFile, RawTriangle, Resources};
 use crate::Error;
 use crate::scene::{Mesh, MeshVelocity};
 use kerrlight_geodesic::flow::rotating_redshift;
-use kerrlight_geodesic::vector::{cross, difference, dot, rotate};
+use kerrlight_geodesic::vector::{cross, difference, dot, norm, rotate};
 use kerrlight_geodesic::{Kerr, PathPoint};
 
 /// A triangle with what a test against it needs.
@@ -38,7 +38,7 @@ pub struct Triangle {
 }
 
 fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
-    let length = dot(a, a).sqrt();
+    let length = norm(a);
     (length > 0.0 && length.is_finite()).then(|| a.map(|x| x / length))
 }
 
@@ -54,7 +54,7 @@ impl Triangle {
         let normal = unit(cross(edges[0], edges[1]))?;
         let inward = edges.map(|edge| unit(cross(normal, edge)));
         let [Some(a), Some(b), Some(c)] = inward else { return None };
-        let size = edges.map(|edge| dot(edge, edge).sqrt()).into_iter().fold(0.0, f64::max);
+        let size = edges.map(norm).into_iter().fold(0.0, f64::max);
         Some(Triangle { corners, normal, inward: [a, b, c], size, texture, material })
     }
 
@@ -121,8 +121,9 @@ impl MeshModel {
     /// # Errors
     /// If a vertex comes to lie farther than 1e7 M from the hole.
     pub fn new(mesh: &Mesh, file: &MeshFile) -> Result<Self, Error> {
-        let norm = dot(mesh.rotation_axis, mesh.rotation_axis).sqrt();
-        let (axis, angle) = (mesh.rotation_axis.map(|x| x / norm), mesh.rotation_deg.to_radians());
+        let length = norm(mesh.rotation_axis);
+        let axis = mesh.rotation_axis.map(|x| x / length);
+        let angle = mesh.rotation_deg.to_radians();
         let place = |x: [f64; 3]| {
             let turned = rotate(axis, angle, x.map(|x| x * mesh.scale));
             core::array::from_fn::<f64, 3, _>(|k| turned[k] + mesh.position[k])
@@ -130,7 +131,7 @@ impl MeshModel {
         let mut triangles = Vec::with_capacity(file.triangles.len());
         for raw in &file.triangles {
             let corners = raw.corners.map(place);
-            let far = corners.map(|c| dot(c, c).sqrt()).into_iter().fold(0.0, f64::max);
+            let far = corners.map(norm).into_iter().fold(0.0, f64::max);
             // Infinite or NaN where scale or file are out of all bounds.
             if far.is_nan() || far > FARTHEST {
                 let allowed = "vertices within 1e7 M of the hole: see `scale` and `position`";

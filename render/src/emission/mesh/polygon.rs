@@ -1,7 +1,7 @@
 //! Polygons cut into triangles.
 
 use core::f64::consts::TAU;
-use kerrlight_geodesic::vector::{cross, difference, dot};
+use kerrlight_geodesic::vector::{cross, difference, dot, norm};
 
 /// Reason why a polygon cannot be cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -45,16 +45,13 @@ pub(super) fn cut(corners: &[[f64; 3]]) -> Result<Cut, Uncut> {
     let size2 = edges.iter().map(|x| dot(*x, *x)).fold(0.0, f64::max);
     let normal = (1..edges.len() - 1).map(|k| cross(edges[k], edges[k + 1]));
     let normal = normal.fold([0.0; 3], |sum, x| [sum[0] + x[0], sum[1] + x[1], sum[2] + x[2]]);
-    let length = dot(normal, normal).sqrt();
+    let length = norm(normal);
     // Coordinates that are no numbers are refused with the finished mesh.
     if !(size2 * length).is_finite() {
         return Ok(Cut { triangles: fan(corners.len()), flat: true });
     }
     if length <= NO_AREA * size2 {
-        let on_a_line = |k: usize| {
-            let area = cross(edges[k], edges[k + 1]);
-            dot(area, area).sqrt() <= NO_AREA * size2
-        };
+        let on_a_line = |k: usize| norm(cross(edges[k], edges[k + 1])) <= NO_AREA * size2;
         let nothing = (1..edges.len() - 1).all(on_a_line);
         // Without an area either all corners lie on one line, or parts of both signs cancel.
         return if nothing {

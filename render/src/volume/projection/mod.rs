@@ -162,6 +162,7 @@ impl<'a> Marcher<'a> {
 mod tests {
     use super::*;
     use crate::volume::paper;
+    use kerrlight_geodesic::vector::{cross, difference};
 
     fn around(hole_radius: f64) -> Surroundings {
         Surroundings { hole_radius, axis: [0.5, 0.0, -0.9], ring_radius: 5.0, half_width: 5.5 }
@@ -210,11 +211,7 @@ mod tests {
     fn exact_frames_are_right_handed() {
         for view in VIEWS {
             let [a, b, c] = view.frame();
-            let cross = |k: usize| {
-                let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-                a[i] * b[j] - a[j] * b[i]
-            };
-            assert!((0..3).all(|k| (cross(k) - c[k]).abs() < 1e-15));
+            assert!(difference(cross(a, b), c).iter().all(|x| x.abs() < 1e-15));
         }
         assert!((VIEWS[0].seen([0.0, 1.0, 0.0])[0] - 1.0).abs() < 1e-15);
     }

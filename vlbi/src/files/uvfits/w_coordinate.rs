@@ -67,8 +67,7 @@ mod tests {
                 let [u, v] = row.uv.map(|x| x / 226_191_789_062.5);
                 let [a, b] =
                     row.stations.map(|k| observation.stations[usize::from(k)].position.unwrap());
-                let length =
-                    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt() / SPEED_OF_LIGHT;
+                let length = kerrlight_geodesic::vector::distance(a, b) / SPEED_OF_LIGHT;
                 let found = (u * u + v * v + w * w).sqrt();
                 // The square of the Earth's velocity.
                 assert!((found / length - 1.0).abs() < 2e-8, "{frame:?}: {found} {length}");

@@ -14,7 +14,7 @@ use crate::transport::optics::Optics;
 use crate::transport::result::Accumulator;
 use crate::transport::tree::WalkScratch;
 use intersections::{Intersections, join};
-use kerrlight_geodesic::vector::{cross, dot};
+use kerrlight_geodesic::vector::{cross, norm};
 use kerrlight_geodesic::{Kerr, Ray};
 use light::SpotLight;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -74,8 +74,7 @@ impl Spots {
 
     /// dx/dt of the matter of spot number `number` at a point, M.
     pub fn velocity(&self, number: usize, x: [f64; 3]) -> [f64; 3] {
-        let r = dot(x, x).sqrt();
-        self.models.get(number).map_or([0.0; 3], |spot| cross(spot.angular_velocity(r), x))
+        self.models.get(number).map_or([0.0; 3], |spot| cross(spot.angular_velocity(norm(x)), x))
     }
 
     /// Their sizes by the radii of their orbits.
