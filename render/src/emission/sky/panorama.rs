@@ -179,12 +179,13 @@ impl Panorama {
         let [x, y, z] = beam.direction();
         let (polar, azimuth) = (x.hypot(y).atan2(z), y.atan2(x));
         let [across, along] = beam.reach();
-        let row = |angle: f64| (angle / PI * self.height as f64 - 0.5).clamp(0.0, self.last_row());
+        let (height, last) = (self.height as f64, (self.height - 1) as f64);
+        let row = |angle: f64| (angle / PI * height - 0.5).clamp(0.0, last);
         let (top, bottom) =
             (row(polar - along).floor() as usize, row(polar + along).ceil() as usize);
         let (mut sum, mut total) = ([0.0; 3], 0.0);
         for row in top..=bottom {
-            let theta = PI * (row as f64 + 0.5) / self.height as f64;
+            let theta = PI * (row as f64 + 0.5) / height;
             // How far the beam reaches around the axis in this row.
             let sin = theta.sin().min(polar.sin());
             let half = if sin > 1.2 * across { (across / sin).asin() * 1.2 } else { PI };
@@ -192,10 +193,6 @@ impl Panorama {
         }
         // The beam may miss the centres of all pixels.
         if total > 0.0 { sum.map(|c| (c / total) as f32) } else { self.color(beam.direction()) }
-    }
-
-    fn last_row(&self) -> f64 {
-        (self.height - 1) as f64
     }
 
     fn average_row(

@@ -16,9 +16,9 @@ pub const SELECTORS: [(&str, &str); 5] = [
 /// A random parameter: value = stored·scale + zero.
 #[derive(Debug, Clone, Copy)]
 pub struct Parameter {
-    index: usize,
-    scale: f64,
-    zero: f64,
+    pub index: usize,
+    pub scale: f64,
+    pub zero: f64,
 }
 
 /// Parameters that name the stations of a baseline.
@@ -336,17 +336,5 @@ impl<'a, 'b> Parameters<'a, 'b> {
         let parts: Vec<_> =
             self.named.iter().filter(|(n, _)| n == "DATE").map(|(_, p)| *p).collect();
         if parts.is_empty() { Err(self.missing("DATE")) } else { Ok(parts) }
-    }
-}
-
-impl Parameter {
-    /// Returns the offset of every stored value.
-    pub fn zero(self) -> f64 {
-        self.zero
-    }
-
-    /// The same without what is added.
-    pub fn without_zero(self) -> Self {
-        Parameter { zero: 0.0, ..self }
     }
 }

@@ -5,7 +5,7 @@ use super::super::{FileError, MOST_HOURS};
 use super::antennas::AntennaTables;
 use super::flags::{self, Flag};
 use super::frequencies;
-use super::layout::{Antennas, Layout, SELECTORS, is_measured};
+use super::layout::{Antennas, Layout, Parameter, SELECTORS, is_measured};
 use super::selectors;
 use crate::Complex64;
 use crate::Error;
@@ -215,8 +215,8 @@ impl Reader<'_> {
     /// Date as MJD in two parts, whose sum would lose digits.
     fn date(&self, group: &[u8]) -> [f64; 2] {
         let parts = &self.layout.date;
-        let stored = |k: usize| self.layout.parameter(group, parts[k].without_zero());
-        let zero: f64 = parts.iter().map(|part| part.zero()).sum();
+        let stored = |k: usize| self.layout.parameter(group, Parameter { zero: 0.0, ..parts[k] });
+        let zero: f64 = parts.iter().map(|part| part.zero).sum();
         let rest: f64 = (1..parts.len()).map(stored).sum();
         // Whole days may be in the stored part, in what is added, or in both.
         let day = stored(0).floor() + zero.floor() - MJD_ZERO.floor();
