@@ -19,9 +19,8 @@ impl Raster {
         if self.one_by_one() {
             return 1;
         }
-        let screen = &self.scene.screen;
-        let pixels = screen.width as usize * screen.rows() as usize;
-        (MOST_VALUES / (pixels * self.names().len().max(1))).clamp(1, MOST_FRAMES)
+        let pixels = self.grid.width * self.grid.height;
+        (MOST_VALUES / (pixels * self.channels.len().max(1))).clamp(1, MOST_FRAMES)
     }
 
     /// Returns whether rays have to be traced anew for every frame: the camera moves, or pixels are

@@ -45,7 +45,8 @@ impl Raster {
     /// # Errors
     /// If a flux is requested and there is no light, or a value does not fit after scaling.
     pub fn summary(&self, journal: &AnyJournal<'_>) -> std::result::Result<Summary, Error> {
-        self.summarize(&journal.tally())
+        let tally = journal.tally();
+        Summary::new(&self.scene, &tally, Summary::factor(&self.scene, &tally)?)
     }
 
     /// Writes the EXR file with settings, in some style.

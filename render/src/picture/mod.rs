@@ -30,12 +30,12 @@ use crate::Error;
 use crate::image::Picture;
 use crate::image::exr::{Layout, Style};
 use crate::scene::{Rings, Scene};
-use crate::transport::{Assets, Meter, PreparedScene, RayResult, Scratch, names};
+use crate::transport::{Assets, Meter, PreparedScene, names};
 use grid::Grid;
 use kerrlight_geodesic::RayDevice;
 use rings::Resolver;
 use std::sync::Arc;
-use tally::Tally;
+use workspace::Workspace;
 
 /// Told how many more rows of pixels are done; returns whether to go on.
 pub type Progress<'a> = dyn Fn(usize) -> bool + Sync + 'a;
@@ -157,8 +157,8 @@ impl Raster {
     /// # Errors
     /// If a value is out of range.
     pub fn trial(&self, rays: usize) -> Result<Meter, Error> {
-        let mut scratch = Scratch::default();
-        scratch.meter = Meter::running();
+        let mut work = Workspace::default();
+        work.scratch.meter = Meter::running();
         let (width, height) = (self.grid.width, self.grid.height);
         // Blocks of neighbours, as in the picture, on a sequence that fills the plane evenly
         // (Roberts 2018: powers of the reciprocal of the plastic number).
@@ -168,24 +168,16 @@ impl Raster {
                 |ratio: f64, size: usize| ((k as f64 * ratio).fract() * size as f64) as usize;
             let (column, row) =
                 (place(0.754_877_666_246_692_7, width), place(0.569_840_290_998_053_2, height));
-            let points = (0..TRIAL).map(|j| {
-                self.grid.inside(
-                    (column + j % 8).min(width - 1),
-                    (row + j / 8).min(height - 1),
-                    [0.0; 2],
-                )
-            });
-            let (alpha, beta): (Vec<f64>, Vec<f64>) = points.unzip();
-            let mut seen = vec![RayResult::default(); TRIAL];
-            self.prepared.observe_block(
-                &alpha,
-                &beta,
-                &[self.prepared.time()],
-                &mut scratch,
-                &mut seen,
-            )?;
+            work.clear();
+            for j in 0..TRIAL {
+                let (column, row) =
+                    ((column + j % 8).min(width - 1), (row + j / 8).min(height - 1));
+                let (x, y) = self.grid.inside(column, row, [0.0; 2]);
+                work.push_ray(x, y);
+            }
+            work.observe(&self.prepared)?;
         }
-        Ok(scratch.meter)
+        Ok(work.scratch.meter)
     }
 
     /// Returns about the number of rays that photon rings take besides those of the regular grid, what hides them left
@@ -226,10 +218,6 @@ impl Raster {
         self.names().contains(&"id").then_some(())?;
         let names = names(&self.scene).into_iter().enumerate();
         Some(names.map(|(k, name)| format!("{k} {name}\n")).collect())
-    }
-
-    fn summarize(&self, tally: &Tally) -> Result<Summary, Error> {
-        Summary::new(&self.scene, tally, Summary::factor(&self.scene, tally)?)
     }
 }
 

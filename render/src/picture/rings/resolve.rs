@@ -3,7 +3,7 @@
 use super::{RingStrata, Stratum};
 use crate::Error;
 use crate::picture::grid::{Grid, Square};
-use crate::picture::workspace::Workspace;
+use crate::picture::workspace::{BLOCK, Workspace};
 use crate::transport::{Layers, Mixed, PreparedScene, RayResult};
 use kerrlight_geodesic::Outcome;
 use rayon::prelude::*;
@@ -203,9 +203,6 @@ impl Resolver {
         Ok(())
     }
 }
-
-/// Rays that are traced together, about.
-const BLOCK: usize = 1024;
 
 /// Jobs with about a block's worth of rays.
 fn batches(jobs: &[Job]) -> impl Iterator<Item = &[Job]> {
