@@ -258,11 +258,8 @@ mod tests {
 
     fn texts() -> Vec<String> {
         let small = uvfits::tests::small();
-        let eht = "#SRC:M87,DATE(MJD):57853,FREQ:229.0707GHz\n\
-            #time(UTC),T1,T2,U(lambda),V(lambda),Iamp(Jy),Iphase(d),Isigma(Jy)\n\
-            02.15138894,AA,LM,1868288384.0,-3689129984.0,0.01103669,-122.7523,0.00446794\n";
         let csv = to_csv(&small, true).unwrap();
-        vec![to_obs_text(&small).unwrap(), csv, eht.to_owned()]
+        vec![to_obs_text(&small).unwrap(), csv, eht_table::tests::CSV.to_owned()]
     }
 
     #[test]

@@ -234,15 +234,14 @@ fn estimate(lights: &[Light; 9]) -> Estimate {
     let middle = at(0, 0);
     let second = |a: f64, b: f64| (a - 2.0 * middle.intensity + b).abs();
     let smooth = second(value(-1, 0), value(1, 0)) + second(value(0, -1), value(0, 1));
-    let around = || (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy)));
-    let bright = around().map(|(dx, dy)| value(dx, dy)).fold(0.0, f64::max);
-    let other = around().any(|(dx, dy)| at(dx, dy).kind != middle.kind);
-    let contrast = other.then(|| range(around().map(|(dx, dy)| value(dx, dy))));
+    let bright = lights.iter().map(|light| light.intensity).fold(0.0, f64::max);
+    let other = lights.iter().any(|light| light.kind != middle.kind);
+    let contrast = other.then(|| range(lights.iter().map(|light| light.intensity)));
     let mut error = smooth / 12.0;
     if let Some(contrast) = contrast {
         error = error.max(0.25 * contrast);
     }
-    if around().any(|(dx, dy)| at(dx, dy).other_band(middle)) {
+    if lights.iter().any(|light| light.other_band(middle)) {
         error = error.max(HIDDEN * bright);
     }
     let of_disc = |light: &Light| (light.kind.disc_images, light.kind.sides);
