@@ -1,6 +1,6 @@
 //! Error estimates and hard rays, against numbers of twice the precision.
 
-use crate::support::{fail, succeed};
+use crate::support::{fail, new_folder, succeed};
 use kerrlight_geodesic::Integrator;
 use kerrlight_validation::accuracy::estimates;
 use kerrlight_validation::accuracy::hard;
@@ -86,8 +86,7 @@ fn code_estimates_bound_errors_of_every_class() {
 
 #[test]
 fn hard_rays_as_a_command() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path();
+    let path = &new_folder();
     succeed(path, &["accuracy", "--hard", "400", "-o", "results"]);
     for name in ["hard.csv", "hard.json"] {
         let text = std::fs::read_to_string(path.join("results").join(name)).expect("results");

@@ -1,13 +1,13 @@
 //! Bad input gets one clear message, exit code 2, and nothing written.
 
 use crate::support::{
-    fail, fail_with, folder_with, kerrlight, message, root, sets, succeed, told, words_of,
+    fail, fail_with, folder_with, kerrlight, message, new_folder, root, sets, succeed, told,
+    words_of,
 };
 
 #[test]
 fn files_that_cannot_be_read() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     fail_with(path, &["render", "nowhere.toml"], &["nowhere.toml", "No such file"]);
     assert!(fail(path, &["render", "."]).contains("directory"));
     assert!(fail(path, &["inspect", "nowhere.exr"]).contains("nowhere.exr"));
@@ -19,8 +19,7 @@ fn files_that_cannot_be_read() {
 
 #[test]
 fn outputs_that_cannot_be_written() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     std::fs::create_dir(path.join("folder.exr")).unwrap();
     assert!(fail(path, &["render", "-o", "folder.exr"]).contains("is a directory"));
     assert!(fail(path, &["render", "-o", "no/such/a.exr"]).contains("no directory no/such"));
@@ -30,8 +29,7 @@ fn outputs_that_cannot_be_written() {
 
 #[test]
 fn scenes_that_are_none() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     let good = std::fs::read_to_string(root().join("scenes/disc_face_on.toml")).unwrap();
     let run = |text: &str| {
         std::fs::write(path.join("scene.toml"), text).unwrap();
@@ -99,8 +97,7 @@ fn skies_that_are_no_pictures() {
 /// it makes.
 #[test]
 fn exact_lines_are_those_of_the_file() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     let fit = std::fs::read_to_string(root().join("scenes/fits/scene_1.toml")).unwrap();
     let scene = "[hole]\nspin = 0.5\n\n[disc]\nouter_edge = 9\n";
     let line = |text: &str, what: &str| {
@@ -149,8 +146,7 @@ fn exact_lines_are_those_of_the_file() {
 
 #[test]
 fn overrides_and_arguments_that_make_no_sense() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     assert!(fail(path, &["render", "--set", "hole.spin"]).contains("key.path=value"));
     fail_with(path, &["render", "--set", "hole.spin=2"], &["--set hole.spin=2", "-1 to 1"]);
     assert!(fail(path, &["render", "--set", "hole.color=2"]).contains("color"));
@@ -165,8 +161,7 @@ fn overrides_and_arguments_that_make_no_sense() {
 
 #[test]
 fn tables_of_rays_that_are_none() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     let run = |text: &str| {
         std::fs::write(path.join("rays.csv"), text).unwrap();
         fail(path, &["trace", "--rays", "rays.csv", "-o", "out.csv"])
@@ -207,8 +202,7 @@ fn outputs_spare_inputs() {
 /// Values that no 32-bit channel holds, and fluxes that cannot be had.
 #[test]
 fn pictures_that_cannot_be() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     let run = |assignments: &[&str]| {
         let small = ["render", "--set", "screen.width=8", "--set", "screen.height=8"];
         fail(path, &[&small[..], &sets(assignments)].concat())
@@ -240,8 +234,7 @@ fn volumes_that_are_none() {
 /// A picture knows its files: rendered again with others, it says so.
 #[test]
 fn files_that_have_changed_are_told() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     for name in ["mesh.toml", "ring_and_moon.obj", "ring_and_moon.mtl"] {
         std::fs::copy(root().join("scenes").join(name), at.join(name)).unwrap();
     }

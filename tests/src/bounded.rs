@@ -2,7 +2,9 @@
 //! what would be needed and what there is, never in a signal.
 
 use crate::file_fields::npy;
-use crate::support::{are_the_same, fail, fail_with, replaced, scene_path, sets, succeed};
+use crate::support::{
+    are_the_same, fail, fail_with, new_folder, replaced, scene_path, sets, succeed,
+};
 use std::io::Write;
 use std::path::Path;
 
@@ -33,8 +35,7 @@ fn refused(at: &Path, memory: &str, words: &[&str], said: &str) {
 
 #[test]
 fn exact_numbers_that_would_take_too_much_are_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let set = |change: &'static str| ["fit", "-o", "run", "--set", change];
     for (change, said) in [
         ("screen.pixels=4000", "screen.pixels = 4000"),
@@ -66,8 +67,7 @@ fn exact_numbers_that_would_take_too_much_are_named() {
 
 #[test]
 fn exact_files_that_unpack_to_too_much_are_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     bomb(&at.join("movie.npz"), "movie.npy", [100, 600, 600]);
     bomb(&at.join("volume.npz"), "emission.npy", [330, 330, 330]);
     assert!(std::fs::metadata(at.join("movie.npz")).unwrap().len() < 1 << 20);
@@ -104,8 +104,7 @@ fn exact_files_that_unpack_to_too_much_are_named() {
 /// Lack of memory that no estimate has foreseen ends in a message as well, and no half file stays.
 #[test]
 fn exact_what_was_not_foreseen_ends_in_a_message() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let curve = ["critical-curve", "--spin", "0.9", "--inclination", "60", "--points", "1000000"];
     let message = fail(at, &[&["--memory", "64MiB"][..], &curve, &["-o", "c.csv"]].concat());
     assert!(message.contains("out of memory") && message.contains("--memory"), "{message}");
@@ -151,8 +150,7 @@ fn without_truth(at: &Path, scene: &str) {
 /// A movie that is larger than its part of the memory is kept in a file, and nothing that comes out is another byte.
 #[test]
 fn exact_a_movie_in_a_file_gives_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let scene = scene_path("fits/flare_images.toml");
     let set = small("training.start={linear={nodes=12,stride=400,steps=4}}");
     let words = ["fit", &scene, "-o"];
@@ -179,8 +177,7 @@ fn exact_a_movie_in_a_file_gives_the_same_bytes() {
 #[test]
 #[ignore = "long"]
 fn exact_the_least_limit_that_is_said_is_enough() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let images = scene_path("fits/flare_images.toml");
     let images = ["fit", &images];
     let few = ["training.steps=3", "output.nodes=16", "training.start=drawn"];
@@ -210,8 +207,7 @@ fn exact_the_least_limit_that_is_said_is_enough() {
 /// Images of one file each are the same data as a movie, by any name and within little memory.
 #[test]
 fn exact_a_sequence_of_images_is_a_movie() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let scene = scene_path("fits/flare_images.toml");
     without_truth(at, &scene);
     let set = small("training.start={linear={nodes=12,stride=2,steps=4}}");

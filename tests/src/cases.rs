@@ -1,7 +1,8 @@
 //! Cases of a comparison as commands of their own, run by an engine: each once, none lost, the same bytes.
 
 use crate::support::{
-    binary, fail, json, kerrlight, kill, message, object, root, skipped, start, succeed, until,
+    binary, fail, json, kerrlight, kill, message, new_folder, object, root, skipped, start,
+    succeed, until,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -110,8 +111,7 @@ fn exact_xargs_and_gnu_parallel_run_each_case_once() {
 /// Ten thousand cases of which one was run, and two thousand have its results.
 #[test]
 fn exact_many_cases_are_listed_counted_and_collected() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     experiment(at, 10_000, 20);
     let listed = succeed(at, &["compare", "seeds.toml", "-o", "out", "--list"]);
     let ids: Vec<&str> = listed.lines().map(|line| line.split('\t').next().unwrap()).collect();
@@ -150,8 +150,7 @@ fn exact_many_cases_are_listed_counted_and_collected() {
 /// Of two with one case the second is sent away; a killed one continues to the same bytes.
 #[test]
 fn exact_a_case_has_one_process_and_survives_kills() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     experiment(at, 1, 3000);
     let listed = succeed(at, &["compare", "seeds.toml", "-o", "out", "--list"]);
     let id = listed.split('\t').next().unwrap();
@@ -220,8 +219,7 @@ fn documented_array() -> String {
 #[test]
 #[ignore = "minutes, and needs Slurm"]
 fn exact_an_array_of_slurm_runs_each_case_once() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let Some(slurm) = Slurm::start(at) else { return };
     experiment(at, 4, 2000);
     let array =

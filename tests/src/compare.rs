@@ -1,7 +1,9 @@
 //! `kerrlight compare`: cases that are whole, cached, gone on with, or failed and named.
 
 use crate::fit::results;
-use crate::support::{cramped, fail, fail_with, json, kerrlight, message, root, succeed, told};
+use crate::support::{
+    cramped, fail, fail_with, json, kerrlight, message, new_folder, root, succeed, told,
+};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -89,8 +91,7 @@ fn check_comparison(at: &Path, first: &Value) {
 
 #[test]
 fn exact_cases_are_whole_and_not_done_twice() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     experiment(at, &[]);
     let printed = succeed(at, &["compare", "rates.toml", "-o", "out"]);
     assert!(printed.contains("| rate | PSNR (dB) |"), "{printed}");
@@ -133,8 +134,7 @@ fn exact_cases_are_whole_and_not_done_twice() {
 
 #[test]
 fn a_case_that_fails_is_named_and_the_others_are_whole() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     experiment(at, &[("[0.1, 0.4]", "[0.1, -0.4]")]);
     let output = kerrlight(at, &["compare", "rates.toml", "-o", "out", "--seeds", "1"]);
     assert_eq!(output.status.code(), Some(1));
@@ -152,8 +152,7 @@ fn a_case_that_fails_is_named_and_the_others_are_whole() {
 #[cfg(unix)]
 #[test]
 fn a_case_that_fills_the_disk_is_named_and_done_later() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let nodes = [
         ("\"rate\"", "\"nodes\""),
         ("\"representation.grid.rate\"", "\"output.nodes\""),
@@ -184,8 +183,7 @@ fn a_case_that_fills_the_disk_is_named_and_done_later() {
 fn a_killed_case_is_gone_on_with() {
     use crate::signals::{child_of, first_case, signal};
     use crate::support::{start, until};
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     experiment(at, &[("steps = 30", "steps = 1200"), ("[0.1, 0.4]", "[0.1]")]);
     let words = ["compare", "rates.toml", "-o", "out", "--seeds", "1"];
     let running = start(at, &words);
@@ -200,8 +198,7 @@ fn a_killed_case_is_gone_on_with() {
 
 #[test]
 fn experiments_are_listed_and_mistakes_are_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let listed = succeed(at, &["compare"]);
     for name in ["representations", "sparsity", "axis-minimum", "velocity-mismatch", "coverage"] {
         assert!(listed.contains(name), "{listed}");
@@ -232,8 +229,7 @@ fn experiments_are_listed_and_mistakes_are_named() {
 /// A quick look says that it is one, shows what ran and not what should have, and concludes nothing.
 #[test]
 fn exact_a_quick_look_claims_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let texts = "seeds = 2\nsetup = [\"30 steps of 16 x 16 pixels.\"]\nreading = [\"The first rate wins.\"]";
     let quick = "[quick.set]\ntraining.steps = 5\nscreen.pixels = 12\n[set]";
     let beside = "caption = \"PSNR.\"\nbeside = [{ name = \"theirs\", values = [77.0] }]";
@@ -270,8 +266,7 @@ fn exact_a_quick_look_claims_nothing() {
 /// Draws around every fit: their numbers are results, and a case is done with all of them.
 #[test]
 fn exact_draws_are_results_of_cases() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let value = ("value = \"psnr_db\"", "value = \"random_nodes_within_95\"");
     experiment(at, &[value]);
     let refused = fail(at, &["compare", "rates.toml", "-o", "out"]);
@@ -300,8 +295,7 @@ fn exact_draws_are_results_of_cases() {
 /// Results that no case can have are refused before anything runs.
 #[test]
 fn wrong_results_are_named_before_anything_runs() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let value = "value = \"psnr_db\"";
     for (changes, message) in [
         (vec![(value, "value = \"nosuch\"")], "value = \"nosuch\" is not allowed: psnr_db, "),
@@ -315,8 +309,7 @@ fn wrong_results_are_named_before_anything_runs() {
 /// Tables of χ² have a part for each kind of data where cases compare several, whatever has put them there.
 #[test]
 fn exact_chi2_of_several_kinds_of_data_has_tables_of_its_own() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let one = "{ data = \"image\", weight = 1.0, sigma = 1.0 }";
     let two = format!("[{one}, {{ data = \"light-curve\", weight = 1.0, sigma = 1.0 }}]");
     let rate =

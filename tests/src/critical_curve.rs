@@ -1,7 +1,7 @@
 //! The critical curve against 25-digit references (the recipe is
 //! tests/reference/critical_curve.py) and the verb that writes it.
 
-use crate::support::{fail_with, root, succeed};
+use crate::support::{fail_with, new_folder, root, succeed};
 use kerrlight_geodesic::analytic::{CriticalCurve, CriticalPoint};
 use kerrlight_geodesic::{Inclination, Kerr, Observer};
 
@@ -110,8 +110,7 @@ fn exact_symmetries_of_the_curve() {
 
 #[test]
 fn critical_curve_writes_a_table() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     let arguments = ["critical-curve", "--spin", "-0.94", "--inclination", "17", "--points", "5"];
     let text = succeed(path, &arguments);
     assert_eq!(text.lines().next(), Some("r,lambda,eta,alpha,beta,gamma,delta,tau"));

@@ -4,7 +4,8 @@
 use crate::eht_data;
 use crate::fit::results;
 use crate::support::{
-    fail, fail_with, folder_with, kerrlight, message, root, scene_path, sets, succeed, told,
+    fail, fail_with, folder_with, kerrlight, message, new_folder, root, scene_path, sets, succeed,
+    told,
 };
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::array::built_in;
@@ -207,8 +208,7 @@ fn exact_single_scans_and_tables_are_fitted() {
 /// Every kind of file that is read says that it is empty.
 #[test]
 fn empty_files_are_said_to_be_empty() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     let empty = ["toml", "exr", "csv", "npy", "npz", "fits", "uvfits", "txt", "png", "obj"];
     for extension in empty {
         std::fs::write(path.join(format!("empty.{extension}")), "").unwrap();
@@ -246,8 +246,7 @@ fn empty_files_are_said_to_be_empty() {
 /// Paths on the command line start where the user stands, those in a file beside it.
 #[test]
 fn exact_paths_start_where_they_are_given() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     for name in ["scenes", "skies", "below"] {
         std::fs::create_dir(path.join(name)).unwrap();
     }
@@ -274,8 +273,7 @@ fn exact_paths_start_where_they_are_given() {
 /// Movies, volumes and runs.
 #[test]
 fn exact_inspect_knows_arrays_and_runs() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     let data = path.join("data.uvfits");
     std::fs::write(&data, files::write_uvfits(&measured()).unwrap()).unwrap();
     assert_eq!(fit(path, "sgra_visibilities.toml", &data, "run"), Ok(()));
@@ -300,8 +298,7 @@ fn exact_inspect_knows_arrays_and_runs() {
 /// Values and ranges in the words of the keys.
 #[test]
 fn messages_tell_values() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     let scene = scene_path("hot_spots.toml");
     let film = |rest: &[&'static str]| {
         let words = [&["movie", &scene, "-o", "frames"][..], rest].concat();

@@ -1,6 +1,6 @@
 //! Fields of files: the same numbers however a file writes them, and none that a file does not tell.
 
-use crate::support::{fail_with, succeed, words_of};
+use crate::support::{fail_with, new_folder, succeed, words_of};
 use std::io::Write;
 use std::path::Path;
 
@@ -43,8 +43,7 @@ fn little(number: f64) -> Vec<u8> {
 /// An image, its rows from the north, as every kind of array.
 #[test]
 fn exact_fields_of_numpy_images() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let plain = npy("'<f8'", "False", "(4, 4)", &bytes(&little, &rows));
     let seen = |name: &str, field: &str| {
         let words = format!("observe {name} {field} {SEEN} -o -");
@@ -82,8 +81,7 @@ fn exact_fields_of_numpy_images() {
 
 #[test]
 fn exact_numpy_files_that_are_no_image_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let plain = npy("'<f8'", "False", "(4, 4)", &bytes(&little, &rows));
     archive(&at.join("two.npz"), &[("one.npy", &plain), ("other.npy", &plain)]);
     let two = [60_f64, 30.0].iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<u8>>();
@@ -111,8 +109,7 @@ fn exact_numpy_files_that_are_no_image_are_refused() {
 
 #[test]
 fn exact_columns_of_rays() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let write = |text: &str| std::fs::write(at.join("rays.csv"), text).unwrap();
     let words = ["trace", "--rays", "rays.csv"];
     write("spin,inclination_deg,alpha,beta\n0.5,60,3,2\n");

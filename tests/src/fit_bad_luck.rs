@@ -2,8 +2,8 @@
 
 use crate::fit::{changed, results, small, with};
 use crate::support::{
-    are_the_same, cramped, fail, fail_with, files, message, replaced, scene_path, sets, skipped,
-    start, succeed, told,
+    are_the_same, cramped, fail, fail_with, files, message, new_folder, replaced, scene_path, sets,
+    skipped, start, succeed, told,
 };
 use std::path::Path;
 
@@ -181,8 +181,7 @@ fn exact_frames_without_visibilities_are_left_out() {
 /// Measured visibilities: an error of zero is named with its place; without averaging every scan is a frame.
 #[test]
 fn exact_visibilities_without_errors_are_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let line = |hour: f64, sigma: f64| {
         format!(
             "{hour:.8}      AA     AZ   1900047104.0000  -4939025408.0000  0.14292954    141.7436  {sigma:.8}\n\

@@ -1,7 +1,7 @@
 //! `kerrlight fit --data FILE`: settings that are guessed from a file, with every guess told.
 
 use crate::eht_data;
-use crate::support::{fail, fail_with, sets, succeed, told, words_of};
+use crate::support::{fail, fail_with, new_folder, sets, succeed, told, words_of};
 use std::path::Path;
 
 const SEEN: &str = "observe image.csv --fov-uas 100 --array EHT2017 --mjd 57850 --utc 5-7 --frames 6 --tint 60 --noise thermal --seed 1";
@@ -24,8 +24,7 @@ fn said(folder: &Path, words: &[&str], run: &str) -> (String, String) {
 /// Of a known source everything is guessed and told; of another one what cannot be guessed is asked for, all at once.
 #[test]
 fn exact_visibilities_are_fitted_at_once() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     observed(path, "m87", "a.uvfits");
     observed(path, "12.5,12.4", "b.uvfits");
     let (told, kept) = said(path, &["--data", "a.uvfits", "--model", "volume"], "a");
@@ -56,8 +55,7 @@ fn exact_visibilities_are_fitted_at_once() {
 /// Light curves: Q and U with errors, and a total flux without any.
 #[test]
 fn exact_light_curves_are_fitted_at_once() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     let mut text = "time_utc_h,I,Q,U\n".to_owned();
     for k in 0..40 {
         let (time, turn) = (9.0 + 0.03 * f64::from(k), 0.35 * f64::from(k));
@@ -101,8 +99,7 @@ fn exact_light_curves_are_fitted_at_once() {
 
 #[test]
 fn bad_input_of_data_is_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     assert!(fail(path, &["fit", "--data", "nowhere.uvfits"]).contains("nowhere.uvfits"));
     std::fs::write(path.join("words.csv"), "some,words\n1,2\n").unwrap();
     assert!(fail(path, &["fit", "--data", "words.csv"]).contains("words.csv"));
@@ -126,8 +123,7 @@ fn code_eht_data_need_nothing_more() {
 /// Two blobs of Sgr A* that stand still are fitted as an image; the same pair turning by a full circle asks for motion.
 #[test]
 fn exact_a_quick_look_tells_what_moves() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     let (side, frames) = (24, 12);
     let image = |turn: f64| {
         let (sin, cos) = turn.sin_cos();

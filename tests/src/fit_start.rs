@@ -2,7 +2,7 @@
 
 use crate::fit::results;
 use crate::fit_data::{FEW, observed};
-use crate::support::{fail, fail_with, scene_path, sets, succeed, words_of};
+use crate::support::{fail, fail_with, new_folder, scene_path, sets, succeed, words_of};
 use kerrlight_render::image::exr;
 use std::path::Path;
 
@@ -103,8 +103,7 @@ fn movie_of_a_run_is_observed(path: &Path) {
 /// The starter file of the built-in experiment is the built-in experiment.
 #[test]
 fn exact_starter_of_the_built_in_experiment() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     succeed(path, &["fit", "--init"]);
     let table = |text: &str| text.parse::<toml::Table>().unwrap();
     let text = std::fs::read_to_string(path.join("my_fit.toml")).unwrap();
@@ -118,8 +117,7 @@ fn exact_starter_of_the_built_in_experiment() {
 /// Data of a source that is known here are fitted at once; of another one when the user has filled in what is missing.
 #[test]
 fn exact_starters_of_visibilities_run() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     for (source, name) in [("sgra", "a"), ("12.5,12.4", "b")] {
         let (data, toml) = (format!("{name}.uvfits"), format!("{name}.toml"));
         observed(path, source, &data);

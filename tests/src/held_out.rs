@@ -1,7 +1,7 @@
 //! Weights that are chosen by frames that are held out.
 
 use crate::fit::results;
-use crate::support::{are_the_same, fail_with, sets, succeed};
+use crate::support::{are_the_same, fail_with, new_folder, sets, succeed};
 
 const HELD_OUT: &str = "held_out={setting=\"linear.smoothness\",values=[0.0,0.1,30.0],folds=2}";
 
@@ -25,8 +25,7 @@ fn small<'a>(setting: &'a str, run: &'a str) -> Vec<&'a str> {
 /// tell, and the volume is that of a fit with the chosen weight to the bit.
 #[test]
 fn exact_held_out_frames_choose_the_weight() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     succeed(at, &small(HELD_OUT, "chosen"));
     let found = results(&at.join("chosen"));
     let held_out = &found["held_out"];

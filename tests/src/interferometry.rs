@@ -1,7 +1,7 @@
 //! Observing from the command line, against eht-imaging 1.3.2 (the recipe is
 //! tests/reference/ehtim_visibilities.py) and against itself.
 
-use crate::support::{fail, root, succeed, words_of};
+use crate::support::{fail, new_folder, root, succeed, words_of};
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::files;
 use kerrlight_vlbi::observation::{Observation, Row};
@@ -131,8 +131,7 @@ fn code_ehtim_closure_phases() {
 /// All formats hold the same data, and noise is that of its seed.
 #[test]
 fn exact_formats_agree_and_seeds_repeat() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     write_image(path);
     let noise = ["--noise", "thermal", "--seed", "3", "--random-phases", "--gain-scan", "0.1"];
     for name in ["a.csv", "b.csv", "a.uvfits", "a.txt"] {
@@ -163,8 +162,7 @@ fn exact_formats_agree_and_seeds_repeat() {
 
 #[test]
 fn exact_convert_flags_and_averages() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     write_image(path);
     observe(path, "EHT2017", "a.uvfits", &[]);
     let flags =
@@ -188,8 +186,7 @@ fn exact_convert_flags_and_averages() {
 /// Q and U of the input are in RL and LR; without them RL and LR are not measured, and all else is the same.
 #[test]
 fn exact_cross_hands_are_those_of_the_input() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     write_image(path);
     write_polarized_image(path);
     observe(path, "EHT2017", "plain.txt", &[]);
@@ -211,8 +208,7 @@ fn exact_cross_hands_are_those_of_the_input() {
 /// depend on the precision of times, nor do frames on the order in which their files are named.
 #[test]
 fn exact_files_of_every_kind_tell_the_same() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     write_image(path);
     let kinds = [("a.uvfits", &[][..]), ("a.txt", &[]), ("a.csv", &["--comments"])];
     for (name, more) in kinds {
@@ -308,8 +304,7 @@ fn write_frames(path: &Path) {
 /// of the scene; pictures know their times.
 #[test]
 fn exact_sequences_of_pictures() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     write_frames(path);
     let observe = |inputs: &[&str], more: &[&str], output: &str| {
         let end = ["-o", output];
@@ -357,8 +352,7 @@ fn bad_sequences_are_named(path: &Path, each: [&str; 3]) {
 
 #[test]
 fn bad_input_is_refused_and_nothing_is_written() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     write_image(path);
     let observe = |change: &dyn Fn(&mut Vec<String>)| {
         let start =
@@ -401,8 +395,7 @@ fn bad_input_is_refused_and_nothing_is_written() {
 /// Baselines that begin one after the other: averages have one time, and close.
 #[test]
 fn regress_averages_of_staggered_baselines_close() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     let mut text = "time_utc_h,t1,t2,u,v,re,im,sigma\n".to_owned();
     for (k, pair) in ["A,B", "A,C", "A,D", "B,C", "B,D", "C,D"].into_iter().enumerate() {
         for time in 0..5 {

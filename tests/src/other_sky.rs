@@ -2,7 +2,7 @@
 //! motion in closed form.
 
 use crate::fit_start::array;
-use crate::support::{even, json, root, sets, succeed, within, words_of};
+use crate::support::{even, json, new_folder, root, sets, succeed, within, words_of};
 use kerrlight_render::dynamics::Velocity;
 use kerrlight_tomo::fit::settings::{FitFile, PriorSettings};
 use kerrlight_tomo::fit::setup::{Drawn, FitData, Instrument};
@@ -256,8 +256,7 @@ fn fitted(folder: &Path, sky: &Sky, sigma: f64, also: &[&str]) -> Value {
 #[test]
 fn exact_images_of_another_program_tell_their_rays() {
     let (sky, arcs) = spots_and_arc();
-    let folder = tempfile::tempdir().expect("a folder");
-    let folder = folder.path();
+    let folder = &new_folder();
     let filmed = |rays: usize| {
         let screen = Screen { pixels: 24, rays, ..SCREEN };
         film(&folder.join("film.npz"), screen, &(sky, arcs.clone()), 0.01)
@@ -281,8 +280,7 @@ fn exact_images_of_another_program_tell_their_rays() {
 #[test]
 fn exact_steps_end_where_they_would_follow_noise() {
     let (sky, arcs) = spots_and_arc();
-    let folder = tempfile::tempdir().expect("a folder");
-    let folder = folder.path();
+    let folder = &new_folder();
     let screen = Screen { pixels: 20, rays: 1, ..SCREEN };
     let sigma = film(&folder.join("film.npz"), screen, &(sky, arcs), 0.02);
     let also = ["representation=grid", "output.nodes=16", "training.batch={pixels=512}"];

@@ -3,7 +3,7 @@
 use crate::compare::cases;
 use crate::eht_data::{M87, SGRA, SGRA_POLARIZED, data};
 use crate::fit::results;
-use crate::support::succeed;
+use crate::support::{new_folder, succeed};
 
 /// Returns the changes for an experiment with public data; none, and says so, where the data are not
 /// there.
@@ -49,8 +49,7 @@ fn experiments() -> Vec<String> {
 
 /// A look at each of these experiments: all cases are done, every table is filled, the page is whole.
 fn quick_looks(names: Vec<String>) {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     for name in &names {
         let Some(set) = on_public_data(name) else { continue };
         let words = ["compare", name, "--quick", "-o", name];

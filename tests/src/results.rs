@@ -1,7 +1,9 @@
 //! Output of verbs at their end: two lines for a person, one JSON object for a script, or a file with `-o -`; and the
 //! command line's own help.
 
-use crate::support::{done, fail, folder_with, message, object, root, scene_path, sets, succeed};
+use crate::support::{
+    done, fail, folder_with, message, new_folder, object, root, scene_path, sets, succeed,
+};
 use kerrlight_render::image::exr;
 use serde_json::json;
 
@@ -165,8 +167,7 @@ fn exact_fit_ends_with_its_verdict_and_results() {
 /// Visibilities are the same from a file and through a pipe, and what `inspect` counts of them is what was written.
 #[test]
 fn exact_visibilities_through_a_pipe_and_as_json() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let scans = ["--source", "sgra", "--mjd", "57850", "--utc", "9-10", "--frames", "3"];
     let uv = [&["uv", "EHT2017"][..], &scans, &["--tint", "10"]].concat();
     let found = object(at, &uv);

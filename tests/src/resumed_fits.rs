@@ -3,8 +3,8 @@
 use crate::fit::{results, with};
 use crate::fit_bad_luck::movie;
 use crate::support::{
-    are_the_same, fail, fail_with, holds, kerrlight, kill, killed, root, sets, start, succeed,
-    told, until,
+    are_the_same, fail, fail_with, holds, kerrlight, kill, killed, new_folder, root, sets, start,
+    succeed, told, until,
 };
 use std::path::Path;
 
@@ -51,8 +51,7 @@ fn refused(at: &Path) -> String {
 #[cfg(unix)]
 #[test]
 fn exact_changed_inputs_and_damaged_state_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let words = of_an_array(at);
     succeed(at, &[&words[..], &["-o", "whole"]].concat());
     assert!(results(&at.join("whole"))["inputs"].to_string().contains("array.txt"));
@@ -103,8 +102,7 @@ fn exact_changed_inputs_and_damaged_state_are_refused() {
 /// A movie with one number changed is another movie. `-o` takes an empty folder, as its help says.
 #[test]
 fn exact_a_changed_movie_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let mut words = movie(at, "0.5");
     words[1] = "changed.toml".to_owned();
     let path = at.join("frame.csv");
@@ -138,8 +136,7 @@ fn exact_a_changed_movie_is_refused() {
 /// Two processes in one folder: the second is refused, and a lock does not survive a kill.
 #[test]
 fn exact_a_folder_belongs_to_one_process() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let mut words = of_an_array(at);
     words.extend(["--set", "training.steps=1000000", "-o", "run"]);
     let child = start(at, &words);
@@ -159,8 +156,7 @@ fn exact_a_folder_belongs_to_one_process() {
 #[cfg(unix)]
 #[test]
 fn exact_comparisons_are_resumed_alone_with_the_same_data() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     of_an_array(at);
     let array = at.join("array.txt");
     let text = format!(

@@ -1,6 +1,6 @@
 //! Files that a scene names: what they may refer to, and the ranges of what they hold.
 
-use crate::support::{fail, fail_with, told};
+use crate::support::{fail, fail_with, new_folder, told};
 use kerrlight_render::volume::{Volume, VolumeFile};
 use std::fs;
 use std::path::Path;
@@ -50,8 +50,7 @@ fn regress_meshes_stay_in_their_folder() {
 /// Corners and axes of a file have the ranges of the scene's own keys.
 #[test]
 fn regress_volumes_of_files_have_the_ranges_of_scenes() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &new_folder();
     let volume = "path = \"x.npz\"\nfactor = 1.0\nrotation = \"keplerian\"\nreference_time = 0.0\n";
     fs::write(at.join("s.toml"), format!("{SCENE}[[volume]]\n{volume}")).unwrap();
     let write = |size: f64, value: f32, axis: f64| {

@@ -3,7 +3,8 @@
 
 use crate::fit::{small, with};
 use crate::support::{
-    are_the_same, binary, holds, kerrlight, message, scene_path, sets, start, succeed, until,
+    are_the_same, binary, holds, kerrlight, message, new_folder, scene_path, sets, start, succeed,
+    until,
 };
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -110,8 +111,7 @@ pub fn first_case(folder: &Path) -> Option<std::path::PathBuf> {
 #[test]
 fn exact_no_fit_outlives_its_comparison() {
     for (name, code) in [("-INT", Some(130)), ("-TERM", Some(143)), ("-KILL", None)] {
-        let folder = tempfile::tempdir().unwrap();
-        let at = folder.path();
+        let at = &new_folder();
         experiment(at);
         let parent = start(at, &["compare", "rates.toml", "-o", "out"]);
         let log = || first_case(at).map(|case| case.join("log.jsonl"));

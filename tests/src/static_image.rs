@@ -5,7 +5,7 @@ use crate::fit::results;
 use crate::fit_start::array;
 use crate::known_skies::bell;
 use crate::support::{
-    binary, done, fail, fail_with, message, scene_path, sets, succeed, told, words_of,
+    binary, done, fail, fail_with, message, new_folder, scene_path, sets, succeed, told, words_of,
 };
 use kerrlight_vlbi::Complex64;
 use kerrlight_vlbi::files;
@@ -59,8 +59,7 @@ fn number(found: &serde_json::Value, key: &str) -> f64 {
 /// The ring within three stated errors, with all guesses told; the same bytes when the run is begun again.
 #[test]
 fn exact_a_ring_is_found_at_once() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     observed(path);
     let output = done(path, &quick(&["--data", "data.uvfits", "-o", "run"]));
     let said = message(&output);
@@ -116,8 +115,7 @@ fn exact_a_ring_is_found_at_once() {
 /// table of gains for each. Other sources and frequencies are refused by name.
 #[test]
 fn exact_two_bands_make_one_image() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     observed(path);
     let low = SEEN.replace("229.1", "227.1").replace("--seed 3 -o data", "--seed 4 -o low");
     succeed(path, &words_of(&low));
@@ -168,8 +166,7 @@ fn exact_two_bands_make_one_image() {
 
 #[test]
 fn bad_input_of_a_static_image_is_named_and_nothing_is_begun() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     observed(path);
     for (set, says) in [
         ("image.pixels=4", "image.pixels = 4 is not allowed: 8 to 512"),
@@ -209,8 +206,7 @@ fn exact_an_experiment_without_its_data_is_refused() {
 /// The experiment with data of a test in place of the public ones.
 #[test]
 fn exact_the_experiment_of_m87_has_its_tables() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     observed(path);
     let set = "data.visibilities.path=data.uvfits";
     succeed(path, &["compare", "m87-2017", "--quick", "--set", set, "-o", "out"]);
@@ -290,8 +286,7 @@ fn polarized(folder: &Path, to: &str) {
 /// and from visibilities beside leakage, with numbers in results and page.
 #[test]
 fn exact_polarisation_of_a_ring_is_found() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     for (file, kind) in [
         ("night_dtermcal.uvfits", "polarimetric ratios"),
         ("night.uvfits", "polarized visibilities"),

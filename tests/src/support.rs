@@ -7,6 +7,7 @@ use kerrlight_render::volume::VolumeArrays;
 use serde_json::Value;
 use std::fmt::Display;
 use std::io::Write;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::OnceLock;
@@ -201,6 +202,22 @@ pub fn until(what: &str, mut is_so: impl FnMut() -> bool) {
         assert!(clock.elapsed() < Duration::from_secs(240), "{what}");
         std::thread::sleep(Duration::from_millis(3));
     }
+}
+
+/// A new folder, which goes with all that is in it.
+pub struct Folder(TempDir);
+
+impl Deref for Folder {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        self.0.path()
+    }
+}
+
+/// A new folder; bound as a reference it lasts as long as that.
+pub fn new_folder() -> Folder {
+    Folder(tempfile::tempdir().expect("a folder"))
 }
 
 /// A new folder with one file.

@@ -1,7 +1,9 @@
 //! Fits that do not know the geometry.
 
 use crate::fit::killed_fit;
-use crate::support::{fail_with, folder_with, json, root, sets, succeed, told, words_of};
+use crate::support::{
+    fail_with, folder_with, json, new_folder, root, sets, succeed, told, words_of,
+};
 
 /// The built-in flare seen by the ngEHT, few pixels and scans, from another inclination and orientation than its
 /// settings say.
@@ -122,8 +124,7 @@ reference_time = 0.0
 #[test]
 #[ignore = "long"]
 fn exact_geometry_of_a_movie_with_one_ray_a_pixel_is_found() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
+    let path = &new_folder();
     let volume = sets(&[
         "simulation.truth.spot=[{center=[-5.0,3.0,0.0],sigma=1.0,amplitude=1.0}]",
         "output.nodes=96",
