@@ -216,9 +216,8 @@ fn exact_the_experiment_of_m87_has_its_tables() {
     for case in cases {
         let of = &case["results"];
         let has_draws = case["levels"]["data"] != "closures alone";
-        // One Gaussian start, 24 pixels and 120 iterations: too little for closures alone, and for draws to come to a minimum.
-        assert!(of["ring_diameter_uas_error"].is_null(), "{of}");
-        assert_eq!(of["draws"].as_array().is_some_and(|all| !all.is_empty()), has_draws);
+        assert_eq!(of["ring_diameter_uas_error"].is_number(), has_draws, "{of}");
+        // One Gaussian start, 24 pixels and 120 iterations: too little for closures alone.
         if has_draws {
             let ring = number(of, "ring_diameter_uas");
             assert!((ring - 42.0).abs() < 6.0, "{ring}: {}", case["levels"]);

@@ -99,7 +99,7 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
         _ => (None, None),
     };
     let mut judged = evidence.judged(compared(file, measured, &survey)?, &movie, tested)?;
-    judged.expect(&numbers::chi2_of_draws(&survey), survey.draws_at_minimum().len());
+    judged.expect(&numbers::chi2_of_draws(&survey), survey.draws_that_count().len());
     let gains = Gains::beside(&evidence, &movie, &others(&survey, measured), folder)?;
     let beside = beside(file, measured, &survey);
     let found = Found {
@@ -138,7 +138,7 @@ fn others(survey: &Survey, measured: &FitData) -> Others {
         explains: known.explains,
     };
     Others {
-        draws: survey.draws_at_minimum().into_iter().map(of).collect(),
+        draws: survey.draws_that_count().into_iter().map(of).collect(),
         known_sky: survey.calibration().map(known),
     }
 }

@@ -35,7 +35,7 @@ pub fn with_error(value: f64, error: Option<f64>, digits: usize) -> String {
 /// χ² per datum of fits of the image with other noise, kind by kind: mean and standard deviation; empty with less than two of
 /// them.
 pub fn chi2_of_draws(survey: &Survey) -> Vec<[f64; 2]> {
-    let draws = survey.draws_at_minimum();
+    let draws = survey.draws_that_count();
     let count = draws.len() as f64;
     let of = |kind: usize| {
         let mean = draws.iter().map(|draw| draw.chi2[kind]).sum::<f64>() / count;

@@ -28,7 +28,7 @@ impl Found<'_> {
             panel("the image", image.clone(), None),
             panel("blurred to 20 µas", self.seen(image, BEAM_UAS), Some(BEAM_UAS)),
         ];
-        let draws = self.survey.draws_at_minimum();
+        let draws = self.survey.draws_that_count();
         if draws.len() > 1 {
             let scatter = scatter(&draws);
             all.push(panel("standard deviation of the draws", scatter, None));

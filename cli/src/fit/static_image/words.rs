@@ -216,11 +216,6 @@ impl Found<'_> {
         if draws < 2 {
             return vec!["No draws were asked for: numbers have no errors.".to_owned()];
         }
-        if self.survey.draws_at_minimum().len() < 2 {
-            return vec![
-                "Most draws did not come to a minimum: numbers have no errors.".to_owned(),
-            ];
-        }
         let known_sky = self.survey.known_sky.as_ref();
         let flux = match self.survey.calibration().is_some_and(|known| known.explains) {
             true => "",
@@ -261,9 +256,9 @@ impl Found<'_> {
                  are unfinished."
             ));
         }
-        let effect = match self.survey.draws_at_minimum().len() {
-            0 | 1 => "numbers have no errors",
-            _ => "errors are those of the others",
+        let effect = match 2 * count > draws.len() {
+            true => "errors are too small",
+            false => "errors are those of the others",
         };
         (count > 0).then(|| {
             format!(

@@ -14,11 +14,10 @@ use kerrlight_vlbi::operator::Pulse;
 /// Voxels along each axis, at most.
 const MOST: usize = 128;
 
-/// Errors that the model has of itself in a geometry that a search has found with χ²/N of `reduced`. Data of the same model have its
-/// rays and panels, and no voxels.
+/// Errors that the model has of itself in a geometry that a search has found with χ²/N of `reduced`.
 pub(super) fn errors(
     unknown: &UnknownGeometry,
-    (place, is_foreign): (&Place, bool),
+    place: &Place,
     problem: &GeometryProblem<'_, f32>,
     spread: &Spread,
     reduced: f64,
@@ -31,11 +30,9 @@ pub(super) fn errors(
     place.seen.smoothly(problem, geometry, |problem| {
         let standing = problem.standing(geometry)?;
         let voxels = voxels(&standing, problem)?;
-        let mut refined: Vec<Refined> = voxels.into_iter().collect();
-        if is_foreign {
-            refined.extend(sums(&standing, problem)?);
-            refined.extend(pixels(unknown, place, &standing, problem)?);
-        }
+        let sums = sums(&standing, problem)?;
+        let pixels = pixels(unknown, place, &standing, problem)?;
+        let refined: Vec<Refined> = [voxels, sums, pixels].into_iter().flatten().collect();
         Ok(ModelErrors { known: standing.errors(problem.free, &refined), left_out: None })
     })
 }

@@ -6,7 +6,7 @@ use super::search_data::SearchData;
 use super::tangent::Anchor;
 use super::{discretisation, seen_through};
 use crate::fit::geometry::{
-    Effort, Exploration, Explored, Geometry, GeometryProblem, Spread, TrialWatch,
+    Effort, Exploration, Explored, Geometry, GeometryProblem, ModelErrors, Spread, TrialWatch,
 };
 use crate::fit::linear::{StopRule, refined};
 use crate::fit::settings::SearchView;
@@ -80,13 +80,21 @@ impl Detail<'_> {
             && (seen.is_images() || seen.view.file.screen.pixels == self.file.screen.pixels)
     }
 
-    /// Adds the errors that the model has of itself: those of its voxels, and of the rest where data are of another model.
+    /// Adds the errors that the model has of itself. Data of the same model have its rays, and no voxels: what is left unexplained
+    /// counts.
     pub fn beside_its_own(&self, place: &Place, sure: Sure) -> Result<Sure> {
         let Some(spread) = &sure.spread else { return Ok(sure) };
-        let is_foreign = self.is_foreign()?;
+        if !self.is_foreign()? {
+            let reduced = sure.reduced_chi2;
+            let excess = self.through(place, |problem| Ok(problem.excess(reduced)))?;
+            let known = spread.unexplained(excess, reduced).into_iter().collect();
+            let own = ModelErrors { known, left_out: None };
+            let spread = sure.spread.map(|spread| spread.beside(&self.unknown.free, own));
+            return Ok(Sure { spread, ..sure });
+        }
         let own = self.through(place, |problem| {
             let reduced = sure.reduced_chi2;
-            discretisation::errors(self.unknown, (place, is_foreign), problem, spread, reduced)
+            discretisation::errors(self.unknown, place, problem, spread, reduced)
         })?;
         let spread = sure.spread.map(|spread| spread.beside(&self.unknown.free, own));
         Ok(Sure { spread, ..sure })
