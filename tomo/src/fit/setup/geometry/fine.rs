@@ -86,7 +86,7 @@ impl Detail<'_> {
         let Some(spread) = &sure.spread else { return Ok(sure) };
         if !self.is_foreign()? {
             let reduced = sure.reduced_chi2;
-            let excess = self.through(place, |problem| Ok(problem.excess(reduced)))?;
+            let excess = self.through(place, |problem| Ok(problem.excess_of_all(reduced)))?;
             let known = spread.unexplained(excess, reduced).into_iter().collect();
             let own = ModelErrors { known, left_out: None };
             let spread = sure.spread.map(|spread| spread.beside(&self.unknown.free, own));
