@@ -140,7 +140,9 @@ impl Compare {
             true => quick::look(experiment),
             false => (experiment.clone(), Vec::new()),
         };
-        if self.collect && !cases.iter().any(|case| matches!(status(case), Status::Done(_))) {
+        let is_all = choice.seeds.is_none() && choice.only.is_empty();
+        let is_done = |case| matches!(status(case), Status::Done(_));
+        if self.collect && is_all && !cases.iter().any(is_done) {
             status::refuse_others(&folder, &cases)?;
         }
         let file = Output::new(&folder.join("results.json"), "")?;

@@ -17,6 +17,7 @@ use kerrlight_vlbi::files;
 use kerrlight_vlbi::files::images::{OwnTimes, WithSize, npy_frames, npz_facts, npz_frames};
 use kerrlight_vlbi::light_curve::LightCurve;
 use kerrlight_vlbi::observation::Observation;
+use kerrlight_vlbi::operator::ImageGrid;
 use kerrlight_vlbi::simulate::Movie;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -119,8 +120,14 @@ fn images(file: &FitFile, path: &Path) -> anyhow::Result<WithSize> {
         "npz" => {
             let (field, times) =
                 npz_facts(BufReader::new(output::open(path)?)).with_context(name)?;
-            check_facts(file, path, field, &times)?;
-            npz_frames(output::read_through(path)?).with_context(name)
+            check_times(file, path, &times)?;
+            let (frames, [width, height]) =
+                npz_frames(output::read_through(path)?).with_context(name)?;
+            if let Some(field) = field {
+                let own = ImageGrid::new(width, height, field * MICROARCSECOND);
+                setup::check_field(file, own.with_context(name)?, &name())?;
+            }
+            Ok((frames, [width, height]))
         }
         // In Fortran order no image lies in one piece: such an array is read as a whole.
         "npy" if numpy::Stream::new(BufReader::new(output::open(path)?)).is_ok() => {
@@ -155,13 +162,12 @@ fn sequence(file: &FitFile, files: &[PathBuf]) -> anyhow::Result<WithSize> {
         return Err(error);
     }
     let name = || files[0].display().to_string();
-    // Frames are made twice where they do not fit into memory.
     let times = match hours.len() == files.len() {
         true => OwnTimes::Since(hours),
         false => OwnTimes::Unknown,
     };
     movie_files::check_steps(&times).with_context(name)?;
-    check_facts(file, &files[0], None, &times)?;
+    check_times(file, &files[0], &times)?;
     Ok((frames?, size))
 }
 
@@ -198,33 +204,13 @@ fn movie(file: &FitFile, path: &Path) -> anyhow::Result<(Movie, OwnTimes)> {
             return Ok((movie.i, times));
         }
     };
-    let grid = movie.i.grid;
-    let field_uas = grid.pixel_rad * grid.width as f64 / MICROARCSECOND;
-    check_facts(file, path, Some(field_uas), &times)?;
+    setup::check_field(file, movie.i.grid, &path.display().to_string())?;
+    check_times(file, path, &times)?;
     Ok((movie.i, times))
 }
 
-/// Fields and times of a file may differ from those of the fit by this part.
-const SAME: f64 = 0.01;
-
-/// Refuses images whose file tells another field on the sky, or other times, than the fit.
-fn check_facts(
-    file: &FitFile,
-    path: &Path,
-    field_uas: Option<f64>,
-    times: &OwnTimes,
-) -> anyhow::Result<()> {
-    let differ = |own: f64, fit: f64| (own - fit).abs() > SAME * own.abs().max(fit.abs());
-    let path = path.display();
-    if let (Some(own), Ok(sky)) = (field_uas, setup::sky(file)) {
-        let fit = sky.pixel_rad * sky.width as f64 / MICROARCSECOND;
-        if differ(own, fit) {
-            bail!(
-                "{path} says that its field is {own:.4} µas wide, and the fit's is {fit:.4} µas: screen.width at the mass and \
-                 the distance of the hole, or screen.field_uas"
-            );
-        }
-    }
+/// Refuses images that are at other times than those of the fit by more than a hundredth.
+fn check_times(file: &FitFile, path: &Path, times: &OwnTimes) -> anyhow::Result<()> {
     let (OwnTimes::Utc(hours) | OwnTimes::Since(hours)) = times else { return Ok(()) };
     let ([first, .., last], Some(mass), Some([from, to])) =
         (&hours[..], file.hole.mass_msun, file.span_of_images())
@@ -232,10 +218,11 @@ fn check_facts(
         return Ok(());
     };
     let (own, fit) = (last - first, (to - from) * gravitational_time(mass) / 3600.0);
-    if differ(own, fit) {
+    if (own - fit).abs() > 0.01 * own.abs().max(fit.abs()) {
         bail!(
-            "{path} says that its images are over {own:.4} hours, and the fit's are over {fit:.4}: data.movie.from and to, M, \
-             at the mass of the hole (`hours` or `times` of an archive: rename what is none)"
+            "{} says that its images are over {own:.4} hours, and the fit's are over {fit:.4}: data.movie.from and to, M, \
+             at the mass of the hole (`hours` or `times` of an archive: rename what is none)",
+            path.display()
         );
     }
     Ok(())

@@ -5,7 +5,6 @@ use crate::fit::settings::{AxisSearch, FitFile, refuse};
 use crate::fit::setup::{self, FitData, Instrument, RaySampling};
 use crate::fit::{Motion, Objective};
 use crate::representation::Registry;
-use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::array::Array;
 use kerrlight_vlbi::light_curve::LightCurve;
 use kerrlight_vlbi::observation::Observation;
@@ -145,15 +144,10 @@ impl Problem {
         Ok(Objective { model: instrument.forward(motion)?, data })
     }
 }
-/// Refuses a movie that is no whole images, or whose field differs from that of the settings by more than a hundredth.
+/// Refuses a movie that is no whole images, or of another field than that of the settings.
 fn check_grid(settings: &FitFile, grid: ImageGrid, numbers: usize) -> Result<(), Error> {
     if grid.pixels() == 0 || numbers == 0 || !numbers.is_multiple_of(grid.pixels()) {
         refuse!("the movie has {numbers} numbers: no images of {} x {}", grid.width, grid.height);
     }
-    let Ok(sky) = setup::sky(settings) else { return Ok(()) };
-    let [own, fit] = [grid, sky].map(|of| of.pixel_rad * of.width as f64 / MICROARCSECOND);
-    if (own - fit).abs() > 0.01 * own.max(fit) {
-        refuse!("the movie is {own:.4} µas wide, and the field of the settings {fit:.4} µas");
-    }
-    Ok(())
+    setup::check_field(settings, grid, "the movie")
 }

@@ -67,7 +67,7 @@ use super::linear::Prior;
 use super::settings::{
     AxisScan, AxisSearch, FitError, FitFile, Linear, Observer as ObserverSettings, Screen,
 };
-use super::settings::{WidthOf, Within};
+use super::settings::{WidthOf, Within, refuse};
 use super::{Motion, Regulariser};
 use crate::optimise::LinearDecay;
 use kerrlight_common::units::{MICROARCSECOND, gravitational_angle, gravitational_time};
@@ -132,6 +132,22 @@ pub fn sky(file: &FitFile) -> Result<ImageGrid> {
         }
     };
     Ok(ImageGrid::new(n, n, field_uas * MICROARCSECOND)?)
+}
+
+/// Refuses images whose own field on the sky differs from that of the settings, where these tell angles, by more than a hundredth.
+///
+/// # Errors
+/// Names the images and both fields.
+pub fn check_field(file: &FitFile, own: ImageGrid, name: &str) -> Result<()> {
+    let Ok(sky) = sky(file) else { return Ok(()) };
+    let [own, fit] = [own, sky].map(|of| of.pixel_rad * of.width as f64 / MICROARCSECOND);
+    if (own - fit).abs() > 0.01 * own.max(fit) {
+        refuse!(
+            "{name} says that its field is {own:.4} µas wide, and the fit's is {fit:.4} µas: screen.width at the mass and the \
+             distance of the hole, or screen.field_uas"
+        );
+    }
+    Ok(())
 }
 
 /// Advice where the mass is missing.

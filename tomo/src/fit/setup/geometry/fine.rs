@@ -84,17 +84,13 @@ impl Detail<'_> {
     /// counts.
     pub fn beside_its_own(&self, place: &Place, sure: Sure) -> Result<Sure> {
         let Some(spread) = &sure.spread else { return Ok(sure) };
-        if !self.is_foreign()? {
-            let reduced = sure.reduced_chi2;
-            let excess = self.through(place, |problem| Ok(problem.excess_of_all(reduced)))?;
-            let known = spread.unexplained(excess, reduced).into_iter().collect();
-            let own = ModelErrors { known, left_out: None };
-            let spread = sure.spread.map(|spread| spread.beside(&self.unknown.free, own));
-            return Ok(Sure { spread, ..sure });
-        }
+        let (is_foreign, reduced) = (self.is_foreign()?, sure.reduced_chi2);
         let own = self.through(place, |problem| {
-            let reduced = sure.reduced_chi2;
-            discretisation::errors(self.unknown, place, problem, spread, reduced)
+            if is_foreign {
+                return discretisation::errors(self.unknown, place, problem, spread, reduced);
+            }
+            let known = spread.unexplained(problem.excess_of_all(reduced), reduced);
+            Ok(ModelErrors { known: known.into_iter().collect(), left_out: None })
         })?;
         let spread = sure.spread.map(|spread| spread.beside(&self.unknown.free, own));
         Ok(Sure { spread, ..sure })
