@@ -1,6 +1,6 @@
 //! Tables of station gains: a station at a time a line, columns told by a line of names.
 
-use super::{FileError, number};
+use super::{FileError, between, number};
 use crate::Complex64;
 use crate::Error;
 use crate::gains::{GainTable, StationGain};
@@ -55,7 +55,7 @@ pub fn parse(text: &str) -> Result<GainTable, Error> {
             continue;
         }
         let located = |message: String| FileError::line(index + 1, message);
-        let cells: Vec<&str> = line.split(',').map(str::trim).take(64).collect();
+        let cells = between(',', line);
         match &places {
             None => places = Some((heading(&cells).map_err(located)?, cells.len())),
             Some((_, names)) if cells.len() > *names => {
@@ -83,11 +83,21 @@ pub fn parse(text: &str) -> Result<GainTable, Error> {
 type Places = [Option<usize>; COLUMNS.len()];
 
 fn heading(cells: &[&str]) -> Result<Places, String> {
-    let times = |name: &str| cells.iter().filter(|cell| **cell == name).count();
+    let times = |name: &str| cells.iter().filter(|cell| cell.eq_ignore_ascii_case(name)).count();
     if let Some(twice) = COLUMNS.iter().find(|name| times(name) > 1) {
         return Err(format!("column `{twice}` appears twice"));
     }
-    let places = COLUMNS.map(|name| cells.iter().position(|cell| *cell == name));
+    // A gain of another name or unit is not passed over: its phase would count as 0.
+    let is_other = |cell: &str| {
+        let name = cell.to_ascii_lowercase();
+        ["phase", "amp"].iter().any(|start| name.starts_with(start))
+            && !COLUMNS.contains(&name.as_str())
+    };
+    if let Some(other) = cells.iter().find(|cell| is_other(cell)) {
+        let allowed = COLUMNS[3..].join(", ");
+        return Err(format!("column `{}` is not allowed: {allowed}", super::shortened(other)));
+    }
+    let places = COLUMNS.map(|name| cells.iter().position(|cell| cell.eq_ignore_ascii_case(name)));
     let missing =
         COLUMNS.iter().zip(places).find(|(name, at)| at.is_none() && !OPTIONAL.contains(name));
     match missing {

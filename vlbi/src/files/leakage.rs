@@ -1,6 +1,6 @@
 //! Tables of leakage: a station a line, columns told by a line of names.
 
-use super::{FileError, number};
+use super::{FileError, between, number};
 use crate::Complex64;
 use crate::Error;
 use crate::polarimetry::{LeakageTable, StationLeakage};
@@ -49,7 +49,7 @@ pub fn parse(text: &str) -> Result<LeakageTable, Error> {
 }
 
 fn station(line: &str) -> Result<StationLeakage, String> {
-    let cells: Vec<&str> = line.split(',').map(str::trim).take(8).collect();
+    let cells = between(',', line);
     let [name, r_re, r_im, r_error, l_re, l_im, l_error] = cells[..] else {
         return Err(format!("{} columns: 7 are needed ({HEADING})", cells.len()));
     };

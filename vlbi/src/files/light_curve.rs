@@ -1,6 +1,6 @@
 //! Tables of light curves: a time a line, columns separated by commas or blanks and told by a line of names.
 
-use super::{FileError, cells, number, sigma};
+use super::{FileError, cells, cells_below, has_tabs, number, sigma};
 use crate::Error;
 use crate::earth::MJD_ZERO;
 use crate::light_curve::{Flux, LightCurve, Sample};
@@ -11,14 +11,22 @@ use kerrlight_common::stokes::StokesParameter;
 const TIMES: [&str; 10] =
     ["time_utc_h", "time", "t", "utc", "ut", "utc_h", "time_h", "time_hr", "hour", "hours"];
 /// Names of a column of times in days, of which the part of the first day counts.
-const DAYS: [&str; 4] = ["mjd", "time_mjd", "jd", "time_jd"];
+const DAYS: [&str; 2] = ["mjd", "time_mjd"];
+const JULIAN_DAYS: [&str; 2] = ["jd", "time_jd"];
+
+#[derive(Clone, Copy, PartialEq)]
+enum TimeUnit {
+    Hours,
+    Days,
+    /// Days from a noon, in full.
+    JulianDays,
+}
 
 /// Place of times, and their unit.
 #[derive(Clone, Copy)]
 struct TimeColumn {
     at: usize,
-    /// True if they are days.
-    days: bool,
+    unit: TimeUnit,
 }
 
 /// Places of the columns.
@@ -29,21 +37,26 @@ struct Heading {
     values: [Option<usize>; 4],
     sigmas: [Option<usize>; 4],
     by: Option<usize>,
+    /// True if tabs separate cells.
+    tabs: bool,
+    /// Two columns of the same quantity.
+    rivals: Option<[String; 2]>,
 }
 
 impl TimeColumn {
     fn find(names: &[String]) -> Option<Self> {
-        let of = |all: &[&str], days| {
+        let of = |all: &[&str], unit| {
             let at = |name: &&str| names.iter().position(|n| n == name);
-            all.iter().find_map(at).map(|at| TimeColumn { at, days })
+            all.iter().find_map(at).map(|at| TimeColumn { at, unit })
         };
-        of(&TIMES, false).or_else(|| of(&DAYS, true))
+        let hours = of(&TIMES, TimeUnit::Hours).or_else(|| of(&DAYS, TimeUnit::Days));
+        hours.or_else(|| of(&JULIAN_DAYS, TimeUnit::JulianDays))
     }
 
     fn check_unit(self, names: &[String], units: &[String]) -> Result<(), String> {
-        let allowed: &[&str] = match self.days {
-            true => &["d", "day", "days", "mjd", "jd", "utc", "ut"],
-            false => &["h", "hr", "hrs", "hour", "hours", "utc", "ut"],
+        let allowed: &[&str] = match self.unit {
+            TimeUnit::Hours => &["h", "hr", "hrs", "hour", "hours", "utc", "ut"],
+            _ => &["d", "day", "days", "mjd", "jd", "utc", "ut"],
         };
         check_unit(&names[self.at], &units[self.at], allowed)
     }
@@ -60,14 +73,24 @@ fn check_unit(name: &str, unit: &str, allowed: &[&str]) -> Result<(), String> {
 impl Heading {
     fn find(names: &[String]) -> Option<Self> {
         let at = |name: &str| names.iter().position(|n| n == name);
-        let any = |names: &[String]| names.iter().find_map(|name| at(name));
-        let value = |parameter: StokesParameter| {
-            let name = parameter.name().to_ascii_lowercase();
-            let fluxes = [name.clone(), format!("{name}_jy"), format!("stokes_{name}")];
-            let is_i = parameter == StokesParameter::I;
-            any(&fluxes).or_else(|| at("flux").or_else(|| at("flux_jy")).filter(|_| is_i))
+        let mut rivals = None;
+        let mut any = |wanted: &[String]| {
+            let mut found = names.iter().enumerate().filter(|(_, name)| wanted.contains(name));
+            let (first, second) = (found.next()?, found.next());
+            if let Some((_, second)) = second.filter(|second| second.1 != first.1) {
+                rivals.get_or_insert([first.1.clone(), second.clone()]);
+            }
+            Some(first.0)
         };
-        let error = |parameter: StokesParameter| {
+        let values = StokesParameter::ALL.map(|parameter| {
+            let name = parameter.name().to_ascii_lowercase();
+            let mut fluxes = vec![name.clone(), format!("{name}_jy"), format!("stokes_{name}")];
+            if parameter == StokesParameter::I {
+                fluxes.extend(["flux", "flux_jy"].map(str::to_owned));
+            }
+            any(&fluxes)
+        });
+        let mut error = |parameter: StokesParameter| {
             let name = parameter.name().to_ascii_lowercase();
             let around = ["sigma", "sig", "err", "error", "std", "e"];
             let mut all: Vec<String> = around
@@ -75,17 +98,19 @@ impl Heading {
                 .flat_map(|word| [format!("{word}_{name}"), format!("{name}_{word}")])
                 .collect();
             all.extend([format!("d{name}"), format!("{name}sigma"), format!("{name}err")]);
-            let shared = ["sigma", "err", "error", "flux_err", "flux_error"];
-            any(&all).or_else(|| shared.iter().find_map(|name| at(name)))
+            let shared = ["sigma", "err", "error", "flux_err", "flux_error"].map(str::to_owned);
+            any(&all).or_else(|| any(&shared))
         };
-        let values = StokesParameter::ALL.map(value);
+        let sigmas = StokesParameter::ALL.map(&mut error);
         values.iter().any(Option::is_some).then_some(())?;
         Some(Heading {
             count: names.len(),
             time: TimeColumn::find(names)?,
             values,
-            sigmas: StokesParameter::ALL.map(error),
+            sigmas,
             by: at("baseline"),
+            tabs: false,
+            rivals,
         })
     }
 
@@ -177,25 +202,28 @@ pub fn is_light_curve(text: &str) -> bool {
 pub fn parse(text: &str) -> Result<LightCurve, Error> {
     let (mut heading, mut comment) = (None, (Vec::new(), Vec::new()));
     let mut samples: Vec<Sample> = Vec::new();
-    let mut first_day = None;
+    let (mut first_day, mut commented) = (None, "");
     for (index, line) in text.lines().enumerate() {
         let located = |message: String| FileError::line(index + 1, message);
         if line.trim().is_empty() {
             continue;
         }
         if line.starts_with('#') {
-            comment = names(line);
+            (comment, commented) = (names(line), line.trim_start_matches('#'));
             continue;
         }
-        let cells = cells(line);
         if heading.is_none() {
             let here = names(line);
             let is_names = Heading::find(&here.0).is_some();
             let (named, units) = if is_names { here } else { std::mem::take(&mut comment) };
             let why = || located(format!("`{}` names no {}", shown(line), wanted()));
-            let found = Heading::find(&named).ok_or_else(why)?;
+            let mut found = Heading::find(&named).ok_or_else(why)?;
+            found.tabs = has_tabs(if is_names { line } else { commented }, named.len());
             if let Some(k) = found.twice(&named) {
                 return Err(located(format!("column `{}` appears twice", named[k])).into());
+            }
+            if let Some([a, b]) = &found.rivals {
+                return Err(located(format!("columns `{a}` and `{b}` name the same flux")).into());
             }
             found.check_units(&named, &units).map_err(located)?;
             heading = Some(found);
@@ -204,6 +232,7 @@ pub fn parse(text: &str) -> Result<LightCurve, Error> {
             }
         }
         let Some(columns) = &heading else { continue };
+        let cells = cells_below(line, columns.count, columns.tabs).map_err(located)?;
         samples.push(sample(&cells, columns, &mut first_day).map_err(located)?);
     }
     if heading.is_none() {
@@ -226,15 +255,19 @@ fn shown(line: &str) -> String {
 }
 
 /// Hours of UTC of a cell. Days count from the midnight before the first of them.
-fn hours(cell: &str, days: bool, first_day: &mut Option<f64>) -> Result<f64, String> {
+fn hours(cell: &str, unit: TimeUnit, first_day: &mut Option<f64>) -> Result<f64, String> {
     let time = number(cell, "column time:")?;
-    let hours = match days {
-        true => {
-            // Told by its size, whatever the column is called.
+    let hours = match unit {
+        TimeUnit::Hours => time,
+        // Less some days that are not told, it may begin at noon or at midnight.
+        TimeUnit::JulianDays if time <= MJD_ZERO => {
+            return Err(format!("column time: JD {time} is not allowed: above {MJD_ZERO}"));
+        }
+        _ => {
+            // Told by its size.
             let mjd = if time > MJD_ZERO { time - MJD_ZERO } else { time };
             24.0 * (mjd - *first_day.get_or_insert(mjd.floor()))
         }
-        false => time,
     };
     match (-1e4..=1e4).contains(&hours) {
         true => Ok(hours),
@@ -254,8 +287,8 @@ fn sample(
     if cells.len() > columns.count {
         return Err(format!("{} cells, but {} names", cells.len(), columns.count));
     }
-    let TimeColumn { at, days } = columns.time;
-    let time_h = hours(cell(at, "time")?, days, first_day)?;
+    let TimeColumn { at, unit } = columns.time;
+    let time_h = hours(cell(at, "time")?, unit, first_day)?;
     let mut stokes = [None; 4];
     for parameter in StokesParameter::ALL {
         let k = parameter.index();
@@ -286,22 +319,23 @@ pub fn parse_times(text: &str) -> Result<Vec<f64>, Error> {
         if line.trim().is_empty() || line.starts_with('#') {
             continue;
         }
-        let cells = cells(line);
-        let Some(TimeColumn { at, days }) = column else {
-            let only = || (cells.len() == 1).then_some(TimeColumn { at: 0, days: false });
+        let Some((TimeColumn { at, unit }, count, tabs)) = column else {
+            let cells = cells(line);
+            let only = || (cells.len() == 1).then_some(TimeColumn { at: 0, unit: TimeUnit::Hours });
             let why = || located(format!("`{}` names no column time_utc_h", shown(line)));
             let (names, units) = names(line);
             let found = TimeColumn::find(&names).or_else(only).ok_or_else(why)?;
             found.check_unit(&names, &units).map_err(located)?;
-            column = Some(found);
+            column = Some((found, names.len(), has_tabs(line, names.len())));
             // A column alone may have no name.
             if let [Ok(time)] = cells.iter().map(|cell| cell.parse()).collect::<Vec<_>>()[..] {
                 times.push(time);
             }
             continue;
         };
+        let cells = cells_below(line, count, tabs).map_err(located)?;
         let cell = cells.get(at).copied().unwrap_or_default();
-        times.push(hours(cell, days, &mut first_day).map_err(located)?);
+        times.push(hours(cell, unit, &mut first_day).map_err(located)?);
     }
     if times.is_empty() {
         return Err(FileError::whole("no times").into());
@@ -385,6 +419,9 @@ mod tests {
         assert_eq!(julian.samples[0].time_h, 18.0);
         let hours = parse("time(hr),Stokes I,Isigma(Jy)\n4.0,2.4,0.1\n").unwrap();
         assert_eq!(flux(&hours, 0, 0).sigma_jy, Some(0.1));
+        // An empty cell between tabs is no measurement, and what follows stays where it is.
+        let tabs = parse("time\tI\tcount\n1\t2.4\t50\n2\t\t50\n3\t2.5\t50\n").unwrap();
+        assert_eq!(tabs.samples.iter().map(|s| s.time_h).collect::<Vec<_>>(), [1.0, 3.0]);
         assert!(is_light_curve("# t Q U\n1 2 3\n") && is_light_curve("UTC,I\n1,2\n"));
         assert!(!is_light_curve("# an image\n1,2,3\n") && !is_light_curve("1 2 3\n"));
     }
@@ -400,6 +437,10 @@ mod tests {
             ("time,I\n1e9,2\n", "line 2: column time: 1000000000 h is not allowed"),
             ("time,Q,Q\n1,2,3\n", "line 1: column `q` appears twice"),
             ("time,I\n1,2,3\n", "line 2: 3 cells, but 2 names"),
+            ("JD,I\n7850.6,2\n", "line 2: column time: JD 7850.6 is not allowed: above 2400000.5"),
+            ("i,time,flux\n0,1,2.4\n", "line 1: columns `i` and `flux` name the same flux"),
+            ("time,I,I_err,sigma_I\n1,2,3,4\n", "columns `i_err` and `sigma_i` name the same flux"),
+            ("time I count\n1 2\n", "line 2: 2 columns, but 3 names"),
             ("time (min),I\n1,2\n", "line 1: column `time` in `min` is not allowed: h"),
             ("time(h)\tI [mJy]\n1\t2\n", "line 1: column `i` in `mjy` is not allowed: jy"),
             ("# MJD [s] I\n1 2\n", "line 2: column `mjd` in `s` is not allowed: d"),

@@ -120,9 +120,38 @@ fn check_numbers(observation: &Observation) -> Result<(), FileError> {
 /// The cells of a line: between commas, or between blanks where there is none; 64 at most, no known writer has more.
 fn cells(line: &str) -> Vec<&str> {
     match line.contains(',') {
-        true => line.split(',').map(str::trim).take(64).collect(),
+        true => between(',', line),
         false => line.split_whitespace().take(64).collect(),
     }
+}
+
+/// The cells between separators, without blanks and quotation marks around them.
+fn between<'a>(separator: char, line: &'a str) -> Vec<&'a str> {
+    let unquoted = |cell: &'a str| {
+        let cell = cell.trim();
+        cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"')).unwrap_or(cell)
+    };
+    line.split(separator).map(unquoted).take(64).collect()
+}
+
+/// Returns whether single tabs stand between the names of columns: cells of the lines below may then be empty.
+fn has_tabs(line: &str, names: usize) -> bool {
+    !line.contains(',') && names > 1 && line.trim().split('\t').count() == names
+}
+
+/// The cells of a line below a heading of `names`.
+///
+/// # Errors
+/// If blanks separate cells and some are missing: it is not known which.
+fn cells_below(line: &str, names: usize, tabs: bool) -> Result<Vec<&str>, String> {
+    if tabs && !line.contains(',') {
+        return Ok(between('\t', line));
+    }
+    let cells = cells(line);
+    if cells.len() < names && !line.contains(',') {
+        return Err(format!("{} columns, but {names} names", cells.len()));
+    }
+    Ok(cells)
 }
 
 /// A text without the byte order mark that spreadsheets and editors of Windows put before it.

@@ -88,12 +88,7 @@ fn read_heading(
         }
         "HISTORY:" => observation.history.push(words[1..].join(" ")),
         "time" => {
-            check_columns(line, &words)?;
-            observation.basis = match words.get(11) {
-                Some(&"Iamp") => Basis::Stokes,
-                Some(&"RRamp") => Basis::Circular,
-                _ => return Err("neither Iamp nor RRamp follows V (lambda)".to_owned()),
-            };
+            observation.basis = columns(line, &words)?;
             return Ok(true);
         }
         _ => {
@@ -108,18 +103,42 @@ fn read_heading(
     Ok(false)
 }
 
-/// Refuses columns in another order, or in other units.
-fn check_columns(line: &str, words: &[&str]) -> Result<(), String> {
-    let (start, wanted) = (words.get(7..11).unwrap_or_default(), "U (lambda) V (lambda)");
+/// The products of a basis in the order of their columns.
+fn hands(basis: Basis) -> [&'static str; 4] {
+    match basis {
+        Basis::Stokes => ["I", "Q", "U", "V"],
+        Basis::Circular => ["RR", "LL", "RL", "LR"],
+    }
+}
+
+/// The basis that the columns are in; refuses others, another order, or other units.
+fn columns(line: &str, words: &[&str]) -> Result<Basis, String> {
+    let (start, wanted) = (
+        words.get(..11).unwrap_or_default(),
+        "time (hr) tint T1 T2 Tau1 Tau2 U (lambda) V (lambda)",
+    );
     if start.join(" ") != wanted {
-        return Err(format!("`{}` is not allowed: {wanted}", super::shortened(&start.join(" "))));
+        return Err(format!("`{}` is not allowed: {wanted}", start.join(" ")));
+    }
+    let basis = match words.get(11) {
+        Some(&"Iamp") => Basis::Stokes,
+        Some(&"RRamp") => Basis::Circular,
+        _ => return Err("neither Iamp nor RRamp follows V (lambda)".to_owned()),
+    };
+    let data =
+        hands(basis).into_iter().flat_map(|hand| [format!("{hand}amp"), format!("{hand}phase")]);
+    let names = data.chain(hands(basis).map(|hand| format!("{hand}sigma")));
+    let named = words[11..].iter().filter(|word| !word.starts_with('('));
+    let named = named.map(|word| word.split('(').next().unwrap_or_default());
+    if let Some((named, name)) = named.zip(names).find(|(named, name)| named != name) {
+        return Err(format!("`{}` is not allowed: {name}", super::shortened(named)));
     }
     let mut units = line.split('(').skip(1).filter_map(|rest| rest.split(')').next());
     match units.find(|unit| !["hr", "lambda", "Jy", "d"].contains(unit)) {
         Some(unit) => {
             Err(format!("unit `{}` is not allowed: hr, lambda, Jy, d", super::shortened(unit)))
         }
-        None => Ok(()),
+        None => Ok(basis),
     }
 }
 
@@ -139,6 +158,10 @@ fn gigahertz(words: &[&str], name: &str) -> Result<f64, String> {
 fn sexagesimal(words: &[&str], name: &str) -> Result<f64, String> {
     let part = |k: usize| number(words.get(k).copied().unwrap_or_default(), name);
     let (whole, minutes, seconds) = (part(1)?, part(3)?, part(5)?);
+    // Seconds that are rounded may be 60.
+    if let Some(part) = [minutes, seconds].into_iter().find(|part| !(0.0..=60.0).contains(part)) {
+        return Err(format!("{name}: {part} minutes or seconds are not allowed: [0, 60]"));
+    }
     let size = whole.abs() + minutes / 60.0 + seconds / 3600.0;
     // Of `-0` the sign counts too.
     Ok(if whole.is_sign_negative() { -size } else { size })
@@ -226,10 +249,7 @@ pub fn to_text(observation: &Observation) -> Result<String, Error> {
     for station in &observation.stations {
         let _ = writeln!(text, "# {}", array::columns(station));
     }
-    let hands = match observation.basis {
-        Basis::Stokes => ["I", "Q", "U", "V"],
-        Basis::Circular => ["RR", "LL", "RL", "LR"],
-    };
+    let hands = hands(observation.basis);
     let _ = write!(text, "# {rule}\n# time (hr) tint T1 T2 Tau1 Tau2 U (lambda) V (lambda)");
     hands.iter().for_each(|hand| {
         let _ = write!(text, " {hand}amp (Jy) {hand}phase(d)");
@@ -332,7 +352,11 @@ mod tests {
         assert!(fail(&good.replace(" AA CC ", " AA XX ")).contains("station `XX`"));
         assert!(fail(&good.replace("time (hr)", "times (hr)")).contains("before the heading"));
         let swapped = good.replace("U (lambda) V (lambda)", "V (lambda) U (lambda)");
-        assert!(fail(&swapped).contains("is not allowed: U (lambda) V (lambda)"));
+        assert!(fail(&swapped).contains("Tau2 U (lambda) V (lambda)"), "{}", fail(&swapped));
+        let other = good.replace("LLamp", "RLamp");
+        assert!(fail(&other).contains("`RLamp` is not allowed: LLamp"), "{}", fail(&other));
+        let minutes = good.replacen(" m ", "5 m ", 1);
+        assert!(fail(&minutes).contains("RA: 455 minutes or seconds"), "{}", fail(&minutes));
         let milli = good.replace("sigma (Jy)", "sigma (mJy)");
         assert!(fail(&milli).contains("unit `mJy` is not allowed"), "{}", fail(&milli));
     }

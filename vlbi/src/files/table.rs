@@ -2,8 +2,8 @@
 //! by a line of names: kerrlight's CSV, and the csv and txt of the EHT's public releases.
 
 use super::{
-    FileError, MOST_HOURS, MOST_WAVELENGTHS, Names, cells, check_located, comments, number,
-    number_within, sigma,
+    FileError, MOST_HOURS, MOST_WAVELENGTHS, Names, cells, cells_below, check_located, comments,
+    has_tabs, number, number_within, sigma,
 };
 use crate::Complex64;
 use crate::Error;
@@ -28,15 +28,19 @@ struct Heading {
     columns: [usize; 8],
     polar: bool,
     channel: Option<usize>,
+    /// True if tabs separate cells.
+    tabs: bool,
 }
 
 impl Heading {
-    fn find(names: &[&str]) -> Option<Self> {
+    fn find(line: &str) -> Option<Self> {
+        let names = &cells(line);
         [(COLUMNS, false), (EHT_COLUMNS, true)].into_iter().find_map(|(wanted, polar)| {
             let at = |name: &str| names.iter().position(|n| n.eq_ignore_ascii_case(name));
             let found: Option<Vec<usize>> = wanted.iter().map(|name| at(name)).collect();
             let (channel, count) = (at(CHANNEL), names.len());
-            Some(Heading { count, columns: found?.try_into().ok()?, polar, channel })
+            let (columns, tabs) = (found?.try_into().ok()?, has_tabs(line, count));
+            Some(Heading { count, columns, polar, channel, tabs })
         })
     }
 
@@ -69,19 +73,19 @@ pub fn parse(text: &str) -> Result<Observation, Error> {
                 continue;
             }
             // The names of columns are a comment in the EHT's tables.
-            let columns = cells(bare.trim());
-            heading = Heading::find(&columns);
+            heading = Heading::find(bare.trim());
             if let Some(heading) = &heading {
-                match heading.twice(&columns) {
+                match heading.twice(&cells(bare.trim())) {
                     Some(name) => {
                         return Err(located(format!("column `{name}` appears twice")).into());
                     }
                     None => continue,
                 }
             }
-            if is_comment {
-                read_facts(bare, &mut observation).map_err(located)?;
-            }
+        }
+        // They stand above the names of the columns, or between these and the data.
+        if is_comment && observation.rows.is_empty() {
+            read_facts(bare, &mut observation).map_err(located)?;
         }
         if is_comment || line.trim().is_empty() {
             continue;
@@ -90,7 +94,8 @@ pub fn parse(text: &str) -> Result<Observation, Error> {
             let why = format!("data before a line that names {}", COLUMNS.join(", "));
             return Err(located(why).into());
         };
-        let Some(row) = row(&cells(line), heading, &mut names).map_err(located)? else {
+        let cells = cells_below(line, heading.count, heading.tabs).map_err(located)?;
+        let Some(row) = row(&cells, heading, &mut names).map_err(located)? else {
             left_out += 1;
             continue;
         };
@@ -213,6 +218,11 @@ mod tests {
         // Products that are not there have an error of NaN, which is equal to nothing.
         assert_eq!(format!("{:?}", parse(CSV).unwrap()), format!("{observation:?}"));
         assert_eq!((observation.source.as_str(), observation.mjd), ("M87", Some(57853)));
+        // Facts may follow the names of the columns, and names be quoted.
+        let mut lines: Vec<&str> = CSV.lines().collect();
+        lines.swap(0, 1);
+        let other = lines.join("\n").replace("AA", "\"AA\"");
+        assert_eq!(format!("{:?}", parse(&other).unwrap()), format!("{observation:?}"));
         let i = observation.rows[0].product(0).unwrap();
         assert!((i.visibility.arg().to_degrees() + 122.7523).abs() < 1e-12);
         assert_eq!(observation.names(&observation.rows[0]), ["AA", "LM"]);
@@ -266,6 +276,9 @@ mod tests {
         assert!(fail(&format!("{head}\n1e7,A,B,1,2,3,4,5\n")).contains("time_utc_h = 1e7 is not"));
         assert!(fail(&format!("{head}\n1,A,B,1,-1e300,3,4,5\n")).contains("v = -1e300 is not"));
         assert!(fail(&format!("{head}\n1,A,B,1,2,3,4,5,6\n")).contains("9 columns, but 8 names"));
+        let tabs = head.replace(',', "\t");
+        assert!(fail(&format!("{tabs}\n1\tA\tB\t1\t2\t\t3\t4\n")).contains("line 2: re ``"));
+        assert!(fail(&format!("{tabs}\n1 A B 1 2 3 4\n")).contains("line 2: "));
         assert!(fail(&format!("{head},u\n1,A,B,1,2,3,4,5,6\n")).contains("line 1: column `u` app"));
     }
 

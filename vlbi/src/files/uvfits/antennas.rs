@@ -92,19 +92,23 @@ fn unknown_mount(table: &Table<'_>, row: usize, name: &str) -> Option<String> {
     (!mounts::is_known(code)).then(remark)
 }
 
-/// The station of a row. Positions are relative to the array's centre (0 for VLBI), y to the east
-/// unless the table says that its coordinates are left-handed.
+/// The station of a row. Positions are relative to the array's centre, y to the east unless the table says that its
+/// coordinates are left-handed. Where the centre is not that of the Earth, as it is for VLBI, x lies in its meridian (AIPS memo 117;
+/// pyuvdata reads it so).
 fn station(unit: &Unit<'_>, table: &Table<'_>, row: usize) -> Result<Option<Station>, FileError> {
     let name = table.text(row, "ANNAME").filter(|name| !name.is_empty());
-    // Names have no blanks, which separate columns in texts.
-    let name = name.map(|name| name.split_whitespace().collect::<Vec<_>>().join("_"));
-    let mut position = [0.0; 3];
-    for (k, keyword) in ["ARRAYX", "ARRAYY", "ARRAYZ"].into_iter().enumerate() {
-        let centre = unit.header.number_or(keyword, 0.0)?;
-        let offset = table.number(row, "STABXYZ", k).unwrap_or(f64::NAN);
-        let left = k == 1 && unit.header.text("XYZHAND").as_deref() == Some("LEFT");
-        position[k] = centre + if left { -offset } else { offset };
-    }
+    // Names have nothing that separates columns, or begins comments, in texts.
+    let separates = |c: char| c.is_whitespace() || matches!(c, ',' | '#' | '"');
+    let words = |name: String| {
+        name.split(separates).filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")
+    };
+    let name = name.map(words).filter(|name| !name.is_empty());
+    let axis = |keyword| unit.header.number_or(keyword, 0.0);
+    let centre = [axis("ARRAYX")?, axis("ARRAYY")?, axis("ARRAYZ")?];
+    let [x, y, z] = [0, 1, 2].map(|k| table.number(row, "STABXYZ", k).unwrap_or(f64::NAN));
+    let y = if unit.header.text("XYZHAND").as_deref() == Some("LEFT") { -y } else { y };
+    let (sin, cos) = f64::atan2(centre[1], centre[0]).sin_cos();
+    let position = [centre[0] + x * cos - y * sin, centre[1] + x * sin + y * cos, centre[2] + z];
     let Some(name) = name.filter(|_| position.iter().all(|x| x.is_finite())) else {
         return Ok(None);
     };

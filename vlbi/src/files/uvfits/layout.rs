@@ -40,8 +40,9 @@ pub struct Layout {
     pub group_size: usize,
     parameters: usize,
     pub groups: usize,
-    pub u: Parameter,
-    pub v: Parameter,
+    /// Parts of u, to be added, seconds.
+    pub u: Vec<Parameter>,
+    pub v: Vec<Parameter>,
     /// Those of [`SELECTORS`] that there are.
     selectors: Vec<(&'static str, Parameter)>,
     pub antennas: Antennas,
@@ -116,6 +117,7 @@ impl Layout {
         };
         let parameter = Parameters::read(header, parameters)?;
         parameter.check_projection()?;
+        parameter.check_once()?;
         let selector = |(name, _)| Some((name, parameter.optional(name)?));
         Ok(Layout {
             number_size: header.number_size()?,
@@ -123,11 +125,11 @@ impl Layout {
             group_size: numbers + parameters,
             parameters,
             groups: header.count("GCOUNT", 1, usize::MAX)?,
-            u: parameter.one("UU")?,
-            v: parameter.one("VV")?,
+            u: parameter.all("UU")?,
+            v: parameter.all("VV")?,
             selectors: SELECTORS.into_iter().filter_map(selector).collect(),
             antennas: parameter.antennas()?,
-            date: parameter.date()?,
+            date: parameter.all("DATE")?,
             integration: parameter.optional("INTTIM"),
             opacity: parameter
                 .optional("TAU1")
@@ -153,6 +155,11 @@ impl Layout {
     fn stored(&self, group: &[u8], index: usize) -> f64 {
         let cell = &group[index * self.number_size..(index + 1) * self.number_size];
         stored(self.float, cell)
+    }
+
+    /// The sum of the parts of a parameter.
+    pub fn sum(&self, group: &[u8], parts: &[Parameter]) -> f64 {
+        parts.iter().map(|part| self.parameter(group, *part)).sum()
     }
 
     /// A parameter of a group.
@@ -229,7 +236,7 @@ fn products(header: &Header<'_>, axis: &Axis) -> Result<([Option<usize>; 4], Bas
     let value = |name: &str, default| header.number_or(&format!("{name}{k}"), default);
     let (first, step, reference) =
         (value("CRVAL", f64::NAN)?, value("CDELT", 1.0)?, value("CRPIX", 1.0)?);
-    let circular = first < 0.0;
+    let circular = first + (1.0 - reference) * step < 0.0;
     let mut products = [None; 4];
     // There are four products, each once: a fifth is refused, however many a header claims.
     for index in 0..axis.length.min(8) {
@@ -282,7 +289,7 @@ impl<'a, 'b> Parameters<'a, 'b> {
     fn read(header: &'a Header<'b>, count: usize) -> Result<Self, FileError> {
         let mut named = Vec::new();
         for k in 1..=count {
-            // Later parts of a date may be named `_DATE`.
+            // Later parts of a date or of (u, v) may be named `_DATE`.
             let Some(name) = header.text(&format!("PTYPE{k}")) else { continue };
             let name = name.trim_start_matches('_').to_owned();
             let scale = header.number_or(&format!("PSCAL{k}"), 1.0)?;
@@ -299,10 +306,26 @@ impl<'a, 'b> Parameters<'a, 'b> {
         self.named.iter().find(|(n, _)| n == name).map(|(_, p)| *p)
     }
 
-    /// A parameter whose name starts so: `UU` may be `UU---SIN`, `UU-L`, ….
-    fn one(&self, start: &str) -> Result<Parameter, FileError> {
-        let found = self.named.iter().find(|(n, _)| n.starts_with(start)).map(|(_, p)| *p);
-        found.ok_or_else(|| self.missing(start))
+    /// The parts of a parameter whose name starts so: `UU` may be `UU---SIN`, `UU-L`, …. Parameters of one name are to be added
+    /// (FITS standard 4.0, section 6.1.2).
+    fn all(&self, start: &str) -> Result<Vec<Parameter>, FileError> {
+        let is_part = |name: &str| name == start || start != "DATE" && name.starts_with(start);
+        let parts: Vec<_> =
+            self.named.iter().filter(|(n, _)| is_part(n)).map(|(_, p)| *p).collect();
+        if parts.is_empty() { Err(self.missing(start)) } else { Ok(parts) }
+    }
+
+    /// Refuses numbers in parts that nobody writes in parts.
+    fn check_once(&self) -> Result<(), FileError> {
+        let others = ["BASELINE", "ANTENNA1", "ANTENNA2", "SUBARRAY", "INTTIM", "TAU1", "TAU2"];
+        for name in SELECTORS.map(|(name, _)| name).into_iter().chain(others) {
+            let mut found = self.named.iter().filter(|(n, _)| n == name);
+            if let (Some(_), Some((_, second))) = (found.next(), found.next()) {
+                let keyword = format!("PTYPE{}", second.index + 1);
+                return Err(self.header.error(&keyword, format!("one {name} alone")));
+            }
+        }
+        Ok(())
     }
 
     /// Refuses projections other than the orthographic one: (u, v) of `UU---NCP` are others.
@@ -330,11 +353,5 @@ impl<'a, 'b> Parameters<'a, 'b> {
         let pair = self.optional("ANTENNA1").zip(self.optional("ANTENNA2"));
         let (first, second) = pair.ok_or_else(|| self.missing("BASELINE"))?;
         Ok(Antennas::Pair(first, second, self.optional("SUBARRAY")))
-    }
-
-    fn date(&self) -> Result<Vec<Parameter>, FileError> {
-        let parts: Vec<_> =
-            self.named.iter().filter(|(n, _)| n == "DATE").map(|(_, p)| *p).collect();
-        if parts.is_empty() { Err(self.missing("DATE")) } else { Ok(parts) }
     }
 }

@@ -41,6 +41,7 @@ pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
     let reference_hz = reference_frequency(header, &layout, tables.frequency_hz)?;
     let (mut channels, unknown) = frequencies::channels(&units, &layout, reference_hz)?;
     let mut frequency_hz = reference_hz;
+    let bandwidth_hz: f64 = channels.iter().map(|c| c.bandwidth_hz).sum();
     // A single channel is no list: its frequency is that of the observation.
     if let [only] = channels[..] {
         frequency_hz = only.frequency_hz;
@@ -58,10 +59,6 @@ pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
     if ahead_h != 0.0 {
         rows.iter_mut().for_each(|row| row.time_h -= ahead_h);
     }
-    let bandwidth = match channels.as_slice() {
-        [] => layout.channel_width_hz.abs(),
-        channels => channels.iter().map(|c| c.bandwidth_hz).sum(),
-    };
     let mut observation = Observation {
         source: match &source {
             Some(source) => source.name.clone(),
@@ -73,7 +70,7 @@ pub fn read(bytes: &[u8]) -> Result<Observation, Error> {
         },
         mjd: Some(mjd),
         frequency_hz: Some(frequency_hz),
-        bandwidth_hz: Some(bandwidth).filter(|bandwidth| *bandwidth > 0.0),
+        bandwidth_hz: Some(bandwidth_hz).filter(|bandwidth| *bandwidth > 0.0),
         channels,
         rows,
         ..Observation::empty(layout.basis)
@@ -286,7 +283,7 @@ impl Reader<'_> {
                     None => return Ok(()),
                 },
             };
-            let seconds = [layout.u, layout.v].map(|p| layout.parameter(group, p));
+            let seconds = [&layout.u, &layout.v].map(|parts| layout.sum(group, parts));
             if !seconds.iter().all(|x| x.abs() <= LONGEST_S) {
                 return Err(format!("(u, v) = {seconds:?} s is not allowed: up to {LONGEST_S} s"));
             }

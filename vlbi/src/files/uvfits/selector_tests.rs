@@ -1,7 +1,7 @@
 //! Files whose settings are not supported are refused, with name and value.
 
 use super::super::fits::{ColumnData, binary_table, padded};
-use super::tests::{random_groups, small, table_of_antennas};
+use super::tests::{of_version, random_groups, small, table_of_antennas};
 use super::*;
 use crate::observation::Observation;
 
@@ -172,6 +172,61 @@ fn exact_coordinates_and_units_of_others_are_refused() {
     assert_eq!(history, ["AIPS SN: calibration that is not applied"]);
 }
 
+/// Parameters of one name are parts of a sum; what nobody writes in parts is refused.
+#[test]
+fn exact_parts_of_u_and_v_are_added() {
+    let parts = [("UU---SIN", [0.5e-3; 2]), ("_VV", [-1e-4, 1e-4])];
+    let made = read_made(&Made { parameters: parts.to_vec(), ..plain() });
+    for (row, v) in made.rows.iter().zip([1.9e-3, 2.1e-3]) {
+        let seconds = row.uv.map(|x| x / 230e9);
+        assert!((seconds[0] - 1.5e-3).abs() < 1e-9 && (seconds[1] - v).abs() < 1e-9, "{seconds:?}");
+    }
+    let twice = Made { parameters: vec![("BASELINE", [258.0; 2])], ..plain() };
+    assert!(refused(&twice).contains("PTYPE6 = 'BASELINE' is not allowed"), "{}", refused(&twice));
+}
+
+/// The width of the only channel is that of the `AIPS FQ` table, as that of several is.
+#[test]
+fn exact_bandwidth_of_one_channel_is_of_the_table() {
+    let table = |width: f32| {
+        let columns = [
+            ("FRQSEL", "", ColumnData::Integers(1, vec![1])),
+            ("IF FREQ", "HZ", ColumnData::Doubles(1, vec![0.0])),
+            ("CH WIDTH", "HZ", ColumnData::Singles(1, vec![width])),
+        ];
+        binary_table("AIPS FQ", 1, &columns, |_| ())
+    };
+    let bandwidth = |width| read_made(&Made { tables: vec![table(width)], ..plain() }).bandwidth_hz;
+    assert_eq!(bandwidth(2e9), Some(2e9));
+    assert_eq!((bandwidth(0.0), read_made(&plain()).bandwidth_hz), (Some(1e9), Some(1e9)));
+}
+
+/// With a centre of the array, x of antennas lies in its meridian.
+#[test]
+fn exact_antennas_about_a_centre_are_turned_to_its_meridian() {
+    let table = binary_table(
+        "AIPS AN",
+        1,
+        &[
+            ("ANNAME", "", ColumnData::Text(8, vec!["E,B #1".into()])),
+            ("STABXYZ", "METERS", ColumnData::Doubles(3, vec![100.0, 20.0, 3.0])),
+            ("NOSTA", "", ColumnData::Integers(1, vec![9])),
+        ],
+        |cards| {
+            cards.number("ARRAYX", 0.0).number("ARRAYY", -5e6).number("ARRAYZ", 4e6);
+        },
+    );
+    let made = read_made(&Made { tables: vec![of_version(2, &table)], ..plain() });
+    let station = made.stations.last().unwrap();
+    // The centre is at 90° west: x points to the south of the axes, y to the east, along x of the Earth.
+    let place = station.position.unwrap();
+    for (is, expected) in place.into_iter().zip([20.0, -5e6 - 100.0, 4e6 + 3.0]) {
+        assert!((is - expected).abs() < 1e-6, "{place:?}");
+    }
+    // Nothing in a name separates columns of texts.
+    assert_eq!(station.name, "E_B_1");
+}
+
 /// Positions in kilometres, scaled columns, products and integrations that cannot be.
 #[test]
 fn exact_cards_of_tables_are_honoured_or_refused() {
@@ -212,6 +267,11 @@ fn paper_times_of_tai_become_utc() {
     }
     assert_eq!(read_made(&plain()).rows[0].time_h, 6.0);
     assert!(refused(&Made { time_system: "GPS", ..plain() }).contains("TIMSYS = 'GPS"));
+    let second = table_of_antennas(&["A", "B"], |cards| {
+        cards.text("TIMSYS", "UTC");
+    });
+    let mixed = Made { time_system: "TAI", tables: vec![of_version(2, &second)], ..plain() };
+    assert!(refused(&mixed).contains("that of the AIPS AN table before"), "{}", refused(&mixed));
 }
 
 /// The pointing of antennas is not the position that (u, v) belong to.

@@ -121,9 +121,9 @@ pub fn calibration(units: &[Unit<'_>]) -> Option<String> {
 /// Hours that the times of a file are ahead of UTC.
 ///
 /// # Errors
-/// If a header names a time system other than UTC and TAI.
+/// If a header names a time system other than UTC and TAI, or another one than the antenna table before.
 pub fn ahead_h(units: &[Unit<'_>], mjd: i32) -> Result<f64, FileError> {
-    let mut ahead = 0.0;
+    let (mut ahead, mut of_tables) = (0.0, None);
     for unit in units {
         let name = unit.header.text("EXTNAME").unwrap_or_default();
         if !(name.is_empty() || name == "AIPS AN") {
@@ -131,13 +131,18 @@ pub fn ahead_h(units: &[Unit<'_>], mjd: i32) -> Result<f64, FileError> {
         }
         for keyword in ["TIMESYS", "TIMSYS"] {
             let system = unit.header.text(keyword).unwrap_or_default();
-            match system.to_ascii_uppercase().as_str() {
-                "" | "UTC" => {}
+            let is_utc = match system.to_ascii_uppercase().as_str() {
+                "" | "UTC" => true,
                 "TAI" | "IAT" => {
                     let seconds = crate::earth::tai_minus_utc(mjd);
                     ahead = seconds.map_err(|error| unit.header.error(keyword, error))? / 3600.0;
+                    false
                 }
                 _ => return Err(unit.header.error(keyword, "UTC, TAI or IAT")),
+            };
+            let is_of_table = keyword == "TIMSYS" && name == "AIPS AN";
+            if is_of_table && *of_tables.get_or_insert(is_utc) != is_utc {
+                return Err(unit.header.error(keyword, "that of the AIPS AN table before"));
             }
         }
     }

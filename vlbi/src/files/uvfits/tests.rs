@@ -151,6 +151,14 @@ pub(super) fn table_of_antennas(names: &[&str], more: impl FnOnce(&mut Cards)) -
     binary_table("AIPS AN", count, &columns, more)
 }
 
+/// A table as another version of its kind.
+pub(super) fn of_version(version: u32, table: &[u8]) -> Vec<u8> {
+    let text = String::from_utf8_lossy(&table[..2880]).into_owned();
+    let version = format!("EXTVER  = {version:>20}");
+    let text = text.replace(&format!("EXTVER  = {:>20}", 1), &version);
+    [text.as_bytes(), &table[2880..]].concat()
+}
+
 /// Returns axes without an `AIPS FQ` table: IFs then have no frequencies of their own; channels
 /// have.
 fn foreign_axes() -> &'static str {
@@ -190,12 +198,7 @@ fn foreign() -> Vec<u8> {
     let groups = [group(25801, [2, 8, 0, -2]), group(25700, [2; 4]), group(25800, [0; 4])];
     bytes.extend(padded(groups.concat(), 0));
     for (version, names) in [(1, ["A", "B"]), (2, ["B", "C"])] {
-        let table = table_of_antennas(&names, |_| ());
-        let text = String::from_utf8_lossy(&table[..2880]).into_owned();
-        let version = format!("EXTVER  = {version:>20}");
-        let text = text.replace(&format!("EXTVER  = {:>20}", 1), &version);
-        bytes.extend(text.into_bytes());
-        bytes.extend(&table[2880..]);
+        bytes.extend(of_version(version, &table_of_antennas(&names, |_| ())));
     }
     bytes
 }
