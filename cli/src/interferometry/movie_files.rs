@@ -55,6 +55,7 @@ pub fn files(argument: &Path) -> anyhow::Result<Vec<PathBuf>> {
     if pattern.digits {
         pattern.no_gaps(&names)?;
     }
+    check_order(&names)?;
     if names.is_empty() {
         bail!("{shown}: there are no files {}*{}", pattern.start, pattern.end);
     }
@@ -80,7 +81,10 @@ impl<'a> Pattern<'a> {
     }
 
     fn middle<'n>(&self, name: &'n str) -> Option<&'n str> {
-        name.strip_prefix(self.start)?.strip_suffix(self.end)
+        let rest = name.strip_prefix(self.start)?;
+        let (middle, end) = rest.split_at_checked(rest.len().checked_sub(self.end.len())?)?;
+        // `f_2.EXR` between `f_1.exr` and `f_3.exr` is a frame.
+        end.eq_ignore_ascii_case(self.end).then_some(middle)
     }
 
     fn fits(&self, name: &str) -> bool {
@@ -141,6 +145,38 @@ fn numbered(name: &str) -> Vec<(u128, String)> {
         in_digits = c.is_ascii_digit();
     }
     parts
+}
+
+/// Refuses files in the order of whole numbers that would be in another one if these had decimals and signs.
+fn check_order(names: &[String]) -> anyhow::Result<()> {
+    match names.windows(2).find(|pair| decimals(&pair[0]) > decimals(&pair[1])) {
+        Some([a, b]) => bail!(
+            "{a}, {b}: their order is not known, since numbers may have decimals or signs; give the files one by one"
+        ),
+        _ => Ok(()),
+    }
+}
+
+/// The numbers in a name, with decimals, and with the signs that do not follow a word.
+fn decimals(name: &str) -> Vec<f64> {
+    let bytes = name.as_bytes();
+    let is_digit = |k: usize| bytes.get(k).is_some_and(u8::is_ascii_digit);
+    let digits = |from: usize| (from..).find(|k| !is_digit(*k)).unwrap_or(from);
+    let (mut numbers, mut k) = (Vec::new(), 0);
+    while k < bytes.len() {
+        let is_sign = bytes[k] == b'-' && (k == 0 || !bytes[k - 1].is_ascii_alphanumeric());
+        let start = k + usize::from(is_sign);
+        let whole = digits(start);
+        if whole == start {
+            k += 1;
+            continue;
+        }
+        let has_point = bytes.get(whole) == Some(&b'.') && is_digit(whole + 1);
+        let end = if has_point { digits(whole + 1) } else { whole };
+        numbers.extend(name[k..end].parse::<f64>());
+        k = end;
+    }
+    numbers
 }
 
 /// Reads a movie from its only file, or from one image a file.
@@ -297,6 +333,15 @@ mod tests {
         assert_eq!(names("f_*.exr"), ["f_8.exr", "f_9.exr", "f_10.exr"]);
         assert_eq!(names(""), ["f_8.exr", "f_9.exr", "f_10.exr", "g.exr"]);
         assert_eq!(names("absent.csv"), ["absent.csv"]);
+        for name in ["t_0.25.exr", "t_0.5.exr", "s_-1.exr", "s_-2.exr", "u_1.EXR", "u_2.exr"] {
+            std::fs::write(path.join(name), "").unwrap();
+        }
+        for pattern in ["t_*.exr", "s_*.exr"] {
+            let error = files(&path.join(pattern)).unwrap_err().to_string();
+            assert!(error.contains("give the files one by one"), "{error}");
+        }
+        assert_eq!(names("u_*.exr"), ["u_1.EXR", "u_2.exr"]);
+        assert_eq!(decimals("v2.run-3_-4.50.exr"), [2.0, 3.0, -4.5]);
         assert!(files(&path.join("h_*.exr")).unwrap_err().to_string().contains("no files h_*.exr"));
         std::fs::remove_file(path.join("f_9.exr")).unwrap();
         let message = files(&path.join("f_%02d.exr")).unwrap_err().to_string();

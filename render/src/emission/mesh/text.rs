@@ -17,9 +17,12 @@ impl Line<'_> {
         self.text.split_whitespace().next().unwrap_or_default()
     }
 
-    /// Returns the text after the first word.
+    /// Returns the text after the first word, up to a comment.
     pub fn rest(&self) -> &str {
-        self.text.split_once(char::is_whitespace).map_or("", |(_, rest)| rest.trim())
+        let rest = self.text.split_once(char::is_whitespace).map_or("", |(_, rest)| rest.trim());
+        let comment = rest.match_indices('#').map(|(at, _)| at);
+        let mut comment = comment.filter(|at| rest[..*at].ends_with(char::is_whitespace));
+        comment.next().map_or(rest, |at| rest[..at].trim())
     }
 
     /// The words after the first, up to a comment.

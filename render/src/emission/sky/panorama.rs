@@ -72,7 +72,9 @@ impl Panorama {
             linear_colors(bytes).map_err(PanoramaError::Decode)?;
         let mut sky = Self::new(width, height, pixels)?;
         let other = other_than_srgb(bytes).map_err(PanoramaError::Decode)?;
-        sky.warnings.extend(other.map(|says| format!("taken as sRGB, though it has {says}")));
+        // Radiance HDR.
+        let taken = if bytes.starts_with(b"#?") { "linear" } else { "sRGB" };
+        sky.warnings.extend(other.map(|says| format!("taken as {taken}, though it has {says}")));
         Ok(sky)
     }
 
