@@ -12,12 +12,18 @@ use anyhow::{Context, bail};
 use clap::ValueEnum;
 use kerrlight_vlbi::files::{self, EhtTable};
 use kerrlight_vlbi::observation::{Observation, Repeats};
+use kerrlight_vlbi::polarimetry::derotate;
 use std::path::Path;
 
-/// Reads visibilities in any format.
+/// Reads visibilities in any format; the rotation of feeds is taken out of those that say that they have it.
 pub fn read(path: &Path) -> anyhow::Result<Observation> {
     let decoded = files::decode(&output::read(path)?);
-    Ok(decoded.with_context(|| path.display().to_string())?.1)
+    let (_, mut observation) = decoded.with_context(|| path.display().to_string())?;
+    let says = || format!("{} says FRCAL: 0", path.display());
+    if derotate(&mut observation).with_context(says)? {
+        eprintln!("note: {}: the rotation of feeds is taken out", says());
+    }
+    Ok(observation)
 }
 
 /// Says of rows that are there more than once what becomes of them where times are compared.

@@ -149,7 +149,11 @@ fn numbered(name: &str) -> Vec<(u128, String)> {
 
 /// Refuses files in the order of whole numbers that would be in another one if these had decimals and signs.
 fn check_order(names: &[String]) -> anyhow::Result<()> {
-    match names.windows(2).find(|pair| decimals(&pair[0]) > decimals(&pair[1])) {
+    let is_other = |pair: &&[String]| {
+        let [(a, of_a), (b, of_b)] = [decimals(&pair[0]), decimals(&pair[1])];
+        of_a == of_b && a > b
+    };
+    match names.windows(2).find(is_other) {
         Some([a, b]) => bail!(
             "{a}, {b}: their order is not known, since numbers may have decimals or signs; give the files one by one"
         ),
@@ -157,17 +161,18 @@ fn check_order(names: &[String]) -> anyhow::Result<()> {
     }
 }
 
-/// The numbers in a name, with decimals, and with the signs that do not follow a word.
-fn decimals(name: &str) -> Vec<f64> {
+/// The numbers in a name, with decimals, and with the signs that do not follow a word; and what stands beside them.
+fn decimals(name: &str) -> (Vec<f64>, String) {
     let bytes = name.as_bytes();
     let is_digit = |k: usize| bytes.get(k).is_some_and(u8::is_ascii_digit);
     let digits = |from: usize| (from..).find(|k| !is_digit(*k)).unwrap_or(from);
-    let (mut numbers, mut k) = (Vec::new(), 0);
+    let (mut numbers, mut others, mut k) = (Vec::new(), Vec::new(), 0);
     while k < bytes.len() {
         let is_sign = bytes[k] == b'-' && (k == 0 || !bytes[k - 1].is_ascii_alphanumeric());
         let start = k + usize::from(is_sign);
         let whole = digits(start);
         if whole == start {
+            others.push(bytes[k]);
             k += 1;
             continue;
         }
@@ -176,7 +181,7 @@ fn decimals(name: &str) -> Vec<f64> {
         numbers.extend(name[k..end].parse::<f64>());
         k = end;
     }
-    numbers
+    (numbers, String::from_utf8_lossy(&others).into_owned())
 }
 
 /// Reads a movie from its only file, or from one image a file.
@@ -341,7 +346,8 @@ mod tests {
             assert!(error.contains("give the files one by one"), "{error}");
         }
         assert_eq!(names("u_*.exr"), ["u_1.EXR", "u_2.exr"]);
-        assert_eq!(decimals("v2.run-3_-4.50.exr"), [2.0, 3.0, -4.5]);
+        let numbers = decimals("v2.run-3_-4.50.exr");
+        assert_eq!(numbers, (vec![2.0, 3.0, -4.5], "v.run-_.exr".to_owned()));
         assert!(files(&path.join("h_*.exr")).unwrap_err().to_string().contains("no files h_*.exr"));
         std::fs::remove_file(path.join("f_9.exr")).unwrap();
         let message = files(&path.join("f_%02d.exr")).unwrap_err().to_string();

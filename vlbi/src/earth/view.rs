@@ -90,13 +90,14 @@ impl View {
     pub(crate) fn of_day(
         source: SourcePosition,
         mjd: i32,
+        ut1: Ut1,
         frame: Frame,
     ) -> impl FnMut(f64) -> Result<Self, Error> {
         let mut last: Option<(f64, Self)> = None;
         move |hours_utc| match last {
             Some((hours, view)) if hours == hours_utc => Ok(view),
             _ => {
-                let view = Self::new(source, Moment { mjd, hours_utc }, Ut1::Table, frame)?;
+                let view = Self::new(source, Moment { mjd, hours_utc }, ut1, frame)?;
                 last = Some((hours_utc, view));
                 Ok(view)
             }

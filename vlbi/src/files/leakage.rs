@@ -57,12 +57,17 @@ fn station(line: &str) -> Result<StationLeakage, String> {
         "" => Ok(f64::NAN),
         cell => number(cell, column),
     };
+    let terms = [
+        Complex64::new(number(r_re, "column d_r_re:")?, number(r_im, "column d_r_im:")?),
+        Complex64::new(number(l_re, "column d_l_re:")?, number(l_im, "column d_l_im:")?),
+    ];
+    // Feeds that see more of the other hand than of their own are exchanged, or of no use.
+    if let Some(d) = terms.iter().find(|d| d.norm() >= 1.0) {
+        return Err(format!("|d| = {} of {name} is not allowed: below 1", d.norm()));
+    }
     Ok(StationLeakage {
         station: name.to_owned(),
-        terms: [
-            Complex64::new(number(r_re, "column d_r_re:")?, number(r_im, "column d_r_im:")?),
-            Complex64::new(number(l_re, "column d_l_re:")?, number(l_im, "column d_l_im:")?),
-        ],
+        terms,
         errors: [error(r_error, "column d_r_error:")?, error(l_error, "column d_l_error:")?],
     })
 }
@@ -84,9 +89,10 @@ mod tests {
         let refused = |text: &str| parse(text).unwrap_err().to_string();
         assert!(refused("station,d\n").starts_with("line 1: `station,d`"));
         assert!(refused(&format!("{text}AA,1,2\n")).contains("line 4: 3 columns"));
-        assert!(refused(&format!("{text}AA,1,2,3,4,5,6\n")).contains("AA is listed twice"));
+        assert!(refused(&format!("{text}AA,.1,.2,3,.4,.5,6\n")).contains("AA is listed twice"));
         let bad = refused(&text.replace(",0.1,", ",x,"));
         assert!(bad.contains("line 3: column d_r_im: `x` is not a number"), "{bad}");
+        assert!(refused(&text.replacen("-0.05", "-2", 1)).contains("line 2: |d| = 2.0"));
         assert!(refused(&text.replacen("-0.05", "much", 1)).contains("line 2: column d_r_im:"));
     }
 }

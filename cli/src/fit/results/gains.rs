@@ -17,6 +17,8 @@ use serde::Serialize;
 
 /// The table of all gains.
 const TABLE: &str = "gains.csv";
+/// That of gains beside the polarisation of a static image, which are found anew.
+pub const POLARIZED_TABLE: &str = "polarized_gains.csv";
 
 /// Curves that a plot has room for.
 const CURVES: usize = 6;
@@ -123,7 +125,7 @@ impl Estimate<'_> {
             return Gains::beside(&self.evidence(), movie, &Others::default(), self.folder);
         }
         let table = self.measured.polarized_gains(&seen.to_vec()?)?;
-        table.map(|table| Gains::written(table, self.measured, self.folder)).transpose()
+        table.map(|table| Gains::written(TABLE, table, self.measured, self.folder)).transpose()
     }
 }
 
@@ -168,11 +170,17 @@ impl Gains {
         {
             calibrate(&mut table, &sky, &all(&known.images)?, known.explains);
         }
-        Ok(Some(Gains { beside, ..Self::written(table, measured, folder)? }))
+        Ok(Some(Gains { beside, ..Self::written(TABLE, table, measured, folder)? }))
     }
 
-    fn written(table: GainTable, measured: &FitData, folder: &Folder) -> anyhow::Result<Self> {
-        write_by_file(TABLE, measured, folder, |own_name| {
+    /// Writes a table.
+    pub fn written(
+        name: &str,
+        table: GainTable,
+        measured: &FitData,
+        folder: &Folder,
+    ) -> anyhow::Result<Self> {
+        write_by_file(name, measured, folder, |own_name| {
             let gains = table.gains.iter().filter_map(|gain| {
                 let gain = StationGain { station: own_name(&gain.station)?, ..gain.clone() };
                 if measured.average_s == 0.0 {

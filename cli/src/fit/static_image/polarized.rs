@@ -3,6 +3,7 @@
 use super::numbers::with_error;
 use crate::fit::folder::Folder;
 use crate::fit::held_out::losses;
+use crate::fit::results::gains::{Gains, POLARIZED_TABLE};
 use crate::fit::results::leakage::Leakage;
 use crate::report::{LinePlot, Outcome};
 use anyhow::Context;
@@ -90,6 +91,8 @@ pub struct Polarized {
     pub survey: PolarizedSurvey,
     /// Leakage of the stations, where it is solved for.
     pub leakage: Option<Leakage>,
+    /// True if gains were solved for.
+    has_gains: bool,
     /// Data, and what is left of them.
     count: usize,
 }
@@ -120,8 +123,8 @@ impl From<&Polarized> for PolarizedNumbers {
 }
 
 impl Polarized {
-    /// Takes the polarisation that was found of these data, and its residuals to be judged; writes the leakage of stations,
-    /// where it was solved for.
+    /// Takes the polarisation that was found of these data, and its residuals to be judged; writes leakage and gains of stations,
+    /// where they were solved for.
     pub fn new(
         file: &StaticImageFile,
         measured: &FitData,
@@ -132,6 +135,11 @@ impl Polarized {
         let leakage = table.map(|table| Leakage::written(table, measured, folder)).transpose()?;
         let Some(settings) = file.polarization.clone() else { return Ok(None) };
         let images = &survey.found.images;
+        let image: Vec<f32> = images.iter().map(|x| *x as f32).collect();
+        let gains = measured.polarized_gains(&image.repeat(measured.times.len()))?;
+        let gains = gains
+            .map(|table| Gains::written(POLARIZED_TABLE, table, measured, folder))
+            .transpose()?;
         // I, Q and U lie one after the other.
         let terms = measured.visibility_terms::<f64>(&[settings.loss()], images.len() / 3)?;
         let term: &dyn FrameTerm<f64> = &*terms.first().context("no polarised data")?.term;
@@ -143,7 +151,8 @@ impl Polarized {
             if measured.has_intrinsic_variability { Errors::Shared } else { Errors::Stated };
         let count = statistics.all.count();
         let tested = (settings.data.label().to_owned(), Tested::gaussian(statistics, errors));
-        Ok(Some((Self { settings, survey, leakage, count }, tested)))
+        let has_gains = gains.is_some();
+        Ok(Some((Self { settings, survey, leakage, has_gains, count }, tested)))
     }
 
     fn value(&self, number: &Number) -> (f64, Option<f64>) {
@@ -225,6 +234,12 @@ impl Polarized {
             ));
         }
         text.extend(self.leakage.iter().flat_map(Leakage::sentences));
+        if self.has_gains {
+            text.push(format!(
+                "Gains were solved for anew beside the polarised image: {POLARIZED_TABLE} has them, which belong to its χ² and \
+                 its leakage. gains.csv has those beside total intensity."
+            ));
+        }
         text
     }
 

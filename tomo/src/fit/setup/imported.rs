@@ -16,6 +16,7 @@ use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::noise::{ScatteringKernel, unscatter};
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::operator::ImageGrid;
+use kerrlight_vlbi::polarimetry::derotate;
 
 /// Advice where there are no data.
 pub(super) const FILE: &str = "a table [data.visibilities] or [data.movie] with `path = \"FILE\"` (`kerrlight fit --init FILE` writes \
@@ -178,17 +179,11 @@ impl Reduction {
     ///
     /// # Errors
     /// If a visibility has no error, none is left, the frequency of scattered light is not known, polarised light would
-    /// get the errors of a source that varies, or turns with the feeds.
+    /// get the errors of a source that varies, or what turns with the feeds does not tell how these stand.
     pub fn of(&self, observation: Observation, losses: &[Loss], name: &str) -> Result<Observation> {
-        let turns = observation.history.iter().any(|line| line == "FRCAL: 0");
-        if turns && is_polarized(losses) {
-            refuse!(
-                "{name} says FRCAL: 0, so that its products turn with the feeds of the stations: take the rotation out first, \
-                 or fit total intensity"
-            );
-        }
         check_rows(&observation).within(name)?;
         let mut observation = observation;
+        derotate(&mut observation).within(name)?;
         if !is_polarized(losses) {
             // Rows without Stokes I take no part in its times and (u, v).
             let basis = observation.basis;

@@ -25,7 +25,14 @@ pub struct Mount {
 pub fn of(station: &Station) -> Result<Mount, FileError> {
     let FeedRotation { parallactic, elevation, offset_deg } = feed_rotation(station);
     let code = CODES.iter().find(|(_, factors)| *factors == [parallactic, elevation]);
-    code.map(|(code, _)| Mount { code: *code, offset_deg }).ok_or_else(|| {
+    let mount = code.map(|(code, _)| {
+        // What would be read as nothing told is told as a full turn, which is none.
+        let mount = Mount { code: *code, offset_deg };
+        let read = Station { feed_rotation: rotation(&station.name, mount), ..station.clone() };
+        let is_read = feed_rotation(&read) == feed_rotation(station);
+        Mount { offset_deg: if is_read { offset_deg } else { offset_deg + 360.0 }, ..mount }
+    });
+    mount.ok_or_else(|| {
         FileError::whole(format!(
             "station {}: feeds that turn with {parallactic} times the parallactic angle and {elevation} times the \
              elevation: UVFITS has codes for 1 and 0, 0 and 0, 1 and 1, 1 and -1",
@@ -95,6 +102,19 @@ mod tests {
         assert!(rotation("XX", Mount { code: 3, offset_deg: 0.0 }).is_none() && !is_known(3));
         for station in built_in("EHT2017").unwrap().stations {
             assert_eq!(rotation(&station.name, of(&station).unwrap()), None, "{}", station.name);
+        }
+    }
+
+    /// Feeds that stations of published names do not have come back, up to a full turn.
+    #[test]
+    fn exact_other_feeds_of_known_names_come_back() {
+        for (name, told) in
+            [("ALMA", [1.0, 0.0, 0.0]), ("SMA", [1.0, -1.0, 0.0]), ("PV", [1.0, 0.0, 0.0])]
+        {
+            let station =
+                Station { feed_rotation: FeedRotation::told(told), ..Station::named(name) };
+            let read = rotation(name, of(&station).unwrap()).unwrap();
+            assert_eq!([read.parallactic, read.elevation, read.offset_deg % 360.0], told, "{name}");
         }
     }
 

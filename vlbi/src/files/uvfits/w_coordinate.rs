@@ -1,6 +1,6 @@
 //! w of baselines: (u, v) come with the data, w from where the stations are.
 
-use crate::earth::{Frame, View};
+use crate::earth::{Frame, Ut1, View};
 use crate::observation::{Observation, Row};
 use kerrlight_common::units::SPEED_OF_LIGHT;
 
@@ -23,7 +23,7 @@ fn known(observation: &Observation, rows: &[&Row]) -> Option<Vec<f64>> {
     let positions: Vec<[f64; 3]> = positions.collect::<Option<_>>()?;
     // In seconds of light.
     let uvw = |rows: &[&Row], frame| -> Option<Vec<[f64; 3]>> {
-        let mut view_at = View::of_day(source, mjd, frame);
+        let mut view_at = View::of_day(source, mjd, Ut1::Table, frame);
         let uvw = |row: &&Row| {
             let [first, second] = row.stations.map(|k| positions[usize::from(k)]);
             Some(view_at(row.time_h).ok()?.uvw(first, second, SPEED_OF_LIGHT))
