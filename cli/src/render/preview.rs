@@ -15,9 +15,9 @@ pub struct PreviewOptions {
     /// black body]
     #[arg(long, value_name = "MAP")]
     colormap: Option<Colors>,
-    /// Stretch of intensity over the colour map
-    #[arg(long, default_value = "linear")]
-    stretch: StretchName,
+    /// Stretch of intensity over the colour map [default: linear]
+    #[arg(long)]
+    stretch: Option<StretchName>,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -31,9 +31,8 @@ enum Colors {
     Color,
 }
 
-#[derive(Debug, Clone, Copy, Default, ValueEnum)]
+#[derive(Debug, Clone, Copy, ValueEnum)]
 enum StretchName {
-    #[default]
     Linear,
     Sqrt,
     Log,
@@ -47,6 +46,11 @@ impl PreviewOptions {
     pub fn channels(&self, scene: &Scene, names: &[&str]) -> anyhow::Result<Vec<&'static str>> {
         let wanted: &[&str] = match self.look(scene) {
             Look::Intensity(..) => &["intensity"],
+            Look::Color if self.stretch.is_some() => {
+                bail!(
+                    "--stretch is of intensity: the PNG shows R, G, B unless --colormap names a map"
+                )
+            }
             Look::Color => &["R", "G", "B"],
         };
         if let Some(name) = wanted.iter().find(|name| !names.contains(name)) {
@@ -58,9 +62,9 @@ impl PreviewOptions {
     /// Returns the values that the PNG of `scene` shows.
     pub fn look(&self, scene: &Scene) -> Look {
         let stretch = match self.stretch {
-            StretchName::Linear => Stretch::Linear,
-            StretchName::Sqrt => Stretch::Sqrt,
-            StretchName::Log => Stretch::Log,
+            None | Some(StretchName::Linear) => Stretch::Linear,
+            Some(StretchName::Sqrt) => Stretch::Sqrt,
+            Some(StretchName::Log) => Stretch::Log,
         };
         let disc = scene.disc.as_ref();
         let is_black_body = disc.is_some_and(|disc| disc.peak_temperature_k.is_some());
@@ -98,7 +102,7 @@ mod tests {
     /// Black bodies have colours of their own, which a map of the intensity would hide.
     #[test]
     fn exact_a_disc_with_a_temperature_is_shown_in_its_colors() {
-        let options = PreviewOptions { colormap: None, stretch: StretchName::Linear };
+        let options = PreviewOptions { colormap: None, stretch: None };
         let look = |text: &str| options.look(&Scene::parse(text).unwrap());
         let cold = include_str!("../../../scenes/disc_face_on.toml");
         let hot = apply_override(cold, "disc.peak_temperature_k=8000").unwrap();

@@ -199,7 +199,8 @@ fn one() -> u32 {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rings {
-    /// Pixels next to the critical curve have more rays, placed along the images.
+    /// Pixels next to the critical curve have more rays, placed along the images; how many depends on the pixels of the whole picture: parts of
+    /// a picture are to be rendered with a regular grid.
     #[default]
     Resolved,
     /// Every pixel has `samples_per_pixel` rays on a regular grid.
@@ -227,7 +228,7 @@ pub struct Effects {
     pub slow_light: bool,
     /// True if gas absorbs what is behind it.
     pub absorption: bool,
-    /// Order of the last lensed image to include; 0: the direct image only; all without it.
+    /// Order of the last lensed image of matter to include; 0: the direct image only; all without it. The sky stays whole.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(max = 100), extend("unit" = "half-orbits"))]
     pub half_orbits: Option<u32>,

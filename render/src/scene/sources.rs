@@ -61,7 +61,7 @@ pub enum GasMotion {
         #[schemars(range(min = -10.0, max = 10.0), extend("unit" = "M"))]
         l0: f64,
     },
-    /// Circles about +z with Ω = 1/(R^{3/2} + a), R = r sin θ; dark where that is not slower than light.
+    /// Circles about +z with Ω = 1/(R^{3/2} + a), R = r sin θ; with redshift, dark where that is not slower than light.
     Keplerian,
     /// Falling from rest at infinity without angular momentum.
     FreeFall,

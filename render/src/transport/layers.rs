@@ -110,8 +110,7 @@ pub(crate) struct Layers {
 impl Layers {
     /// Makes the layers of a ray with emission of some intensity, which lets a share of light from behind it `through`.
     pub(super) fn of(ray: &TracedRay, record: &Record, intensity: f64, through: f32) -> Self {
-        let whole = ray.surface.is_none() && ray.until >= ray.mino_total;
-        let is_open = whole && ray.outcome == Outcome::Escaped;
+        let is_open = ray.surface.is_none() && ray.outcome == Outcome::Escaped;
         let mixed = Mixed {
             opacity: if is_open { 1.0 - through } else { 1.0 },
             coverage: if is_open && intensity <= 0.0 { 0.0 } else { 1.0 },

@@ -282,7 +282,7 @@ impl<'a> Sum<'a> {
     fn end(&self, ray: &TracedRay, crossings: &[PlaneCrossing]) -> Option<Origin> {
         let PreparedScene { optics, meshes, .. } = self.scene;
         let Some(mino_time) = ray.surface else {
-            let falls = ray.outcome == Outcome::Captured && ray.until >= ray.mino_total;
+            let falls = ray.outcome == Outcome::Captured;
             return falls.then_some(Origin { source: HOLE, mino_time: ray.mino_total });
         };
         let in_plane = crossings.iter().any(|crossing| crossing.mino_time == mino_time);

@@ -217,7 +217,7 @@ async function saveExr(page) {
   const { width, height } = page.sharp, panel = panels().find(panel => panel !== "data");
   if (!panel) return tell("only what is traced can be saved as EXR");
   const [area] = areas(width, height), light = await page.gpu.measure(panel, area.width, area.height);
-  saveFile(exrBytes(light, area.width, area.height, command(area.width, area.height) ?? ""), "kerrlight.exr");
+  saveFile(exrBytes(light, area.width, area.height, command(area.width, area.height, panel) ?? ""), "kerrlight.exr");
 }
 
 // The place of the picture under a point of the window, and its panel.

@@ -75,9 +75,11 @@ const halfField = () => (isCamera() ? Math.tan(0.5 * state.angle * RADIANS) : 0.
 
 const quoted = text => (/^[\w.\/=:+-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
 
-// The command that renders the view, `width` by `height` pixels; null for drawings that no command makes.
-function command(width, height) {
-  if (state.slice !== "none" || (isCamera() && !state.lensing)) return null;
+// The command that renders a panel, `width` by `height` pixels; null for drawings that no command makes: the scene is that of
+// what was recovered, and spots are never rendered without lensing.
+function command(width, height, panel = panels().find(panel => panel !== "data")) {
+  if (panel !== "recovered" || state.slice !== "none") return null;
+  if (!state.lensing && (isCamera() || (state.spots && GIVEN.keys.includes("spot")))) return null;
   const across = 2 * halfField() * width / Math.min(width, height), short = x => +x.toPrecision(12);
   const set = { "hole.spin": short(state.spin), "observer.time": short(state.time), "screen.width": width, "screen.height": height };
   const pose = { radius: short(state.radius), theta_deg: short(state.inclination), phi_deg: short(state.azimuth), field_of_view_deg: short(2 * Math.atan(across / 2) / RADIANS), yaw_deg: short(state.yaw), pitch_deg: short(state.pitch), roll_deg: short(state.roll) };
@@ -93,6 +95,8 @@ function command(width, height) {
   Object.assign(set, { "effects.lensing": !!state.lensing, "effects.slow_light": !!(state.slow && state.lensing) });
   if (SCENE.effects.redshift) set["effects.redshift"] = !!(state.redshift && state.lensing);
   for (const [key, on] of [["disc", state.disc], ["sky", state.sky], ["spot", state.spots], ["volume", state.volume]]) if (!on) remove.push(key);
+  // Neither is drawn along straight rays.
+  if (!state.lensing) remove.push(...["disc", "gas", "sky"].filter(key => !remove.includes(key)));
   const words = [...remove.filter(key => GIVEN.keys.includes(key)).map(key => `${key}=`), ...Object.entries(set).map(([key, value]) => `${key}=${value}`)];
   return `kerrlight render ${[...GIVEN.words, "-o", "view.exr"].map(quoted).join(" ")} ${words.map(word => `--set ${quoted(word)}`).join(" ")}`;
 }

@@ -42,9 +42,6 @@ impl Sky {
     #[inline]
     pub fn light(&self, ray: &TracedRay, beam: Option<&footprint::Sky>) -> [f32; 3] {
         let (Some(direction), None) = (ray.exit, ray.surface) else { return [0.0; 3] };
-        if ray.until < ray.mino_total {
-            return [0.0; 3];
-        }
         match (self.beams, beam) {
             (Some(spacing), Some(end)) => self.model.mean_color(&Beam::new(end, spacing)),
             _ => self.model.color(direction),
