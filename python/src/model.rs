@@ -58,10 +58,8 @@ impl Model {
         let motion = settings.motion(hole.spin(), axis)?;
         let factors = stokes.map_or(Ok(Vec::new()), |(law, parameters)| {
             let sin_inclination = place.inclination().sin();
-            let screen = [alpha.to_vec(), beta.to_vec()];
-            let position_angle = 0.0;
             let view =
-                PolarizedView { law, axis, sin_inclination, screen, position_angle, unit: None };
+                PolarizedView { law, axis, sin_inclination, position_angle: 0.0, unit: None };
             let factors = view.factors(&lines, hole, &motion.velocity)?;
             let of = |p: &StokesParameter| factors.iter().map(|stokes| stokes.get(*p)).collect();
             Ok::<_, Error>(parameters.iter().map(of).collect())

@@ -203,6 +203,10 @@ fn check_polarization(scene: &Scene) -> Result<(), Invalid> {
         }
         return Ok(());
     }
+    if scene.disc.as_ref().is_some_and(|disc| disc.peak_temperature_k.is_some()) {
+        let allowed = "false with disc.peak_temperature_k: black bodies are no synchrotron sources";
+        return Err(Invalid::new(key, true, allowed));
+    }
     if !(effects.redshift && effects.lensing && scene.camera.is_none()) {
         let allowed = "only with redshift = true, with lensing and without a [camera]";
         return Err(Invalid::new(key, true, allowed));

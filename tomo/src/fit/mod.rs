@@ -63,7 +63,7 @@ pub use forward::forward_model::{Field, ForwardModel, Motion, Redshift};
 pub use forward::occupancy::{Occupancy, OccupancySettings};
 pub use forward::pixel_rays::RingRays;
 pub use forward::shift::Circles;
-pub use forward::sightlines::{Region, Sampling, SightlineRequest, Sightlines, flight};
+pub use forward::sightlines::{Arrival, Region, Sampling, SightlineRequest, Sightlines, flight};
 pub use forward::stokes::{Observable, PolarizedView};
 pub use learning::checkpoint;
 pub use learning::device::{DeviceError, DeviceRunner, StepDevice, Stretch, Taken};

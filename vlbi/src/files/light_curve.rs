@@ -192,7 +192,8 @@ pub fn is_light_curve(text: &str) -> bool {
     false
 }
 
-/// Reads a table with a column of times (`time_utc_h`, `time`, `t`, `UTC` or `hour`, hours of UTC; `MJD` or `JD`, days) and
+/// Reads a table with a column of times (`time_utc_h`, `time`, `t`, `UTC` or `hour`, hours of UTC, which count on over midnight; `MJD`
+/// or `JD`, days) and
 /// any of I, Q, U and V in Jy, each with a column of its standard deviations (`sigma_I`, `I_err`, `dI`), or one `sigma`
 /// for all. Names may have these units in brackets. Other columns, lines that start with `#` and cells that are empty or `nan` are
 /// left out; the last comment above the numbers may name the columns.
@@ -238,12 +239,27 @@ pub fn parse(text: &str) -> Result<LightCurve, Error> {
     if heading.is_none() {
         return Err(FileError::whole(format!("no line names {}", wanted())).into());
     }
+    if heading.is_some_and(|found| found.time.unit == TimeUnit::Hours) {
+        over_midnight(&mut samples);
+    }
     samples.retain(Sample::has_flux);
     if samples.is_empty() {
         return Err(FileError::whole("no fluxes").into());
     }
     samples.sort_by(|a: &Sample, b: &Sample| a.time_h.total_cmp(&b.time_h));
     Ok(LightCurve { samples })
+}
+
+/// Counts hours on where they begin anew at midnight: they fall once, by more than half a day, and those after midnight come
+/// before all others on a clock. Tables of several telescopes, one after the other, are none of these.
+fn over_midnight(samples: &mut [Sample]) {
+    let fall = |k: &usize| samples[*k].time_h < samples[k - 1].time_h;
+    let falls: Vec<usize> = (1..samples.len()).filter(fall).collect();
+    let [midnight] = falls[..] else { return };
+    let (before, last) = (samples[midnight - 1].time_h, samples[samples.len() - 1].time_h);
+    if before - samples[midnight].time_h > 12.0 && last < samples[0].time_h {
+        samples[midnight..].iter_mut().for_each(|sample| sample.time_h += 24.0);
+    }
 }
 
 fn wanted() -> &'static str {
@@ -419,6 +435,13 @@ mod tests {
         assert_eq!(julian.samples[0].time_h, 18.0);
         let hours = parse("time(hr),Stokes I,Isigma(Jy)\n4.0,2.4,0.1\n").unwrap();
         assert_eq!(flux(&hours, 0, 0).sigma_jy, Some(0.1));
+        // A night over midnight, and two telescopes one after the other.
+        let hours = |text: &str| -> Vec<f64> {
+            let samples = parse(&format!("time,I\n{text}")).unwrap().samples;
+            samples.iter().map(|sample| sample.time_h).collect()
+        };
+        assert_eq!(hours("23.75,1\n0,1\n0.25,1\n"), [23.75, 24.0, 24.25]);
+        assert_eq!(hours("1,1\n14,1\n1,1\n15,1\n"), [1.0, 1.0, 14.0, 15.0]);
         // An empty cell between tabs is no measurement, and what follows stays where it is.
         let tabs = parse("time\tI\tcount\n1\t2.4\t50\n2\t\t50\n3\t2.5\t50\n").unwrap();
         assert_eq!(tabs.samples.iter().map(|s| s.time_h).collect::<Vec<_>>(), [1.0, 3.0]);

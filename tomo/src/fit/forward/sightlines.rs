@@ -117,6 +117,17 @@ pub struct Sightlines {
     pub radial: Vec<f64>,
     /// Least and largest radius of the region, M: matter that comes from elsewhere is dark. Without them, none is.
     pub limits: Option<[f64; 2]>,
+    /// Arrivals of all rays that were traced, those of a pixel with several of them one by one.
+    pub arrivals: Vec<Arrival>,
+}
+
+/// Place where a ray arrives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arrival {
+    /// End of its nodes, which begin where those of the ray before end.
+    pub end: usize,
+    /// α and β, M.
+    pub place: [f64; 2],
 }
 
 /// Rays traced at a time.
@@ -151,6 +162,11 @@ impl Sightlines {
             // Rays that were traced step by step came last.
             all.sort_from(first);
         }
+        let ends = all.starts[1..].iter().zip(&all.pixel);
+        all.arrivals = ends
+            .map(|(end, ray)| (*end, *ray as usize))
+            .map(|(end, ray)| Arrival { end, place: [alpha[ray], beta[ray]] })
+            .collect();
         // They have grown, and are kept for long.
         all.columns().into_iter().for_each(Vec::shrink_to_fit);
         Ok(all)

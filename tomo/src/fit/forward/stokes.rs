@@ -1,7 +1,7 @@
 //! Stokes parameters of a fit: what a unit of emission at each node adds to I, Q and U of its pixel, and several images
 //! of one model.
 
-use super::sightlines::Sightlines;
+use super::sightlines::{Arrival, Sightlines};
 use crate::Error;
 use kerrlight_common::simd::Float;
 use kerrlight_geodesic::vector::norm;
@@ -21,8 +21,6 @@ pub struct PolarizedView {
     pub axis: Axis,
     /// Sine of the angle between the spin and the line of sight.
     pub sin_inclination: f64,
-    /// Place where each pixel's ray arrives: α and β, M.
-    pub screen: [Vec<f64>; 2],
     /// Position angle of the spin on the sky, radians east of north.
     pub position_angle: f64,
     /// Unit of |b|, where it is not to be that of the nodes that are seen: a mean field depends on them.
@@ -42,7 +40,8 @@ impl PolarizedView {
         velocity: &AngularVelocity,
     ) -> Result<Vec<Stokes>, Error> {
         self.law.check()?;
-        let ok = lines.radial.len() == lines.points();
+        let is_whole = lines.arrivals.last().map_or(0, |last| last.end) == lines.points();
+        let ok = is_whole && lines.radial.len() == lines.points();
         Error::check("polarization", lines.points() as f64, ok, "nodes with momenta")?;
         // The unit may be the mean field of all nodes: no factor is known before all are seen.
         let views = self.views(lines, hole, velocity);
@@ -66,14 +65,13 @@ impl PolarizedView {
         hole: &Kerr,
         velocity: &AngularVelocity,
     ) -> Vec<Vec<Option<SynchrotronView>>> {
-        let [alpha, beta] = &self.screen;
         let along = |ray: usize| -> Vec<Option<SynchrotronView>> {
-            let pixel = lines.pixel[ray] as usize;
-            let screen = ScreenPoint::new(hole, self.sin_inclination, alpha[pixel], beta[pixel]);
-            let nodes = lines.starts[ray]..lines.starts[ray + 1];
-            nodes.map(|k| self.node(lines, k, &screen, hole, velocity)).collect()
+            let Arrival { end, place: [alpha, beta] } = lines.arrivals[ray];
+            let start = ray.checked_sub(1).map_or(0, |before| lines.arrivals[before].end);
+            let screen = ScreenPoint::new(hole, self.sin_inclination, alpha, beta);
+            (start..end).map(|k| self.node(lines, k, &screen, hole, velocity)).collect()
         };
-        (0..lines.rays()).into_par_iter().map(along).collect()
+        (0..lines.arrivals.len()).into_par_iter().map(along).collect()
     }
 
     fn unit_of<'a>(&self, views: impl Iterator<Item = &'a SynchrotronView>) -> f64 {

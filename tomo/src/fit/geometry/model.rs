@@ -122,14 +122,10 @@ impl GeometryModel {
     /// Returns the view of polarised light in a geometry.
     pub fn polarized(&self, geometry: &Geometry) -> Option<PolarizedView> {
         let law = self.polarization?;
-        let turn = turn(geometry);
-        let places = self.x.iter().zip(&self.y).map(|(x, y)| turn([*x, *y]).into());
-        let (alpha, beta): (Vec<f64>, Vec<f64>) = places.unzip();
         Some(PolarizedView {
             law,
             axis: self.axis,
             sin_inclination: geometry.get(Parameter::Inclination).sin(),
-            screen: [alpha, beta],
             position_angle: geometry.get(Parameter::PositionAngle),
             unit: None,
         })

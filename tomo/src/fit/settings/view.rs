@@ -69,8 +69,8 @@ pub struct Screen {
     /// Jy in the pixel of a sight line with 1 M of emission 1: the unit of emission.
     #[schemars(range(min = 1e-15, max = 1e15), extend("unit" = "Jy per M of emission 1"))]
     pub jy_per_pixel: f64,
-    /// Rays of each pixel near the critical curve, whose mean is its light; without it one, or 16 where images of another
-    /// program ask for means.
+    /// Rays of each pixel near the critical curve, whose mean is its light; without it one, or 16 of light curves, and where images
+    /// of another program ask for means.
     #[schemars(example = 8)]
     #[schemars(range(min = 1, max = 1024), extend("unit" = "rays"))]
     pub ring_rays: Option<usize>,

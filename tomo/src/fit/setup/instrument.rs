@@ -32,6 +32,9 @@ pub struct Instrument {
     pub quiescent: Option<Quiescent>,
 }
 
+/// Rays of pixels near the critical curve where nobody says how many.
+pub(super) const RING_RAYS: usize = 16;
+
 /// Rays of the trial by which the nodes of all are estimated.
 const TRIAL: usize = 512;
 
@@ -116,8 +119,7 @@ impl Instrument {
         }
         lines.weight.iter_mut().for_each(|weight| *weight *= jy);
         let redshift = file.effects.redshift_power.map(|power| Redshift { power });
-        let pixels = [alpha, beta];
-        let polarized = polarized(file, &pixels)?;
+        let (pixels, polarized) = ([alpha, beta], polarized(file)?);
         let (seen, quiescent) = (seen(file)?, quiescent(file, chosen.len())?);
         Ok(Self { pixels, hole, lines, redshift, polarized, seen, quiescent })
     }
@@ -182,8 +184,8 @@ fn spread(side: usize) -> Vec<usize> {
     (0..pixels).step_by(step).collect()
 }
 
-/// Returns the view of polarised light at these pixels, if any is modelled.
-fn polarized(file: &FitFile, screen: &[Vec<f64>; 2]) -> Result<Option<PolarizedView>> {
+/// Returns the view of polarised light, if any is modelled.
+fn polarized(file: &FitFile) -> Result<Option<PolarizedView>> {
     let Some(law) = file.polarization else { return Ok(None) };
     law.check()?;
     if let Some(power) = file.effects.redshift_power {
@@ -198,14 +200,10 @@ fn polarized(file: &FitFile, screen: &[Vec<f64>; 2]) -> Result<Option<PolarizedV
         refuse!("polarization needs region.nodes = {{ gauss = {{ order, split }} }}");
     }
     let missing = || FitError::missing("motion.axis", format!("polarization needs it; {AXIS}"));
-    let turned = upright(file);
-    let [x, y] = screen;
-    let (alpha, beta) = x.iter().zip(y).map(|(x, y)| turned([*x, *y]).into()).unzip();
     Ok(Some(PolarizedView {
         law,
         axis: known_axis(file)?.ok_or_else(missing)?,
         sin_inclination: observer(&file.observer)?.inclination().sin(),
-        screen: [alpha, beta],
         position_angle: file.observer.position_angle_deg.value().to_radians(),
         unit: None,
     }))
@@ -217,19 +215,21 @@ pub(super) fn upright(file: &FitFile) -> impl Fn([f64; 2]) -> [f64; 2] + use<> {
     move |[x, y]| [x * cos + y * sin, y * cos - x * sin]
 }
 
-/// More rays for pixels of the photon ring, where they are wanted.
+/// More rays for pixels of the photon ring, where they are wanted, or where data see the flux of the ring alone: nothing tells
+/// single rays then that have missed it.
 ///
 /// # Errors
 /// If their number is out of range, or rays have no mean.
 pub(super) fn ring(file: &FitFile) -> Result<Option<RingRays>> {
-    let Some(count) = file.screen.ring_rays else { return Ok(None) };
+    let absorbs = file.effects.absorption.is_some();
+    let count = match file.screen.ring_rays {
+        Some(count) => count,
+        None if seen(file)?.is_flux() && !absorbs => RING_RAYS,
+        None => return Ok(None),
+    };
     // Nodes of a pixel's rays are one list: each ray would dim the next.
-    if file.effects.absorption.is_some() {
+    if absorbs {
         refuse!("screen.ring_rays and effects.absorption exclude each other");
-    }
-    // Polarised factors are those of a ray through one place of the pixel.
-    if file.polarization.is_some() {
-        refuse!("screen.ring_rays and polarization exclude each other");
     }
     Ok((count > 1).then_some(RingRays { count, spacing: spacing(&file.screen)?, lattice: 0 }))
 }
@@ -247,9 +247,6 @@ pub(super) fn samples(file: &FitFile) -> Result<usize> {
     }
     if count > 1 && file.effects.absorption.is_some() {
         refuse!("screen.samples_per_pixel and effects.absorption exclude each other");
-    }
-    if count > 1 && file.polarization.is_some() {
-        refuse!("screen.samples_per_pixel and polarization exclude each other");
     }
     Ok(side)
 }

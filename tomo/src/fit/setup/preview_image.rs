@@ -128,12 +128,8 @@ impl PreviewView<'_> {
         }
         let model = ForwardModel::new(&lines, motion, hole, *redshift)?;
         let Some(view) = polarized else { return Ok(model) };
-        let screen = [rays.alpha.clone(), rays.beta.clone()];
-        let factors = PolarizedView { screen, unit, ..view.clone() }.factors(
-            &lines,
-            hole,
-            &motion.velocity,
-        )?;
+        let view = PolarizedView { unit, ..view.clone() };
+        let factors = view.factors(&lines, hole, &motion.velocity)?;
         model.seen(Some(&factors), &Observable::Images)
     }
 }

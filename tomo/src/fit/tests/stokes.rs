@@ -27,11 +27,11 @@ pub fn law(frame: FieldFrame, [vertical, radial, toroidal]: [f64; 3]) -> Polariz
 }
 
 /// Few rays about a hole.
-pub fn traced(spin: f64, degrees: f64) -> (Kerr, Sightlines, [Vec<f64>; 2]) {
+pub fn traced(spin: f64, degrees: f64) -> (Kerr, Sightlines) {
     some_traced(spin, degrees, 12)
 }
 
-fn some_traced(spin: f64, degrees: f64, count: usize) -> (Kerr, Sightlines, [Vec<f64>; 2]) {
+fn some_traced(spin: f64, degrees: f64, count: usize) -> (Kerr, Sightlines) {
     let hole = Kerr::new(spin).unwrap();
     let observer = Observer::at_infinity(Inclination::from_degrees(degrees).unwrap());
     let at = |k: usize| (9.0 * (0.9 * k as f64).sin() + 0.1, 8.0 * (1.3 * k as f64).cos());
@@ -40,15 +40,14 @@ fn some_traced(spin: f64, degrees: f64, count: usize) -> (Kerr, Sightlines, [Vec
     let sampling = Sampling::Gauss { order: 4, split: 1 };
     let request = SightlineRequest { region, sampling, delay: false, momentum: true };
     let lines = Sightlines::trace(&hole, &observer, &alpha, &beta, &request).unwrap();
-    (hole, lines, [alpha, beta])
+    (hole, lines)
 }
 
-pub fn view(law: PolarizationLaw, screen: &[Vec<f64>; 2], degrees: f64) -> PolarizedView {
+pub fn view(law: PolarizationLaw, degrees: f64) -> PolarizedView {
     PolarizedView {
         law,
         axis: Axis::new([0.0, 0.0, 1.0]).unwrap(),
         sin_inclination: degrees.to_radians().sin(),
-        screen: screen.clone(),
         position_angle: 0.0,
         unit: None,
     }
@@ -101,10 +100,10 @@ fn paper_loops_of_a_vertical_field() {
             weight: vec![1.0],
             momentum: [vec![-polar * sin], vec![polar * cos], vec![l_z]],
             radial: vec![cos_alpha],
+            arrivals: vec![Arrival { end: 1, place: [alpha, beta] }],
             ..Sightlines::default()
         };
-        let screen = [vec![alpha], vec![beta]];
-        let seen = view(law, &screen, 20.0).factors(&lines, &hole, &KEPLERIAN).unwrap()[0];
+        let seen = view(law, 20.0).factors(&lines, &hole, &KEPLERIAN).unwrap()[0];
         let expected = narayan(r, [alpha, beta], [cos_alpha, l_z, polar], lapse);
         assert!((seen.i / expected[0] - 1.0).abs() < 1e-9, "{phi}: {} {expected:?}", seen.i);
         assert!(apart(seen.evpa(), expected[1]).abs() < 1e-9, "{phi}: {cos_psi}");
@@ -163,9 +162,7 @@ fn exact_polarised_spot_of_the_renderer() {
     let velocity = AngularVelocity::Keplerian { drag: 0.9 };
     let motion = Motion { velocity, reference: 40.0, injection: None, times: vec![40.0] };
     let law = law(FieldFrame::Gas, [0.7, 0.3, 0.4]);
-    let factors = view(law, &[alpha.clone(), beta.clone()], 50.0)
-        .factors(&lines, &hole, &motion.velocity)
-        .unwrap();
+    let factors = view(law, 50.0).factors(&lines, &hole, &motion.velocity).unwrap();
     let all = vec![StokesParameter::I, StokesParameter::Q, StokesParameter::U];
     let model = ForwardModel::<f64>::new(&lines, &motion, &hole, None).unwrap();
     let model = model.seen(Some(&factors), &Observable::StokesImages(all)).unwrap();
@@ -253,9 +250,9 @@ fn code_lowered_rule_of_circular_orbits() {
 }
 
 fn of_factors(seen: &Observable) -> (ForwardModel<f64>, ForwardModel<f64>) {
-    let (hole, lines, screen) = traced(0.6, 40.0);
+    let (hole, lines) = traced(0.6, 40.0);
     let velocity = AngularVelocity::Keplerian { drag: 0.6 };
-    let factors = view(law(FieldFrame::Ideal, [0.6, 0.2, 0.5]), &screen, 40.0)
+    let factors = view(law(FieldFrame::Ideal, [0.6, 0.2, 0.5]), 40.0)
         .factors(&lines, &hole, &velocity)
         .unwrap();
     let motion = Motion { velocity, reference: 0.0, injection: None, times: vec![0.0, 20.0, 45.0] };
@@ -332,8 +329,8 @@ fn exact_gradients_of_polarised_fluxes() {
 /// slower than light is dark.
 #[test]
 fn exact_turns_and_dark_gas() {
-    let (hole, lines, screen) = traced(0.6, 40.0);
-    let plain = view(law(FieldFrame::Ideal, [1.0, 0.0, 0.3]), &screen, 40.0);
+    let (hole, lines) = traced(0.6, 40.0);
+    let plain = view(law(FieldFrame::Ideal, [1.0, 0.0, 0.3]), 40.0);
     let turned = PolarizedView { position_angle: 0.4, ..plain.clone() };
     let gas = AngularVelocity::Keplerian { drag: 0.6 };
     let [a, b] = [plain.clone(), turned].map(|view| view.factors(&lines, &hole, &gas).unwrap());
@@ -358,8 +355,8 @@ fn exact_a_part_of_the_rays_has_the_mean_field_of_all() {
         ..law(FieldFrame::Ideal, [1.0, 0.0, 0.3])
     };
     let factors = |count: usize, unit: Option<f64>| {
-        let (hole, lines, screen) = some_traced(0.6, 40.0, count);
-        let view = PolarizedView { unit, ..view(law, &screen, 40.0) };
+        let (hole, lines) = some_traced(0.6, 40.0, count);
+        let view = PolarizedView { unit, ..view(law, 40.0) };
         (view.factors(&lines, &hole, &gas).unwrap(), view.unit_along(&lines, &hole, &gas))
     };
     let (all, unit) = factors(12, None);

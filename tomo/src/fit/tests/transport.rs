@@ -31,7 +31,7 @@ fn emitted(hole: &Kerr, lines: &Sightlines, node: usize, field: &MagneticField) 
 fn exact_position_angles_are_those_of_parallel_transport() {
     let mut compared = 0;
     for (spin, degrees) in [(0.0, 20.0), (0.9, 60.0), (-0.7, 130.0)] {
-        let (hole, lines, screen) = traced(spin, degrees);
+        let (hole, lines) = traced(spin, degrees);
         let field = MagneticField { vertical: 0.8, radial: 0.5, toroidal: -0.4 };
         let law = law(FieldFrame::Gas, [field.vertical, field.radial, field.toroidal]);
         for node in (0..lines.points()).step_by(7) {
@@ -42,7 +42,7 @@ fn exact_position_angles_are_those_of_parallel_transport() {
                 - spin * spin * hole.delta(r) * (1.0 - (z / r).powi(2));
             let rate = 2.0 * spin * r / area;
             let gas = AngularVelocity::Table { radii: vec![2.0, 3.0], rates: vec![rate; 2] };
-            let factors = view(law, &screen, degrees).factors(&lines, &hole, &gas).unwrap();
+            let factors = view(law, degrees).factors(&lines, &hole, &gas).unwrap();
             let end = emitted(&hole, &lines, node, &field).carried_out(spin, 0.01);
             let ([north, east], miss) = end.on_screen(degrees.to_radians());
             assert!(miss < 1e-6, "the ray misses the observer by {miss}");

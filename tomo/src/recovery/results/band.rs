@@ -215,12 +215,28 @@ fn radii(scan: &BandScan) -> Vec<[f64; 2]> {
     normalised(scan.radii.iter().enumerate().map(|(k, radius)| [*radius, share(k)]).collect())
 }
 
+/// Places over which the share of a radius is spread.
+const PLACES: usize = 32;
+
 /// Shares of the periods of the orbits of all geometries, minutes; where matter stands still there is none.
 fn periods(scan: &BandScan) -> Vec<[f64; 2]> {
-    let shares = orbits(scan).into_iter().flatten();
-    let all = scan.periods_min.iter().flatten().copied().zip(shares);
-    let moving = all.filter(|(period, _)| period.is_finite());
-    normalised(moving.map(|(period, share)| [period, share]).collect())
+    let all = scan.periods_min.iter().zip(orbits(scan));
+    normalised(all.flat_map(|(periods, shares)| spread(periods, &shares)).collect())
+}
+
+/// Spreads the share of each period half way to those of the next radii: many geometries have the same few.
+fn spread(periods: &[f64], shares: &[f64]) -> Vec<[f64; 2]> {
+    let mut all = Vec::new();
+    let half_way = |k: usize, to: Option<usize>| {
+        let other = to.and_then(|to| periods.get(to)).filter(|period| period.is_finite());
+        other.map_or(periods[k], |other| 0.5 * (periods[k] + other))
+    };
+    for (k, share) in shares.iter().enumerate().filter(|(k, _)| periods[*k].is_finite()) {
+        let [from, to] = [k.checked_sub(1), Some(k + 1)].map(|to| half_way(k, to));
+        let place = |j: usize| from + (to - from) * (j as f64 + 0.5) / PLACES as f64;
+        all.extend((0..PLACES).map(|j| [place(j), share / PLACES as f64]));
+    }
+    all
 }
 
 /// Shares in so many bins of the same width, each at its middle.
@@ -293,6 +309,20 @@ mod tests {
         assert_eq!(bins, [[1.5, 0.5], [2.5, 0.5]]);
         assert_eq!(binned(&[[2.0, 1.0]], 3)[0][1], 1.0);
         assert!(binned(&[], 3).is_empty());
+    }
+
+    /// However many geometries have a period, it is known no better than the radii are apart.
+    #[test]
+    fn exact_periods_are_spread_half_way_to_the_next() {
+        let of = |shares| spread(&[60.0, 80.0, 120.0, f64::INFINITY], shares);
+        let one = of(&[0.0, 1.0, 0.0, 0.0]);
+        let shares = normalised([one.clone(), one.clone(), one].concat());
+        for (part, expected) in [(0.025, 70.75), (0.5, 85.0), (0.975, 99.25)] {
+            let found = quantile(&shares, part);
+            assert!((found - expected).abs() < 1.0, "{part}: {found}");
+        }
+        let last = normalised(of(&[0.0, 0.0, 1.0, 5.0]));
+        assert!((quantile(&last, 1.0) - 120.0).abs() < 1.0);
     }
 
     /// Quantiles of equal shares are those of a straight line.

@@ -5,6 +5,7 @@ use crate::fit::geometry::{Geometry, Spread};
 use crate::fit::journal::Memory;
 use crate::fit::settings::{FitFile, SearchView, UnknownGeometry};
 use crate::fit::setup::FitData;
+use crate::fit::setup::instrument::RING_RAYS;
 
 /// Resolution at which geometries are compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,9 +40,6 @@ pub struct RaySampling {
     /// Number of the lattice of rays near the critical curve, 0 for the usual one.
     pub lattice: u64,
 }
-
-/// Rays of a pixel near the critical curve, where pixels are means: a few miss the narrow images there.
-const RING_RAYS: usize = 16;
 
 impl RaySampling {
     /// Means over twice as many rays along each side.
