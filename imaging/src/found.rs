@@ -69,16 +69,12 @@ impl Calibration {
         scatter(&self.fluxes).unwrap_or(0.0)
     }
 
-    /// What the method adds to a number, with its error, over the images that have it; none if fewer than two do. The error is that of
-    /// the mean; to a sky that is not like the shape the method may add anything from half to one and a half times as much.
+    /// What the method adds to a number of the shape, with the standard error, over the images that have it; none if fewer than two do.
     fn added(&self, number: &Number<'_>) -> Option<(f64, f64)> {
         let of_shape = number(&self.shape, self.ring.as_ref())?;
         let all: Vec<f64> = self.at_minimum().filter_map(|image| image.number(number)).collect();
         let (mean, of_mean) = mean_with_error(&all)?;
-        let added = mean - of_shape;
-        // A factor that is even between ½ and 1½ has a standard deviation of 1/√12.
-        let of_sky = if self.explains { 0.0 } else { added / 12f64.sqrt() };
-        Some((added, of_mean.hypot(of_sky)))
+        Some((mean - of_shape, of_mean))
     }
 }
 
@@ -97,6 +93,8 @@ fn scatter(values: &[f64]) -> Option<f64> {
 
 /// Standard deviation of a direction of which nothing is known, degrees.
 const UNKNOWN_DEG: f64 = 180.0 / 1.732_050_807_568_877_2;
+/// Part of a diameter by which rings of one size differ at most.
+const ALIKE: f64 = 0.25;
 /// Error of a mean direction that says something of it, degrees.
 const SURE_DEG: f64 = 15.0;
 
@@ -136,17 +134,21 @@ impl Survey {
         self.starts.iter().filter(as_good).chain(&self.strengths)
     }
 
-    /// Returns how many of the draws, and of the images that data do not tell from the best, have a ring, and how many these
-    /// are.
+    /// Returns how many of the draws, and of the images that data do not tell from the best, have a ring, of a size that is within a
+    /// quarter of this one's where this one has a ring; and how many these are.
     pub fn with_ring(&self) -> [usize; 2] {
         let all = || self.draws.iter().chain(self.alternatives());
-        [all().filter(|image| image.ring.is_some()).count(), all().count()]
+        let here = self.found().ring.as_ref();
+        let is_like = |ring: &Ring| {
+            here.is_none_or(|here| (ring.diameter_uas / here.diameter_uas - 1.0).abs() < ALIKE)
+        };
+        [all().filter(|image| image.ring.as_ref().is_some_and(is_like)).count(), all().count()]
     }
 
-    /// Diameter of the ring in µas, less what the method adds to that of the best simple shape, and its error where that is known:
-    /// a blurred ring is smaller. An image that is not at a minimum is taken as it is.
-    pub fn ring_diameter(&self) -> Option<(f64, Option<f64>)> {
-        self.calibrated(&|_, ring| Some(ring?.diameter_uas))
+    /// A number of the ring, less what the method adds to that of the best simple shape where it explains the data, and its error where
+    /// that is known: a blurred ring is smaller and more even. An image that is not at a minimum is taken as it is.
+    pub fn ring_number(&self, number: impl Fn(&Ring) -> f64) -> Option<(f64, Option<f64>)> {
+        self.calibrated(&|_, ring| ring.map(&number))
     }
 
     /// Direction in which its ring is brightest, degrees east of north, likewise: bright parts draw light to them that belongs elsewhere.
@@ -165,31 +167,30 @@ impl Survey {
         Some(((here + turn).rem_euclid(360.0), error.map(|error| error.min(UNKNOWN_DEG))))
     }
 
-    /// Flux in Jy, likewise, if the shape explains the data: brightness that no baseline sees costs an image little, so that it has more
-    /// of it than the sky. Otherwise that of the image, with what the method adds to the shape's in its error.
+    /// Flux in Jy, likewise: brightness that no baseline sees costs an image little, so that it has more of it than the sky.
     pub fn flux(&self) -> (f64, Option<f64>) {
         let number: &Number<'_> = &|image, _| Some(image.iter().sum());
         let here = self.found().solution.image.iter().sum();
-        let error = self.error(|image| image.number(number));
-        let Some(known) = self.calibration().filter(|known| !known.explains) else {
-            let (flux, error) = self.calibrated(number).unwrap_or((here, error));
-            let of_shape = self.calibration().map_or(0.0, Calibration::flux_error);
-            // The more the image's flux is that of the shape, the less it scatters, and the more the shape's error counts.
-            return (flux, error.map(|error| error.max(of_shape)));
-        };
-        let added = known.added(number).map_or(0.0, |(added, _)| added);
-        (here, error.map(|error| error.hypot(added)))
+        let (flux, error) = self.calibrated(number).unwrap_or((here, None));
+        let of_shape = self.calibration().map_or(0.0, Calibration::flux_error);
+        // The more the image's flux is that of the shape, the less it scatters, and the more the shape's error counts.
+        (flux, error.map(|error| error.max(of_shape)))
     }
 
-    /// A number less what the method adds to that of the best simple shape. Its error is the standard deviation of the draws, the
-    /// distance of images that data do not tell from the best, and the error of what is taken off, in quadrature.
+    /// A number less what the method adds to that of the best simple shape where it explains the data. Its error is then the standard
+    /// deviation of the draws, the distance of images that data do not tell from the best, and the error of what is taken off, in
+    /// quadrature; otherwise that of the image, with what the method adds to the shape's.
     fn calibrated(&self, number: &Number<'_>) -> Option<(f64, Option<f64>)> {
         let here = self.found().number(number)?;
         let of = |image: &Candidate| image.number(number);
-        let Some((added, of_added)) = self.calibration().and_then(|known| known.added(number))
-        else {
+        let known = self.calibration();
+        let Some((added, of_added)) = known.and_then(|known| known.added(number)) else {
             return Some((here, self.error(of)));
         };
+        // To a sky that is not like the shape the method adds something else: no more than its size is known.
+        if known.is_some_and(|known| !known.explains) {
+            return Some((here, self.error(of).map(|error| error.hypot(of_added).hypot(added))));
+        }
         // The method adds to images of the image as well: what is taken off is no error of the rest.
         let draws: Vec<f64> = self.draws_that_count().into_iter().filter_map(of).collect();
         let others = self.apart(&mut self.alternatives(), of)?;
@@ -202,7 +203,8 @@ impl Survey {
     pub fn draws_that_count(&self) -> Vec<&Candidate> {
         let there = self.draws.iter().filter(|draw| draw.solution.has_converged);
         let there: Vec<&Candidate> = there.collect();
-        if 2 * there.len() < self.draws.len() { self.draws.iter().collect() } else { there }
+        let are_few = there.len() < 2 || 2 * there.len() < self.draws.len();
+        if are_few { self.draws.iter().collect() } else { there }
     }
 
     /// Images of a known sky, if they say what the method has done to the image: it came to a minimum.
@@ -289,7 +291,7 @@ mod tests {
         hardly_seen.draws = vec![image(1.12), image(1.12)];
         near(hardly_seen.flux(), [1.04, 0.03]);
         let off = (0.02f64.powi(2) + 0.08f64.powi(2)) / 2.0;
-        near(survey(false).flux(), [1.1, off.sqrt().hypot(0.06)]);
+        near(survey(false).flux(), [1.1, off.sqrt().hypot(0.06).hypot(0.01)]);
         let mut stopped = survey(true);
         stopped.starts[0].solution.has_converged = false;
         near(stopped.flux(), [1.1, off.sqrt()]);

@@ -94,7 +94,7 @@ pub use polarized::{
     LinearPolarization, PolarizedCandidate, PolarizedProblem, PolarizedSurvey, survey_polarized,
 };
 pub use problem::{FluxPrior, ImageProblem};
-pub use ring::Ring;
+pub use ring::{MOST_CENTRAL, Ring};
 pub use shapes::{Shape, ShapeFit, best_shape, fit_shapes};
 pub use solve::Solution;
 pub use survey::{Stage, SurveyWatch, image, known_skies, survey};

@@ -35,7 +35,7 @@ const SAMPLES: f64 = 6.0;
 /// Part of the directions whose brightest point may lie at a limit of the radii: there is no ring with more.
 const MOST_AT_LIMITS: f64 = 0.1;
 /// Mean brightness at the centre over that of the ring: what is brighter inside is a disc.
-const MOST_CENTRAL: f64 = 0.5;
+pub const MOST_CENTRAL: f64 = 0.5;
 /// Part of the directions that a ring has light in: two knots have gaps between them, a crescent one.
 const LEAST_COVERAGE: f64 = 0.7;
 /// Brightness over that of the centre, and over that of the brightest direction, from which on a direction has light.

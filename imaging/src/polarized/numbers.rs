@@ -25,6 +25,24 @@ pub struct LinearPolarization {
     pub beta2_deg: f64,
 }
 
+/// The place of a peak between pixels, east and north of the middle, µas: that of parabolas through the brightest pixel and its
+/// neighbours.
+fn peak(values: &[f64], grid: ImageGrid, brightest: usize) -> [f64; 2] {
+    let n = grid.width;
+    let [row, column] = [brightest / n, brightest % n];
+    let off = |before: f64, after: f64| {
+        let curvature = before - 2.0 * values[brightest] + after;
+        if curvature < 0.0 { 0.5 * (before - after) / curvature } else { 0.0 }
+    };
+    let inside = |k: usize, end: usize| (1..end.saturating_sub(1)).contains(&k);
+    let columns = inside(column, n).then(|| off(values[brightest - 1], values[brightest + 1]));
+    let rows = inside(row, grid.height).then(|| off(values[brightest - n], values[brightest + n]));
+    let [east, north] = grid.place_uas(brightest);
+    let pixel = grid.pixel_rad / MICROARCSECOND;
+    // Columns run to the west, rows to the south.
+    [east - columns.unwrap_or(0.0) * pixel, north - rows.unwrap_or(0.0) * pixel]
+}
+
 impl LinearPolarization {
     /// Measures images of I, Q and U that follow each other; the centre is to the east and north of the middle of the field,
     /// µas, the beam a full width at half maximum.
@@ -38,20 +56,19 @@ impl LinearPolarization {
         let seen: f64 = light.iter().sum();
         let polarized: Vec<Complex<f64>> =
             q.iter().zip(&u).map(|(q, u)| Complex::new(*q, *u)).collect();
-        let angle = |k: usize| {
-            let [east, north] = grid.place_uas(k);
-            (east - centre_uas[0]).atan2(north - centre_uas[1])
-        };
+        let direction =
+            |[east, north]: [f64; 2]| (east - centre_uas[0]).atan2(north - centre_uas[1]);
+        let angle = |k: usize| direction(grid.place_uas(k));
         let turned = |(k, p): (usize, &Complex<f64>)| p * Complex::cis(-2.0 * angle(k));
         let beta2: Complex<f64> = polarized.iter().enumerate().map(turned).sum();
-        let brightest = (0..n).max_by(|a, b| polarized[*a].norm().total_cmp(&polarized[*b].norm()));
-        let brightest = brightest.unwrap_or(0);
+        let bright: Vec<f64> = polarized.iter().map(|p| p.norm()).collect();
+        let brightest = (0..n).max_by(|a, b| bright[*a].total_cmp(&bright[*b])).unwrap_or(0);
         Self {
             net_fraction: net.norm() / total(0),
             net_evpa_deg: 0.5 * net.arg().to_degrees(),
-            mean_fraction: polarized.iter().map(|p| p.norm()).sum::<f64>() / seen,
-            brightest_fraction: polarized[brightest].norm() / light[brightest],
-            brightest_deg: angle(brightest).to_degrees(),
+            mean_fraction: bright.iter().sum::<f64>() / seen,
+            brightest_fraction: bright[brightest] / light[brightest],
+            brightest_deg: direction(peak(&bright, grid, brightest)).to_degrees(),
             beta2: beta2.norm() / seen,
             beta2_deg: beta2.arg().to_degrees(),
         }

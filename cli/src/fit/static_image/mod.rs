@@ -95,7 +95,9 @@ pub fn run(prepared: &Prepared, folder: &Folder) -> anyhow::Result<Answer> {
     let movie = still(&survey.found().solution.image, measured);
     let evidence = Evidence { file: None, losses: &file.loss, seed: file.seed, measured };
     let (polarized, tested) = match (&prepared.polarized, polarized) {
-        (Some(measured), Some(survey)) => Polarized::new(file, measured, survey, folder)?.unzip(),
+        (Some(measured), Some(of_polarized)) => {
+            Polarized::new(file, measured, of_polarized, &survey, folder)?.unzip()
+        }
         _ => (None, None),
     };
     let mut judged = evidence.judged(compared(file, measured, &survey)?, &movie, tested)?;

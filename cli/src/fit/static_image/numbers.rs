@@ -14,12 +14,12 @@ pub const RING: [(&str, Number); 5] = [
     ("ring_central_brightness", |ring| ring.central_brightness),
 ];
 
-/// A number of the ring with its error; diameter and direction are calibrated.
+/// A number of the ring with its error, calibrated but for the width, which includes what the array blurs.
 pub fn of_ring(survey: &Survey, ring: &Ring, name: &str, number: Number) -> (f64, Option<f64>) {
     let calibrated = match name {
-        "ring_diameter_uas" => survey.ring_diameter(),
+        "ring_width_uas" => None,
         "ring_position_angle_deg" => survey.ring_direction(),
-        _ => None,
+        _ => survey.ring_number(number),
     };
     calibrated.unwrap_or_else(|| (number(ring), survey.ring_error(number)))
 }

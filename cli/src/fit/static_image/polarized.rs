@@ -8,27 +8,43 @@ use crate::fit::results::leakage::Leakage;
 use crate::report::{LinePlot, Outcome};
 use anyhow::Context;
 use kerrlight_imaging::settings::{StaticImageFile, StaticPolarization};
-use kerrlight_imaging::{LinearPolarization, PolarizedSurvey};
+use kerrlight_imaging::{LinearPolarization, PolarizedSurvey, Survey};
 use kerrlight_tomo::fit::FrameTerm;
 use kerrlight_tomo::fit::setup::{FitData, told_end};
 use kerrlight_tomo::fit::verdict::{Errors, Statistics, Tested};
 use serde::Serialize;
 
-/// A number: its key and period in results.json, name, unit, digits, and meaning.
+/// A number: its key in results.json, kind, name, unit, digits, and meaning.
 struct Number {
     key: &'static str,
     of: fn(&LinearPolarization) -> f64,
-    period: Option<f64>,
+    kind: Kind,
     name: &'static str,
     unit: &'static str,
     meaning: &'static str,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    /// A part of all light, of which images have too much.
+    OfLight,
+    Plain,
+    /// An angle with its period, degrees.
+    Angle(f64),
+}
+
+/// A factor with its error.
+#[derive(Clone, Copy)]
+struct Factor {
+    value: f64,
+    error: f64,
 }
 
 const NUMBERS: [Number; 7] = [
     Number {
         key: "net_fraction",
         of: |p| p.net_fraction,
-        period: None,
+        kind: Kind::OfLight,
         name: "net polarisation",
         unit: "",
         meaning: "|ΣP|/ΣI: what an array sees that does not resolve the source",
@@ -36,7 +52,7 @@ const NUMBERS: [Number; 7] = [
     Number {
         key: "net_evpa_deg",
         of: |p| p.net_evpa_deg,
-        period: Some(180.0),
+        kind: Kind::Angle(180.0),
         name: "net position angle",
         unit: "°",
         meaning: "of the electric vector of all light together, east of north",
@@ -44,7 +60,7 @@ const NUMBERS: [Number; 7] = [
     Number {
         key: "mean_fraction",
         of: |p| p.mean_fraction,
-        period: None,
+        kind: Kind::OfLight,
         name: "mean polarisation",
         unit: "",
         meaning: "Σ|P|/ΣI of the image as the beam sees it",
@@ -52,7 +68,7 @@ const NUMBERS: [Number; 7] = [
     Number {
         key: "brightest_fraction",
         of: |p| p.brightest_fraction,
-        period: None,
+        kind: Kind::Plain,
         name: "polarisation where it is brightest",
         unit: "",
         meaning: "|P|/I there, as the beam sees it",
@@ -60,7 +76,7 @@ const NUMBERS: [Number; 7] = [
     Number {
         key: "brightest_deg",
         of: |p| p.brightest_deg,
-        period: Some(360.0),
+        kind: Kind::Angle(360.0),
         name: "direction of that place",
         unit: "°",
         meaning: "from the centre, east of north: −90 is west",
@@ -68,7 +84,7 @@ const NUMBERS: [Number; 7] = [
     Number {
         key: "beta2",
         of: |p| p.beta2,
-        period: None,
+        kind: Kind::OfLight,
         name: "|β₂|",
         unit: "",
         meaning: "modulus of Σ P e^(−2iφ)/ΣI: how much electric vectors turn with the direction φ from the centre",
@@ -76,7 +92,7 @@ const NUMBERS: [Number; 7] = [
     Number {
         key: "beta2_deg",
         of: |p| p.beta2_deg,
-        period: Some(360.0),
+        kind: Kind::Angle(360.0),
         name: "arg β₂",
         unit: "°",
         meaning: "0 for radial electric vectors, 180 for tangential ones, spirals between",
@@ -93,6 +109,8 @@ pub struct Polarized {
     pub leakage: Option<Leakage>,
     /// True if gains were solved for.
     has_gains: bool,
+    /// Flux of the image over the flux that was found, with the relative error of the latter.
+    light: Factor,
     /// Data, and what is left of them.
     count: usize,
 }
@@ -129,6 +147,7 @@ impl Polarized {
         file: &StaticImageFile,
         measured: &FitData,
         survey: PolarizedSurvey,
+        light: &Survey,
         folder: &Folder,
     ) -> anyhow::Result<Option<(Self, (String, Tested))>> {
         let table = survey.leakage.as_ref().map(|leakage| leakage.table.clone());
@@ -152,12 +171,36 @@ impl Polarized {
         let count = statistics.all.count();
         let tested = (settings.data.label().to_owned(), Tested::gaussian(statistics, errors));
         let has_gains = gains.is_some();
-        Ok(Some((Self { settings, survey, leakage, has_gains, count }, tested)))
+        let (flux, error) = light.flux();
+        let of_image: f64 = light.found().solution.image.iter().sum();
+        let light = Factor { value: of_image / flux, error: error.unwrap_or(0.0) / flux };
+        Ok(Some((Self { settings, survey, leakage, has_gains, light, count }, tested)))
     }
 
+    /// A number with its error. Light that an image has and the sky has not is not polarised: fractions of all light are too small by it.
     fn value(&self, number: &Number) -> (f64, Option<f64>) {
         let value = (number.of)(&self.survey.found.numbers);
-        (value, self.survey.error(number.of, number.period))
+        let period = match number.kind {
+            Kind::Angle(period) => Some(period),
+            _ => None,
+        };
+        let error = self.survey.error(number.of, period);
+        if number.kind != Kind::OfLight {
+            return (value, error);
+        }
+        let value = self.light.value * value;
+        (value, error.map(|error| (self.light.value * error).hypot(self.light.error * value)))
+    }
+
+    /// Returns whether a number is measured: a direction of what may be zero is none.
+    fn is_seen(&self, number: &Number) -> bool {
+        let of = match number.key {
+            "net_evpa_deg" => &NUMBERS[0],
+            "beta2_deg" => &NUMBERS[5],
+            _ => return true,
+        };
+        let (value, error) = self.value(of);
+        error.is_none_or(|error| value >= 2.0 * error)
     }
 
     /// χ² over the number of its data, with their kind.
@@ -181,7 +224,11 @@ impl Polarized {
             let (value, error) = self.value(number);
             let digits = if number.unit.is_empty() { 3 } else { 0 };
             let Number { name, unit, meaning, .. } = *number;
-            Outcome { name, value: with_error(value, error, digits), unit, meaning }
+            let value = match self.is_seen(number) {
+                true => with_error(value, error, digits),
+                false => "not measured".to_owned(),
+            };
+            Outcome { name, value, unit, meaning }
         };
         NUMBERS.iter().map(one).collect()
     }
@@ -193,9 +240,7 @@ impl Polarized {
         let per_cent = |(value, error): (f64, Option<f64>)| {
             with_error(100.0 * value, error.map(|error| 100.0 * error), 1)
         };
-        // A direction of what may be zero is none.
-        let is_seen = beta.1.is_none_or(|error| beta.0 >= 2.0 * error);
-        let argument = match is_seen {
+        let argument = match self.is_seen(&NUMBERS[6]) {
             true => format!("the argument {}°", with_error(angle.0, angle.1, 0)),
             false => "no measured argument: it is less than two errors from 0".to_owned(),
         };

@@ -7,7 +7,9 @@ use crate::fit::closures;
 use crate::fit::results::medium;
 use crate::report::Part;
 use kerrlight_imaging::settings::{RingSettings, StartImage, StrengthSettings};
-use kerrlight_imaging::{Calibration, Candidate, Envelope, Profile, ShapeFit, Survey, best_shape};
+use kerrlight_imaging::{
+    Calibration, Candidate, Envelope, MOST_CENTRAL, Profile, Ring, ShapeFit, Survey, best_shape,
+};
 use kerrlight_tomo::fit::settings::LossKind;
 use kerrlight_tomo::fit::setup::told_end;
 
@@ -24,10 +26,16 @@ fn ring(survey: &Survey, shapes: &[ShapeFit], between: &RingSettings) -> String 
     if let Some(doubt) = doubt(survey, shapes) {
         return format!("The image looks like a ring, but {doubt}: no ring is claimed.");
     }
-    let [diameter, width, angle, ..] =
+    let [diameter, width, angle, asymmetry, _] =
         RING.map(|(name, number)| of_ring(survey, &ring, name, number));
+    let is_even = asymmetry.1.is_none_or(|error| asymmetry.0 < 2.0 * error);
     let bright = match angle.1 {
-        Some(error) if error > EVEN_DEG => "as bright on all sides within the errors".to_owned(),
+        Some(error) if error > EVEN_DEG && is_even => {
+            "as bright on all sides within the errors".to_owned()
+        }
+        Some(error) if error > EVEN_DEG => {
+            "brighter on one side, whose direction is not known".to_owned()
+        }
         Some(error) => {
             format!("brightest at {}° east of north", with_error(angle.0, Some(error), 0))
         }
@@ -36,7 +44,7 @@ fn ring(survey: &Survey, shapes: &[ShapeFit], between: &RingSettings) -> String 
     let [with, all] = survey.with_ring();
     let others = match with == all {
         true => String::new(),
-        false => format!(" {with} of {all} images that the data allow have one."),
+        false => format!(" {with} of {all} images that the data allow have one of this size."),
     };
     format!(
         "The image has a ring of {} µas, {} µas wide, {bright}.{others}",
@@ -75,7 +83,19 @@ fn no_ring(survey: &Survey, shapes: &[ShapeFit], between: &RingSettings) -> Stri
 pub fn doubt(survey: &Survey, shapes: &[ShapeFit]) -> Option<String> {
     let [with, all] = survey.with_ring();
     if (with as f64) < LEAST_AGREEMENT * all as f64 {
-        return Some(format!("{with} of {all} images that the data allow have one"));
+        return Some(format!("{with} of {all} images that the data allow have one of this size"));
+    }
+    let ring = survey.found().ring?;
+    let of = |number: fn(&Ring) -> f64| survey.ring_number(number).unwrap_or((number(&ring), None));
+    let (diameter, error) = of(|ring| ring.diameter_uas);
+    if let Some(error) = error.filter(|error| diameter < LEAST_CERTAINTY * error) {
+        return Some(format!("its diameter, {diameter:.0} ± {error:.0} µas, is not measured"));
+    }
+    let (central, error) = of(|ring| ring.central_brightness);
+    if let Some(error) = error.filter(|error| central + error > MOST_CENTRAL) {
+        return Some(format!(
+            "its middle may be filled: {central:.2} ± {error:.2} as bright as it"
+        ));
     }
     let least =
         |is_ring: bool| best_shape(shapes.iter().filter(|fit| fit.shape.is_ring() == is_ring));
@@ -83,11 +103,12 @@ pub fn doubt(survey: &Survey, shapes: &[ShapeFit]) -> Option<String> {
     let (ring, other) = (least(true)?, least(false)?);
     (other.criterion < ring.criterion).then(|| {
         format!(
-            "a {} fits the data better than a {} (χ² with a penalty on parameters {:.0} and {:.0})",
+            "a {} fits the data better than a {} (χ² with a penalty on parameters {:.0} and {:.0}){}",
             other.shape.name(),
             ring.shape.name(),
             other.criterion,
-            ring.criterion
+            ring.criterion,
+            if other.explains { "" } else { ", though neither explains them" }
         )
     })
 }
@@ -97,6 +118,9 @@ const EVEN_DEG: f64 = 45.0;
 
 /// Part of the images that the data allow which have to have a ring.
 const LEAST_AGREEMENT: f64 = 0.8;
+
+/// Errors that the diameter of a ring has to be from 0.
+const LEAST_CERTAINTY: f64 = 3.0;
 
 impl Found<'_> {
     /// Paragraphs under headings.
@@ -294,17 +318,15 @@ impl Found<'_> {
 fn calibrated(known: &Calibration) -> String {
     let rest = match known.explains {
         true => {
-            "explains the data, so that what the method adds to the flux and to gains is taken off as well"
+            "explains the data, so that what it adds to flux, gains and ring (to the brightest direction where these images agree on one) is taken off, and the scatter of the draws about their mean counts in place of their distance"
         }
         false => {
-            "does not explain the data, so that what the method adds to the flux and to gains is part of their errors"
+            "does not explain the data, so that what it adds to flux, gains and ring is part of their errors"
         }
     };
     format!(
-        "{} images of measurements of the best simple shape tell what the method makes of a known sky: what it adds to the \
-         diameter of the ring, and to its brightest direction where these images agree on one, is taken off. The shape {rest}. \
-         Where something is taken off diameter, direction or flux, the scatter of the draws about their mean counts in place \
-         of their distance. Where an image did not come to a minimum, nothing is taken off.",
+        "{} images of measurements of the best simple shape tell what the method makes of a known sky. The shape {rest}. Where an \
+         image did not come to a minimum, nothing is taken off.",
         known.images.len()
     )
 }
