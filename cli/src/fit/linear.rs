@@ -45,10 +45,14 @@ pub fn statement(solution: &LinearSolution<f32>) -> String {
     let stopped = !matches!(solution.ending, Ending::Converged | Ending::Rounding);
     if let Some(certificate) = solution.certificate {
         // The gap counts in losses of the dark field, which is 0 where dark explains the data.
-        if !certificate.relative_gap().is_finite() {
+        if certificate.dark == 0.0 {
             return "minimum of a convex problem: the dark field explains the data".to_owned();
         }
         let gap = certificate.relative_gap();
+        if !gap.is_finite() {
+            return "not a certified minimum: the loss left the range of numbers, as with errors that are far too small"
+                .to_owned();
+        }
         if gap > LOOSE {
             // No loss is below 0.
             let gap = gap.min(certificate.value / certificate.dark);

@@ -118,7 +118,7 @@ impl LinePlot {
             }
         }
         if plots.is_empty() {
-            bail!("plot {:?} has no point to show", self.title);
+            return Ok((String::new(), format!("{caption} There is no point to show.")));
         }
         if hidden > 0 {
             caption +=

@@ -5,7 +5,6 @@ use crate::fit::settings::{FitFile, Loss, LossKind};
 use crate::fit::setup::{FitData, errors};
 use crate::fit::verdict::{Errors, Expected, Statistics, Tested, Verdict, ZeroSpacing, judge};
 use kerrlight_common::frames::Frames;
-use kerrlight_vlbi::products::debiased_amplitude;
 
 /// A verdict with all that it is made of.
 #[derive(Clone, Debug)]
@@ -112,7 +111,8 @@ impl Evidence<'_> {
         };
         let shortest = SHORT / (sky.pixel_rad * sky.width as f64);
         let flux = movie.sums()?;
-        let (mut count, mut weights, mut sums) = (0, 0.0, [0.0; 2]);
+        // Mean squares: those of noise are known, at any signal to noise, and phases are not needed.
+        let (mut count, mut weights, mut squares, mut variance) = (0, 0.0, [0.0; 2], 0.0);
         for (row, frame) in observation.rows.iter().zip(frames) {
             let Some(i) = row.stokes_i(observation.basis) else { continue };
             // A row without an error would have all the weight.
@@ -122,11 +122,14 @@ impl Evidence<'_> {
             let weight = i.noise_sigma.powi(-2);
             count += 1;
             weights += weight;
-            sums[0] += weight * debiased_amplitude(&i);
-            sums[1] += weight * flux.get(*frame).copied().unwrap_or(f64::NAN);
+            let flux = flux.get(*frame).copied().unwrap_or(f64::NAN);
+            squares[0] += weight * i.visibility.norm_sqr() - 2.0;
+            squares[1] += weight * flux * flux;
+            // |V|² has the variance 4 σ² (F² + σ²).
+            variance += weight * flux * flux + 1.0;
         }
-        let [measured_jy, model_jy] = sums.map(|sum| sum / weights);
-        let error_jy = weights.powf(-0.5);
+        let [measured_jy, model_jy] = squares.map(|sum| (sum / weights).max(0.0).sqrt());
+        let error_jy = variance.sqrt() / (weights * model_jy.max(weights.powf(-0.5)));
         Ok((count > 0).then_some(ZeroSpacing { measured_jy, error_jy, model_jy, count }))
     }
 }

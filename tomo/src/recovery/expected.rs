@@ -13,8 +13,8 @@ use kerrlight_vlbi::operator::{Method, Operator, Transform};
 use kerrlight_vlbi::products::ClosureKind;
 use num_complex::Complex;
 
-/// Draws of the noise.
-const DRAWS: u64 = 12;
+/// Draws of the noise: the tails of closure quantities are long, and nothing is fitted to a draw.
+const DRAWS: u64 = 48;
 
 impl Evidence<'_> {
     /// Visibilities of a movie for all rows of the data that have Stokes I, in their order; none without any.

@@ -1,6 +1,6 @@
 //! Tables of light curves: a time a line, columns separated by commas or blanks and told by a line of names.
 
-use super::{FileError, cells, cells_below, has_tabs, number, sigma};
+use super::{FileError, cells, cells_below, has_tabs, number, over_midnight, sigma};
 use crate::Error;
 use crate::earth::MJD_ZERO;
 use crate::light_curve::{Flux, LightCurve, Sample};
@@ -240,26 +240,16 @@ pub fn parse(text: &str) -> Result<LightCurve, Error> {
         return Err(FileError::whole(format!("no line names {}", wanted())).into());
     }
     if heading.is_some_and(|found| found.time.unit == TimeUnit::Hours) {
-        over_midnight(&mut samples);
+        over_midnight(&mut samples, |sample| &mut sample.time_h);
     }
     samples.retain(Sample::has_flux);
     if samples.is_empty() {
         return Err(FileError::whole("no fluxes").into());
     }
     samples.sort_by(|a: &Sample, b: &Sample| a.time_h.total_cmp(&b.time_h));
+    // Copies are no further measurements.
+    samples.dedup();
     Ok(LightCurve { samples })
-}
-
-/// Counts hours on where they begin anew at midnight: they fall once, by more than half a day, and those after midnight come
-/// before all others on a clock. Tables of several telescopes, one after the other, are none of these.
-fn over_midnight(samples: &mut [Sample]) {
-    let fall = |k: &usize| samples[*k].time_h < samples[k - 1].time_h;
-    let falls: Vec<usize> = (1..samples.len()).filter(fall).collect();
-    let [midnight] = falls[..] else { return };
-    let (before, last) = (samples[midnight - 1].time_h, samples[samples.len() - 1].time_h);
-    if before - samples[midnight].time_h > 12.0 && last < samples[0].time_h {
-        samples[midnight..].iter_mut().for_each(|sample| sample.time_h += 24.0);
-    }
 }
 
 fn wanted() -> &'static str {
@@ -441,7 +431,8 @@ mod tests {
             samples.iter().map(|sample| sample.time_h).collect()
         };
         assert_eq!(hours("23.75,1\n0,1\n0.25,1\n"), [23.75, 24.0, 24.25]);
-        assert_eq!(hours("1,1\n14,1\n1,1\n15,1\n"), [1.0, 1.0, 14.0, 15.0]);
+        assert_eq!(hours("2,1\n1,1\n2,1\n2,3\n"), [1.0, 2.0, 2.0]);
+        assert_eq!(hours("1,1\n14,1\n1,2\n15,1\n"), [1.0, 1.0, 14.0, 15.0]);
         // An empty cell between tabs is no measurement, and what follows stays where it is.
         let tabs = parse("time\tI\tcount\n1\t2.4\t50\n2\t\t50\n3\t2.5\t50\n").unwrap();
         assert_eq!(tabs.samples.iter().map(|s| s.time_h).collect::<Vec<_>>(), [1.0, 3.0]);

@@ -154,6 +154,17 @@ fn cells_below(line: &str, names: usize, tabs: bool) -> Result<Vec<&str>, String
     Ok(cells)
 }
 
+/// Counts hours on where they begin anew at midnight: they fall once, by more than half a day, and those after midnight come
+/// before all others on a clock. Tables of several telescopes, one after the other, are none of these.
+fn over_midnight<T>(rows: &mut [T], hour: impl Fn(&mut T) -> &mut f64) {
+    let hours: Vec<f64> = rows.iter_mut().map(|row| *hour(row)).collect();
+    let falls: Vec<usize> = (1..hours.len()).filter(|k| hours[*k] < hours[k - 1]).collect();
+    let [midnight] = falls[..] else { return };
+    if hours[midnight - 1] - hours[midnight] > 12.0 && hours[hours.len() - 1] < hours[0] {
+        rows[midnight..].iter_mut().for_each(|row| *hour(row) += 24.0);
+    }
+}
+
 /// A text without the byte order mark that spreadsheets and editors of Windows put before it.
 pub(crate) fn without_mark(text: &str) -> &str {
     text.strip_prefix('\u{feff}').unwrap_or(text)

@@ -3,7 +3,7 @@
 
 use super::{
     FileError, MOST_HOURS, MOST_WAVELENGTHS, Names, cells, cells_below, check_located, comments,
-    has_tabs, number, number_within, sigma,
+    has_tabs, number, number_within, over_midnight, sigma,
 };
 use crate::Complex64;
 use crate::Error;
@@ -112,6 +112,7 @@ pub fn parse(text: &str) -> Result<Observation, Error> {
         return Err(FileError::whole("no visibilities").into());
     }
     check_located(&observation)?;
+    over_midnight(&mut observation.rows, |row| &mut row.time_h);
     if left_out > 0 {
         observation.history.push(format!("{left_out} lines without a visibility (nan) left out"));
     }
@@ -280,6 +281,17 @@ mod tests {
         assert!(fail(&format!("{tabs}\n1\tA\tB\t1\t2\t\t3\t4\n")).contains("line 2: re ``"));
         assert!(fail(&format!("{tabs}\n1 A B 1 2 3 4\n")).contains("line 2: "));
         assert!(fail(&format!("{head},u\n1,A,B,1,2,3,4,5,6\n")).contains("line 1: column `u` app"));
+    }
+
+    /// Hours of a night over midnight count on, however many baselines a scan has.
+    #[test]
+    fn exact_hours_count_on_over_midnight() {
+        let line = |hour: &str, pair: &str| format!("{hour},{pair},1,2,3,4,5\n");
+        let [a, b] = ["A,B", "A,C"];
+        let scans = ["23.5", "0", "0.5"].map(|hour| line(hour, a) + &line(hour, b));
+        let read = parse(&(COLUMNS.join(",") + "\n" + &scans.concat())).unwrap();
+        let hours: Vec<f64> = read.rows.iter().map(|row| row.time_h).collect();
+        assert_eq!(hours, [23.5, 23.5, 24.0, 24.0, 24.5, 24.5]);
     }
 
     /// As in UVFITS, a value that is no number means that there is no such datum.

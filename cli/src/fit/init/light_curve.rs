@@ -102,7 +102,7 @@ pub fn of_light_curve(
         (
             "background",
             if polarized {
-                background(scatter / (fitted.parameters.len() as f64).sqrt())
+                background(scatter / (fitted.parameters.len() as f64).sqrt(), &fitted.curve)
             } else {
                 String::new()
             },
@@ -122,8 +122,14 @@ fn mass(source: Option<&Source>) -> String {
     }
 }
 
-/// Backgrounds about as bright as what varies in each of Q and U of the data, Jy.
-fn background(scatter: f64) -> String {
+/// Backgrounds about as bright as what varies in each of Q and U of the data, Jy, as fast as samples tell and as slow as all of
+/// them: one that is faster than those of the list would look like a flare.
+fn background(scatter: f64, curve: &LightCurve) -> String {
+    let hours = |k: Option<&Sample>| k.map_or(0.0, |sample| sample.time_h);
+    let span = 60.0 * (hours(curve.samples.last()) - hours(curve.samples.first())).max(1.0 / 60.0);
+    let least = 2.0 * span / (curve.samples.len().max(2) - 1) as f64;
+    let times = core::iter::successors(Some(least), |time| (*time < span).then_some(3.0 * time));
+    let times = times.map(digits).collect::<Vec<_>>().join(", ");
     let constant = digits(scatter);
     let variations = [0.2, 0.5, 1.0].map(|part| digits(part * scatter)).join(", ");
     format!(
@@ -131,7 +137,7 @@ fn background(scatter: f64) -> String {
 [band.background]
 constant_jy = {constant} #! what does not move differs from the mean by as much as the data vary
 variation_jy = [{variations}] #! of what varies, a small part, half or all does not orbit
-correlation_min = [20.0, 60.0, 180.0] #! the source varies within such times
+correlation_min = [{times}] #! from two samples to the span: a background that varies faster looks like a flare
 matern = [\"1/2\", \"5/2\"] #! as a damped random walk, or smoothly"
     )
 }

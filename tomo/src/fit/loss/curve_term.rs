@@ -37,7 +37,9 @@ impl StokesCurveTerm {
         check("light-curve numbers", count as f64, whole, "whole frames, 1 or more")?;
         for [flux, sigma] in data.iter().flatten() {
             check("light-curve flux", *flux, flux.is_finite(), "finite numbers")?;
-            check("light-curve sigma", *sigma, *sigma > 0.0 && sigma.is_finite(), "above 0")?;
+            // The inverse square is one of single precision.
+            let ok = (1e-18..1e18).contains(sigma);
+            check("light-curve sigma", *sigma, ok, "1e-18 Jy to 1e18 Jy")?;
         }
         Ok(Self { parameters, correlations: vec![0.0; data.len() / parameters], data })
     }

@@ -4,7 +4,7 @@ use super::{FitData, Result};
 use crate::fit::settings::{Loss, LossKind};
 use kerrlight_vlbi::gains::GainPriors;
 use kerrlight_vlbi::noise::add_thermal_noise;
-use kerrlight_vlbi::observation::{Observation, Row};
+use kerrlight_vlbi::observation::{Basis, Observation, Row};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
@@ -24,6 +24,15 @@ impl FitData {
             add_thermal_noise(observation, seed);
             // Errors stay as they are stated: the noise alone is scaled.
             observation.rows.iter_mut().for_each(|row| scale(row, 1.0 / factor));
+            let loses_phases = |loss: &Loss| match loss.data {
+                LossKind::Amplitudes => true,
+                LossKind::Visibilities => self.gains.as_ref().is_some_and(|of| of.free_phases),
+                _ => false,
+            };
+            if losses.iter().any(loses_phases) {
+                let basis = observation.basis;
+                observation.rows.iter_mut().for_each(|row| debias(row, basis, factor));
+            }
             if let Some(priors) = &self.gains {
                 multiply_gains(observation, frames, priors, seed);
             }
@@ -51,6 +60,19 @@ impl FitData {
             }
         }
         Ok(copy)
+    }
+}
+
+/// Takes the power of the noise that was added off a row: where phases are lost, amplitudes of data with noise twice would be too
+/// large, since errors are stated for noise once.
+fn debias(row: &mut Row, basis: Basis, factor: f64) {
+    let Some(i) = row.stokes_i(basis) else { return };
+    let square = i.visibility.norm_sqr();
+    let left = square - (factor * i.noise_sigma).powi(2);
+    // A little is left, so that it has a phase.
+    let by = (left / square).max(1e-6).sqrt();
+    if by.is_finite() {
+        row.products.iter_mut().for_each(|product| *product *= by);
     }
 }
 
@@ -82,7 +104,8 @@ mod tests {
     use kerrlight_common::frames::Frames;
     use kerrlight_vlbi::Complex64;
     use kerrlight_vlbi::array::Station;
-    use kerrlight_vlbi::observation::{Basis, Measured};
+    use kerrlight_vlbi::observation::Measured;
+    use kerrlight_vlbi::products::debiased_amplitude;
 
     /// Gains of two stations of a prior of 0.3 scatter the amplitudes of a frame by √2 times as much, and σ with them.
     #[test]
@@ -103,6 +126,27 @@ mod tests {
         for row in &drawn.rows {
             assert!((row.noise_sigma[0] / row.products[0].norm() / 1e-9 - 1.0).abs() < 1e-6);
         }
+    }
+
+    /// Amplitudes of data with noise once more are about those of the data, at a signal to noise of 3 too.
+    #[test]
+    fn exact_noise_once_more_makes_no_amplitude_larger() {
+        let one = Measured { visibility: Complex64::new(3.0, 0.0), noise_sigma: 1.0 };
+        let row = Row::total_intensity(0.0, [0, 1], [1e9, 0.0], one);
+        let rows = 4000;
+        let observation =
+            Observation { rows: vec![row; rows], ..Observation::empty(Basis::Stokes) };
+        let visibilities = Some((observation, vec![0; rows]));
+        let data = FitData { visibilities, ..FitData::default() };
+        let mean = |losses: &[Loss]| {
+            let drawn = data.perturbed(losses, 1.0, 3).unwrap().visibilities.unwrap().0;
+            let all = drawn.stokes_i().map(|(_, i)| debiased_amplitude(&i));
+            all.sum::<f64>() / rows as f64
+        };
+        let amplitudes = mean(&[Loss::new(LossKind::Amplitudes)]);
+        assert!((amplitudes - debiased_amplitude(&one)).abs() < 0.08, "{amplitudes}");
+        // With phases nothing is lost: the noise stays what it is.
+        assert!(mean(&[Loss::new(LossKind::Visibilities)]) > debiased_amplitude(&one) + 0.1);
     }
 
     /// Sums of pixels scatter by the error of the total flux, pixels of images by their own.

@@ -345,10 +345,13 @@ fn judge_structure(term: usize, tested: &Tested, verdict: &mut Verdict) {
     if tested.errors == Errors::Stated {
         return;
     }
-    if let Some(correlation) = beyond(in_time.correlation(), expected.in_time, in_time.count()) {
+    // What is alike but smaller than the errors is no error of the model that data can tell.
+    let size = tested.statistics.chi2().unwrap_or(1.0).min(1.0);
+    let of = |pairs: &Pairs| pairs.correlation().map(|correlation| size * correlation);
+    if let Some(correlation) = beyond(of(in_time), expected.in_time, in_time.count()) {
         verdict.add(Outcome::Unexplained, Some(term), Fault::InTime(correlation));
     }
-    if let Some(correlation) = beyond(in_space.correlation(), 0.0, in_space.count()) {
+    if let Some(correlation) = beyond(of(in_space), 0.0, in_space.count()) {
         verdict.add(Outcome::Unexplained, Some(term), Fault::InSpace(correlation));
     }
     judge_groups(term, tested, verdict);

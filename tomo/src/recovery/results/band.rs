@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::fit::BackgroundDatum;
 use crate::fit::band::{Background, Band, Interval};
+use crate::fit::settings::BackgroundSettings;
 use crate::fit::setup::{self, BandGeometry, BandScan};
 use crate::null::or_nan;
 use crate::recovery::{Choice, Problem};
@@ -45,6 +46,8 @@ pub struct BandResults {
     pub ln_bayes_factor: Option<f64>,
     /// Background of the flare, where that is assumed.
     pub background: Option<Background>,
+    /// Settings at an end of which the background is: others beyond it may be more probable.
+    pub background_ends: Vec<String>,
     /// Expected background at all data.
     pub background_jy: Option<Vec<BackgroundDatum>>,
     /// χ² of the samples that were not fitted, over their number.
@@ -109,6 +112,7 @@ impl BandResults {
         let rate = setup::motion(file, Vec::new())?.velocity.rate(best.band.radius);
         let upwards = rate * file.motion.axis.map_or(1.0, |axis| axis[2]);
         let (radii, periods) = (radii(scan), periods(scan));
+        let tried = file.band.as_ref().and_then(|band| band.background.as_ref());
         Ok(Self {
             inclination_deg: median(&inclinations, Some(best.inclination_deg)),
             inclinations,
@@ -124,6 +128,11 @@ impl BandResults {
             periods: binned(&periods, BINS),
             ln_bayes_factor: scan.ln_bayes_factor,
             background: scan.background.is_some().then_some(best.band.background),
+            background_ends: scan
+                .background
+                .as_ref()
+                .and(tried)
+                .map_or_else(Vec::new, |tried| ends(tried, &best.band.background)),
             background_jy: scan.background.clone(),
             validation_chi2_per_datum: scan.validation,
             truth: TrueBand { inclination_deg: truth },
@@ -171,6 +180,21 @@ impl BandResults {
         let turns = self.rotation_factor.probabilities.iter();
         turns.filter(|[factor, _]| *factor > 0.0).map(|[_, share]| share).sum()
     }
+}
+
+/// The settings whose shortest time or largest variation a background has: what is faster or stronger looks like a flare.
+fn ends(tried: &BackgroundSettings, found: &Background) -> Vec<String> {
+    let least = tried.correlation_min.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = tried.variation_jy.iter().copied().fold(0.0, f64::max);
+    let are_lists = [&tried.correlation_min, &tried.variation_jy].map(|list| list.len() > 1);
+    let mut all = Vec::new();
+    if are_lists[0] && found.minutes == least {
+        all.push("band.background.correlation_min".to_owned());
+    }
+    if are_lists[1] && found.variation == most {
+        all.push("band.background.variation_jy".to_owned());
+    }
+    all
 }
 
 /// Shares of the probability of values, in their order.
@@ -302,6 +326,7 @@ fn azimuth(Interval { median, low, high }: Interval) -> Interval {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::linear::Roughness;
 
     #[test]
     fn exact_bins_hold_all_shares() {
@@ -309,6 +334,24 @@ mod tests {
         assert_eq!(bins, [[1.5, 0.5], [2.5, 0.5]]);
         assert_eq!(binned(&[[2.0, 1.0]], 3)[0][1], 1.0);
         assert!(binned(&[], 3).is_empty());
+    }
+
+    /// The shortest time and the largest variation of lists are ends of them; one value alone is known.
+    #[test]
+    fn exact_backgrounds_at_the_end_of_lists_are_named() {
+        let tried = |minutes: &[f64]| BackgroundSettings {
+            constant_jy: 0.1,
+            variation_jy: vec![0.0, 0.05],
+            correlation_min: minutes.to_vec(),
+            matern: vec![Roughness::Half],
+        };
+        let found = |minutes, variation| Background { minutes, variation, ..Background::NONE };
+        assert_eq!(
+            ends(&tried(&[20.0, 60.0]), &found(20.0, 0.0)),
+            ["band.background.correlation_min"]
+        );
+        assert_eq!(ends(&tried(&[20.0]), &found(20.0, 0.05)), ["band.background.variation_jy"]);
+        assert!(ends(&tried(&[20.0, 60.0]), &found(60.0, 0.0)).is_empty());
     }
 
     /// However many geometries have a period, it is known no better than the radii are apart.

@@ -19,6 +19,13 @@ impl BandResults {
         let truth = truth.map_or(String::new(), |truth| format!(" (truth: {truth:.1}°)"));
         let inclination = self.inclination_deg.interval;
         let mut all: Vec<String> = self.ln_against_background().map(flare).into_iter().collect();
+        if self.is_seen() == Some(true) && !self.background_ends.is_empty() {
+            all.push(format!(
+                "The most probable background is at an end of {}: a background that is faster or stronger looks like a flare. \
+                 Lengthen the list before you trust the flare.",
+                self.background_ends.join(" and of ")
+            ));
+        }
         all.extend([
             format!(
                 "The inclination is between {:.1}° and {:.1}° at 95 %, with a median of {:.1}°{truth}.",
@@ -158,7 +165,7 @@ mod tests {
         let curve = "probabilities = [[1.0, 1.0]]";
         let known = "median = 1.0\nlow = 1.0\nhigh = 1.0";
         let text = format!(
-            "inclinations = []\nradii = []\nperiods = []\ngeometries = [[20.0, 1.0, 0.0, 0.0]]
+            "background_ends = []\ninclinations = []\nradii = []\nperiods = []\ngeometries = [[20.0, 1.0, 0.0, 0.0]]
              [inclination_deg]\n{known}\n[radius]\n{known}\n[period_min]\n{known}
              [emission_radius]\n{known}\n[azimuth_deg]\n{known}\n[truth]
              [rotation_factor]\nbest = 1.0\n{curve}\n[position_angle_deg]\nbest = 0.0\n{curve}
