@@ -4,10 +4,11 @@ use super::{FitData, Result};
 use crate::fit::settings::{Loss, LossKind};
 use kerrlight_vlbi::gains::GainPriors;
 use kerrlight_vlbi::noise::add_thermal_noise;
-use kerrlight_vlbi::observation::{Basis, Observation, Row};
+use kerrlight_vlbi::observation::{Observation, Row};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
+use std::collections::{BTreeMap, BTreeSet};
 
 impl FitData {
     /// The data with noise once more, `factor` times as large as their errors: what might as well have been measured.
@@ -24,14 +25,9 @@ impl FitData {
             add_thermal_noise(observation, seed);
             // Errors stay as they are stated: the noise alone is scaled.
             observation.rows.iter_mut().for_each(|row| scale(row, 1.0 / factor));
-            let loses_phases = |loss: &Loss| match loss.data {
-                LossKind::Amplitudes => true,
-                LossKind::Visibilities => self.gains.as_ref().is_some_and(|of| of.free_phases),
-                _ => false,
-            };
-            if losses.iter().any(loses_phases) {
-                let basis = observation.basis;
-                observation.rows.iter_mut().for_each(|row| debias(row, basis, factor));
+            let amplitudes = losses.iter().any(|loss| loss.data == LossKind::Amplitudes);
+            if amplitudes || self.gains.as_ref().is_some_and(|of| of.free_phases) {
+                debias(observation, frames, factor, amplitudes);
             }
             if let Some(priors) = &self.gains {
                 multiply_gains(observation, frames, priors, seed);
@@ -63,16 +59,31 @@ impl FitData {
     }
 }
 
-/// Takes the power of the noise that was added off a row: where phases are lost, amplitudes of data with noise twice would be too
-/// large, since errors are stated for noise once.
-fn debias(row: &mut Row, basis: Basis, factor: f64) {
-    let Some(i) = row.stokes_i(basis) else { return };
-    let square = i.visibility.norm_sqr();
-    let left = square - (factor * i.noise_sigma).powi(2);
-    // A little is left, so that it has a phase.
-    let by = (left / square).max(1e-6).sqrt();
-    if by.is_finite() {
-        row.products.iter_mut().for_each(|product| *product *= by);
+/// Takes off rows the power of the noise that was added where it is not seen as such: amplitudes of data with noise twice would be
+/// too large, since errors are stated for noise once. Of amplitudes that is one of two parts of each; free phases of stations
+/// follow as many parts of a frame's noise as there are phases.
+fn debias(observation: &mut Observation, frames: &[usize], factor: f64, amplitudes: bool) {
+    let basis = observation.basis;
+    let mut seen: BTreeMap<usize, (BTreeSet<u16>, f64)> = BTreeMap::new();
+    for (row, frame) in observation.rows.iter().zip(frames) {
+        if row.stokes_i(basis).is_some() {
+            let (stations, rows) = seen.entry(*frame).or_default();
+            stations.extend(row.stations);
+            *rows += 1.0;
+        }
+    }
+    for (row, frame) in observation.rows.iter_mut().zip(frames) {
+        let (Some(i), Some((stations, rows))) = (row.stokes_i(basis), seen.get(frame)) else {
+            continue;
+        };
+        let part = if amplitudes { 1.0 } else { (stations.len() as f64 - 1.0) / rows };
+        let square = i.visibility.norm_sqr();
+        let left = square - part * (factor * i.noise_sigma).powi(2);
+        // A little is left, so that it has a phase.
+        let by = (left / square).max(1e-6).sqrt();
+        if by.is_finite() {
+            row.products.iter_mut().for_each(|product| *product *= by);
+        }
     }
 }
 
@@ -104,7 +115,7 @@ mod tests {
     use kerrlight_common::frames::Frames;
     use kerrlight_vlbi::Complex64;
     use kerrlight_vlbi::array::Station;
-    use kerrlight_vlbi::observation::Measured;
+    use kerrlight_vlbi::observation::{Basis, Measured};
     use kerrlight_vlbi::products::debiased_amplitude;
 
     /// Gains of two stations of a prior of 0.3 scatter the amplitudes of a frame by √2 times as much, and σ with them.
