@@ -151,6 +151,19 @@ impl Survey {
         self.calibrated(&|_, ring| ring.map(&number))
     }
 
+    /// Diameter of the ring in µas, likewise. Blurred by a beam of b, a ring of the diameter d has lost b²/(4 d ln 2) of it (EHT
+    /// Collaboration 2019, ApJL 875, L4, appendix G): where no shape explains the data, that of a beam as wide as the ring is part of
+    /// the error, since nothing says how much of its width is the array's.
+    pub fn ring_diameter(&self) -> Option<(f64, Option<f64>)> {
+        let (diameter, error) = self.ring_number(|ring| ring.diameter_uas)?;
+        let ring = self.found().ring.as_ref()?;
+        let blurred = match self.calibration().is_some_and(|known| known.explains) {
+            true => 0.0,
+            false => ring.width_uas.powi(2) / (4.0 * core::f64::consts::LN_2 * ring.diameter_uas),
+        };
+        Some((diameter, error.map(|error| error.hypot(blurred))))
+    }
+
     /// Direction in which its ring is brightest, degrees east of north, likewise: bright parts draw light to them that belongs elsewhere.
     /// Images of an even ring have any direction, and say nothing of that.
     pub fn ring_direction(&self) -> Option<(f64, Option<f64>)> {

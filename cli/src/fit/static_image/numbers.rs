@@ -18,6 +18,7 @@ pub const RING: [(&str, Number); 5] = [
 pub fn of_ring(survey: &Survey, ring: &Ring, name: &str, number: Number) -> (f64, Option<f64>) {
     let calibrated = match name {
         "ring_width_uas" => None,
+        "ring_diameter_uas" => survey.ring_diameter(),
         "ring_position_angle_deg" => survey.ring_direction(),
         _ => survey.ring_number(number),
     };

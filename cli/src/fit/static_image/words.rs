@@ -8,7 +8,7 @@ use crate::fit::results::medium;
 use crate::report::Part;
 use kerrlight_imaging::settings::{RingSettings, StartImage, StrengthSettings};
 use kerrlight_imaging::{
-    Calibration, Candidate, Envelope, MOST_CENTRAL, Profile, Ring, ShapeFit, Survey, best_shape,
+    Calibration, Candidate, Envelope, MOST_CENTRAL, Profile, ShapeFit, Survey, best_shape,
 };
 use kerrlight_tomo::fit::settings::LossKind;
 use kerrlight_tomo::fit::setup::told_end;
@@ -86,12 +86,12 @@ pub fn doubt(survey: &Survey, shapes: &[ShapeFit]) -> Option<String> {
         return Some(format!("{with} of {all} images that the data allow have one of this size"));
     }
     let ring = survey.found().ring?;
-    let of = |number: fn(&Ring) -> f64| survey.ring_number(number).unwrap_or((number(&ring), None));
-    let (diameter, error) = of(|ring| ring.diameter_uas);
+    let (diameter, error) = survey.ring_diameter().unwrap_or((ring.diameter_uas, None));
     if let Some(error) = error.filter(|error| diameter < LEAST_CERTAINTY * error) {
         return Some(format!("its diameter, {diameter:.0} ± {error:.0} µas, is not measured"));
     }
-    let (central, error) = of(|ring| ring.central_brightness);
+    let central = survey.ring_number(|ring| ring.central_brightness);
+    let (central, error) = central.unwrap_or((ring.central_brightness, None));
     if let Some(error) = error.filter(|error| central + error > MOST_CENTRAL) {
         return Some(format!(
             "its middle may be filled: {central:.2} ± {error:.2} as bright as it"
