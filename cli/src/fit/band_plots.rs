@@ -85,6 +85,7 @@ mod tests {
     fn exact_curves_and_loops_of_results() {
         let middle = json!({"best": 8.0, "median": 8.0, "low": 7.0, "high": 9.0});
         let results = json!({
+            "background_ends": [],
             "inclinations": [[10.0, 0.7], [20.0, 0.3]],
             "position_angle_deg": {"best": 0.0, "probabilities": [[0.0, 1.0]]},
             "rotation_factor": {"best": 1.0, "probabilities": [[1.0, 1.0]]},
