@@ -122,7 +122,8 @@ impl BandResults {
             radius: median(&radii, Some(best.band.radius)),
             radii,
             band: best.band,
-            emission_radius: scan.radius,
+            // A normal distribution may reach below the axis.
+            emission_radius: Interval { low: scan.radius.low.max(0.0), ..scan.radius },
             azimuth_deg: azimuth(scan.azimuth),
             period_min: median(&periods, None),
             periods: binned(&periods, BINS),

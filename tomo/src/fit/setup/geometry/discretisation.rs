@@ -1,6 +1,6 @@
 //! Errors of a geometry that the model of the fit makes: its voxels, its pixels, and its sums along rays.
 
-use super::detail::{Place, RaySampling};
+use super::detail::{MORE, Place, RaySampling};
 use super::refinement::finer;
 use super::search_data::SearchData;
 use super::seen_through;
@@ -32,7 +32,8 @@ pub(super) fn errors(
         let voxels = voxels(&standing, problem)?;
         let sums = sums(&standing, problem)?;
         let pixels = pixels(unknown, place, &standing, problem)?;
-        let refined: Vec<Refined> = [voxels, sums, pixels].into_iter().flatten().collect();
+        let ring = ring(place, &standing, problem)?;
+        let refined: Vec<Refined> = [voxels, sums, pixels, ring].into_iter().flatten().collect();
         Ok(ModelErrors { known: standing.errors(problem.free, &refined), left_out: None })
     })
 }
@@ -100,6 +101,21 @@ fn pixels(
         let model = GeometryModel { split: problem.model.split, ..finer.model.clone() };
         standing.refined(kind, &GeometryProblem { model: &model, ..*finer })
     })
+}
+
+/// Images of another program through more rays in the pixels near the critical curve, whose error falls as their number.
+fn ring(
+    Place { seen, at, even, .. }: &Place,
+    standing: &Standing,
+    problem: &GeometryProblem<'_, f32>,
+) -> Result<Option<Refined>> {
+    let more = at.rays.ringed().filter(|_| seen.is_images() && even.is_none());
+    let Some(rays) = more.filter(|_| problem.model.polarization.is_none()) else { return Ok(None) };
+    // The model has the panels of the search already, and `seen_through` multiplies them.
+    let rays = RaySampling { panels: 1, ..rays };
+    let model = seen_through(&seen.view.file, problem.model.clone(), rays)?;
+    let kind = Refinement { source: "rays of the photon ring", onwards: onwards(1.0, MORE as f64) };
+    standing.refined(kind, &GeometryProblem { model: &model, ..*problem })
 }
 
 /// Returns the ratio of endless refinement to a `finer`-fold one, where errors go with this power of the size of parts.

@@ -105,6 +105,16 @@ impl Detail<'_> {
         self.lowest(here, among, CLEAR)
     }
 
+    /// Four times as many rays in each pixel near the critical curve, where residuals point to them and χ²/2 becomes clearly lower: as many
+    /// unknowns explain more. Too few make ripples there, in which steps end and intervals miss the truth.
+    pub fn ringed(&self, here: &Solved) -> Result<Option<Solved>> {
+        let Place { at, seen, .. } = &here.place;
+        let is_open = self.has_open_rays(seen) && self.file.screen.ring_rays.is_none();
+        let Some(rays) = at.rays.ringed().filter(|_| is_open) else { return Ok(None) };
+        let among = self.pointed_to(here, vec![Resolution { rays, ..*at }], |_| CLEAR)?;
+        self.lowest(here, among, CLEAR)
+    }
+
     /// Returns whether the data are images and nobody has said which rays their pixels have.
     fn has_open_rays(&self, seen: &SearchData) -> bool {
         let screen = &self.file.screen;
@@ -186,6 +196,15 @@ mod tests {
         let here = detail.solved(detail.place(means, 1.0).unwrap(), known_geometry(&file)).unwrap();
         let matched = detail.matched(&here).unwrap();
         matched.map(|there| there.place.at.rays.per_side)
+    }
+
+    /// Pixels near the critical curve have 16, 64 and 256 rays, no more, and none of their own among samples.
+    #[test]
+    fn exact_rays_of_the_ring_grow() {
+        let means = RaySampling::default().denser();
+        let all: Vec<_> = core::iter::successors(Some(means), |rays| rays.ringed()).collect();
+        assert_eq!(all.iter().map(|rays| rays.ring).collect::<Vec<_>>(), [16, 64, 256].map(Some));
+        assert!(RaySampling::default().ringed().is_none());
     }
 
     /// Images of another program through an even lattice are told from means by the pixels that the photon ring crosses.

@@ -163,7 +163,11 @@ impl Detail<'_> {
             let most = if rays > 1 && even.is_none() { MOST } else { rays };
             let mut among = self.finer_sums(&here.place, most);
             among.extend(self.more_voxels(&here, even.as_ref())?);
-            let Some(there) = self.asked_for(&here, among)? else {
+            let there = match self.asked_for(&here, among)? {
+                None if even.is_none() => self.ringed(&here)?,
+                there => there,
+            };
+            let Some(there) = there else {
                 let even = even.map(|even| even.place.at.rays);
                 return Ok((Place { even, ..here.place }, best));
             };
