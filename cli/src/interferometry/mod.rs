@@ -20,8 +20,10 @@ pub fn read(path: &Path) -> anyhow::Result<Observation> {
     let decoded = files::decode(&output::read(path)?);
     let (_, mut observation) = decoded.with_context(|| path.display().to_string())?;
     let says = || format!("{} says FRCAL: 0", path.display());
-    if derotate(&mut observation).with_context(says)? {
-        eprintln!("note: {}: the rotation of feeds is taken out", says());
+    match derotate(&mut observation) {
+        Ok(true) => eprintln!("note: {}: the rotation of feeds is taken out", says()),
+        Ok(false) => {}
+        Err(error) => eprintln!("warning: {}, and the rotation of feeds stays: {error}", says()),
     }
     Ok(observation)
 }

@@ -52,10 +52,10 @@ pub fn files(argument: &Path) -> anyhow::Result<Vec<PathBuf>> {
         names.extend(name.to_str().filter(|name| pattern.fits(name)).map(str::to_owned));
     }
     names.sort_by_cached_key(|name| numbered(name));
-    if pattern.digits {
-        pattern.no_gaps(&names)?;
+    match pattern.digits {
+        true => pattern.no_gaps(&names)?,
+        false => check_order(&names)?,
     }
-    check_order(&names)?;
     if names.is_empty() {
         bail!("{shown}: there are no files {}*{}", pattern.start, pattern.end);
     }
@@ -118,7 +118,10 @@ pub fn sort_by_numbers(files: &mut [PathBuf]) {
     let differs = |k: &usize| names.iter().any(|name| name[*k].0 != first[*k].0);
     if let [only] = (0..first.len()).filter(differs).collect::<Vec<_>>()[..] {
         let is_decimal = only > 1 && first[only - 1].1 == ".";
-        if !is_decimal {
+        let name = |file: &PathBuf| file.to_string_lossy().into_owned();
+        let mut sorted: Vec<String> = files.iter().map(name).collect();
+        sorted.sort_by_cached_key(|name| numbered(name));
+        if !is_decimal && check_order(&sorted).is_ok() {
             files.sort_by_cached_key(|file| numbered(&file.to_string_lossy()));
         }
     }
@@ -155,7 +158,7 @@ fn check_order(names: &[String]) -> anyhow::Result<()> {
     };
     match names.windows(2).find(is_other) {
         Some([a, b]) => bail!(
-            "{a}, {b}: their order is not known, since numbers may have decimals or signs; give the files one by one"
+            "{a}, {b}: their order is not known, since numbers may have decimals or signs: number them from 0 on, or give the files one by one to `observe`"
         ),
         _ => Ok(()),
     }
@@ -343,9 +346,13 @@ mod tests {
         }
         for pattern in ["t_*.exr", "s_*.exr"] {
             let error = files(&path.join(pattern)).unwrap_err().to_string();
-            assert!(error.contains("give the files one by one"), "{error}");
+            assert!(error.contains("number them from 0 on"), "{error}");
         }
         assert_eq!(names("u_*.exr"), ["u_1.EXR", "u_2.exr"]);
+        assert_eq!(names("s_-%d.exr"), ["s_-1.exr", "s_-2.exr"]);
+        let mut given = ["s_-2.exr", "s_-1.exr"].map(PathBuf::from);
+        sort_by_numbers(&mut given);
+        assert_eq!(given, ["s_-2.exr", "s_-1.exr"].map(PathBuf::from));
         let numbers = decimals("v2.run-3_-4.50.exr");
         assert_eq!(numbers, (vec![2.0, 3.0, -4.5], "v.run-_.exr".to_owned()));
         assert!(files(&path.join("h_*.exr")).unwrap_err().to_string().contains("no files h_*.exr"));

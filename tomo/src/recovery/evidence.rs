@@ -128,7 +128,9 @@ impl Evidence<'_> {
             // |V|² has the variance 4 σ² (F² + σ²).
             variance += weight * flux * flux + 1.0;
         }
-        let [measured_jy, model_jy] = squares.map(|sum| (sum / weights).max(0.0).sqrt());
+        // NaN stays what it is.
+        let root = |sum: f64| if sum < 0.0 { 0.0 } else { (sum / weights).sqrt() };
+        let [measured_jy, model_jy] = squares.map(root);
         let error_jy = variance.sqrt() / (weights * model_jy.max(weights.powf(-0.5)));
         Ok((count > 0).then_some(ZeroSpacing { measured_jy, error_jy, model_jy, count }))
     }

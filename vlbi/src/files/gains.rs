@@ -1,6 +1,6 @@
 //! Tables of station gains: a station at a time a line, columns told by a line of names.
 
-use super::{FileError, between, number};
+use super::{FileError, between, number, over_midnight};
 use crate::Complex64;
 use crate::Error;
 use crate::gains::{GainTable, StationGain};
@@ -75,6 +75,7 @@ pub fn parse(text: &str) -> Result<GainTable, Error> {
     if gains.is_empty() {
         return Err(FileError::whole("no gains").into());
     }
+    over_midnight(&mut gains, |gain| &mut gain.time_h);
     gains.sort_by(|a: &StationGain, b: &StationGain| a.time_h.total_cmp(&b.time_h));
     Ok(GainTable { gains })
 }

@@ -101,7 +101,8 @@ impl Heading {
             let shared = ["sigma", "err", "error", "flux_err", "flux_error"].map(str::to_owned);
             any(&all).or_else(|| any(&shared))
         };
-        let sigmas = StokesParameter::ALL.map(&mut error);
+        let sigmas = StokesParameter::ALL
+            .map(|parameter| values[parameter.index()].and_then(|_| error(parameter)));
         values.iter().any(Option::is_some).then_some(())?;
         Some(Heading {
             count: names.len(),
@@ -345,6 +346,9 @@ pub fn parse_times(text: &str) -> Result<Vec<f64>, Error> {
     }
     if times.is_empty() {
         return Err(FileError::whole("no times").into());
+    }
+    if column.is_some_and(|(found, ..)| found.unit == TimeUnit::Hours) {
+        over_midnight(&mut times, |time| time);
     }
     Ok(times)
 }

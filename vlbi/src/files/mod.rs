@@ -144,8 +144,16 @@ fn has_tabs(line: &str, names: usize) -> bool {
 /// # Errors
 /// If blanks separate cells and some are missing: it is not known which.
 fn cells_below(line: &str, names: usize, tabs: bool) -> Result<Vec<&str>, String> {
-    if tabs && !line.contains(',') {
-        return Ok(between('\t', line));
+    if tabs && !line.contains(',') && line.contains('\t') {
+        let mut cells = between('\t', line);
+        // Tabs at the ends of a line stand beside no column.
+        while cells.len() > names && cells.last() == Some(&"") {
+            cells.pop();
+        }
+        if cells.len() > names && cells.first() == Some(&"") {
+            cells.remove(0);
+        }
+        return Ok(cells);
     }
     let cells = cells(line);
     if cells.len() < names && !line.contains(',') {

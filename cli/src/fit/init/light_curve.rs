@@ -127,8 +127,13 @@ fn mass(source: Option<&Source>) -> String {
 fn background(scatter: f64, curve: &LightCurve) -> String {
     let hours = |k: Option<&Sample>| k.map_or(0.0, |sample| sample.time_h);
     let span = 60.0 * (hours(curve.samples.last()) - hours(curve.samples.first())).max(1.0 / 60.0);
-    let least = 2.0 * span / (curve.samples.len().max(2) - 1) as f64;
-    let times = core::iter::successors(Some(least), |time| (*time < span).then_some(3.0 * time));
+    let apart = curve.samples.windows(2).map(|pair| 60.0 * (pair[1].time_h - pair[0].time_h));
+    let mut steps: Vec<f64> = apart.filter(|step| *step > 0.0).collect();
+    steps.sort_by(f64::total_cmp);
+    let least = 2.0 * steps.get(steps.len() / 2).copied().unwrap_or(span);
+    let times = core::iter::successors(Some(least.min(span)), |time| {
+        (*time < span).then(|| (3.0 * time).min(span))
+    });
     let times = times.map(digits).collect::<Vec<_>>().join(", ");
     let constant = digits(scatter);
     let variations = [0.2, 0.5, 1.0].map(|part| digits(part * scatter)).join(", ");

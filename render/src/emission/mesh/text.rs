@@ -20,8 +20,12 @@ impl Line<'_> {
     /// Returns the text after the first word, up to a comment.
     pub fn rest(&self) -> &str {
         let rest = self.text.split_once(char::is_whitespace).map_or("", |(_, rest)| rest.trim());
-        let comment = rest.match_indices('#').map(|(at, _)| at);
-        let mut comment = comment.filter(|at| rest[..*at].ends_with(char::is_whitespace));
+        // `Material #1` is a name.
+        let is_comment = |at: &usize| {
+            rest[..*at].ends_with(char::is_whitespace)
+                && rest[at + 1..].chars().next().is_none_or(char::is_whitespace)
+        };
+        let mut comment = rest.match_indices('#').map(|(at, _)| at).filter(is_comment);
         comment.next().map_or(rest, |at| rest[..at].trim())
     }
 

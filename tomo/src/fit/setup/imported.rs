@@ -184,6 +184,13 @@ impl Reduction {
         check_rows(&observation).within(name)?;
         let mut observation = observation;
         derotate(&mut observation).within(name)?;
+        // Stokes parameters of each row do not tell how they were made.
+        let turns = observation.history.iter().any(|line| line == "FRCAL: 0");
+        if turns && is_polarized(losses) {
+            refuse!(
+                "{name} says FRCAL: 0, and has Stokes parameters: give the products of the feeds, whose rotation can be taken out"
+            );
+        }
         if !is_polarized(losses) {
             // Rows without Stokes I take no part in its times and (u, v).
             let basis = observation.basis;

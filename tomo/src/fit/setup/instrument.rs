@@ -228,7 +228,7 @@ pub(super) fn ring(file: &FitFile) -> Result<Option<RingRays>> {
         None => return Ok(None),
     };
     // Nodes of a pixel's rays are one list: each ray would dim the next.
-    if absorbs {
+    if absorbs && count > 1 {
         refuse!("screen.ring_rays and effects.absorption exclude each other");
     }
     Ok((count > 1).then_some(RingRays { count, spacing: spacing(&file.screen)?, lattice: 0 }))

@@ -76,7 +76,9 @@ fn debias(observation: &mut Observation, frames: &[usize], factor: f64, amplitud
         let (Some(i), Some((stations, rows))) = (row.stokes_i(basis), seen.get(frame)) else {
             continue;
         };
-        let part = if amplitudes { 1.0 } else { (stations.len() as f64 - 1.0) / rows };
+        // No more than all, where baselines are not connected.
+        let phases = ((stations.len() as f64 - 1.0) / rows).min(1.0);
+        let part = if amplitudes { 1.0 } else { phases };
         let square = i.visibility.norm_sqr();
         let left = square - part * (factor * i.noise_sigma).powi(2);
         // A little is left, so that it has a phase.

@@ -3,6 +3,7 @@
 use super::drawn::{FINER, OtherModel, binned, fine_images, is_drawn, is_drawn_elsewhere};
 use super::gains;
 use super::imported::even_times;
+use super::instrument::ring;
 use super::leakage;
 use super::light_curve;
 use super::observed::{Spoiled, schedule_of, spoil};
@@ -32,8 +33,8 @@ impl FitData {
         }
         let mut seen = simulated.clone();
         if is_drawn(file) {
-            let rays = &mut seen.screen.ring_rays;
-            *rays = rays.map(|rays| (DENSER * rays).min(MOST_RAYS));
+            let rays = ring(&seen)?.map(|rays| (DENSER * rays.count).min(MOST_RAYS));
+            seen.screen.ring_rays = rays.or(seen.screen.ring_rays);
         }
         let instrument = Instrument::new(&seen).within("simulation")?;
         simulate(&simulated, file, &instrument, array, None)

@@ -347,11 +347,14 @@ fn judge_structure(term: usize, tested: &Tested, verdict: &mut Verdict) {
     }
     // What is alike but smaller than the errors is no error of the model that data can tell.
     let size = tested.statistics.chi2().unwrap_or(1.0).min(1.0);
-    let of = |pairs: &Pairs| pairs.correlation().map(|correlation| size * correlation);
-    if let Some(correlation) = beyond(of(in_time), expected.in_time, in_time.count()) {
+    let alike = |pairs: &Pairs, expected: f64| {
+        let allowed = (CHANCE / (pairs.count().max(1) as f64).sqrt()).max(STRUCTURE);
+        pairs.correlation().filter(|value| size * (value - expected).abs() > allowed)
+    };
+    if let Some(correlation) = alike(in_time, expected.in_time) {
         verdict.add(Outcome::Unexplained, Some(term), Fault::InTime(correlation));
     }
-    if let Some(correlation) = beyond(of(in_space), 0.0, in_space.count()) {
+    if let Some(correlation) = alike(in_space, 0.0) {
         verdict.add(Outcome::Unexplained, Some(term), Fault::InSpace(correlation));
     }
     judge_groups(term, tested, verdict);

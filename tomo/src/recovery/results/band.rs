@@ -189,10 +189,10 @@ fn ends(tried: &BackgroundSettings, found: &Background) -> Vec<String> {
     let most = tried.variation_jy.iter().copied().fold(0.0, f64::max);
     let are_lists = [&tried.correlation_min, &tried.variation_jy].map(|list| list.len() > 1);
     let mut all = Vec::new();
-    if are_lists[0] && found.minutes == least {
+    if are_lists[0] && found.variation > 0.0 && found.minutes == least {
         all.push("band.background.correlation_min".to_owned());
     }
-    if are_lists[1] && found.variation == most {
+    if are_lists[1] && found.variation > 0.0 && found.variation == most {
         all.push("band.background.variation_jy".to_owned());
     }
     all
@@ -348,11 +348,12 @@ mod tests {
         };
         let found = |minutes, variation| Background { minutes, variation, ..Background::NONE };
         assert_eq!(
-            ends(&tried(&[20.0, 60.0]), &found(20.0, 0.0)),
+            ends(&tried(&[20.0, 60.0]), &found(20.0, 0.02)),
             ["band.background.correlation_min"]
         );
         assert_eq!(ends(&tried(&[20.0]), &found(20.0, 0.05)), ["band.background.variation_jy"]);
-        assert!(ends(&tried(&[20.0, 60.0]), &found(60.0, 0.0)).is_empty());
+        assert!(ends(&tried(&[20.0, 60.0]), &found(60.0, 0.02)).is_empty());
+        assert!(ends(&tried(&[1.0, 60.0]), &Background::NONE).is_empty());
     }
 
     /// However many geometries have a period, it is known no better than the radii are apart.

@@ -140,7 +140,7 @@ pub fn ahead_h(units: &[Unit<'_>], mjd: i32) -> Result<f64, FileError> {
                 }
                 _ => return Err(unit.header.error(keyword, "UTC, TAI or IAT")),
             };
-            let is_of_table = keyword == "TIMSYS" && name == "AIPS AN";
+            let is_of_table = keyword == "TIMSYS" && name == "AIPS AN" && !system.is_empty();
             if is_of_table && *of_tables.get_or_insert(is_utc) != is_utc {
                 return Err(unit.header.error(keyword, "that of the AIPS AN table before"));
             }

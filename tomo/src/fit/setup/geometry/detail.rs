@@ -41,9 +41,9 @@ pub struct RaySampling {
     pub lattice: u64,
 }
 
-/// Factor on the rays of pixels near the critical curve, and the most of them.
+/// Factor on the rays of pixels near the critical curve, and the most of them in a search.
 pub(super) const MORE: usize = 4;
-const MOST_RING: usize = 256;
+pub(super) const MOST_RING: usize = 256;
 
 impl RaySampling {
     /// Means over twice as many rays along each side.
@@ -51,10 +51,9 @@ impl RaySampling {
         Self { per_side: 2 * self.per_side, ring: self.ring.or(Some(RING_RAYS)), ..self }
     }
 
-    /// Four times as many rays in pixels near the critical curve, if these have rays of their own and not too many.
+    /// Four times as many rays in pixels near the critical curve, if these have rays of their own.
     pub fn ringed(self) -> Option<Self> {
-        let count = self.ring.map(|count| MORE * count).filter(|count| *count <= MOST_RING)?;
-        Some(Self { ring: Some(count), ..self })
+        Some(Self { ring: Some(MORE * self.ring?), ..self })
     }
 }
 

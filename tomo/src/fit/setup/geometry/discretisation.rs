@@ -109,8 +109,10 @@ fn ring(
     standing: &Standing,
     problem: &GeometryProblem<'_, f32>,
 ) -> Result<Option<Refined>> {
-    let more = at.rays.ringed().filter(|_| seen.is_images() && even.is_none());
-    let Some(rays) = more.filter(|_| problem.model.polarization.is_none()) else { return Ok(None) };
+    // Rays that somebody has asked for stay.
+    let is_open = seen.view.file.screen.ring_rays.is_none() && even.is_none();
+    let is_plain = seen.is_images() && problem.model.polarization.is_none();
+    let Some(rays) = at.rays.ringed().filter(|_| is_open && is_plain) else { return Ok(None) };
     // The model has the panels of the search already, and `seen_through` multiplies them.
     let rays = RaySampling { panels: 1, ..rays };
     let model = seen_through(&seen.view.file, problem.model.clone(), rays)?;

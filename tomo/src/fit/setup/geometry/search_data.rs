@@ -38,7 +38,7 @@ const SETTLING: usize = 6;
 impl SearchData {
     /// Prepares a search all over: volumes are told apart by a few iterations, through single rays.
     pub fn coarsely(file: &FitFile, measured: &FitData, view: &SearchView) -> Result<Self> {
-        let screen = Screen { ring_rays: None, samples_per_pixel: None, ..file.screen.clone() };
+        let screen = Screen { ring_rays: Some(1), samples_per_pixel: None, ..file.screen.clone() };
         Self::new(&FitFile { screen, ..file.clone() }, measured, view, 0)
     }
 
