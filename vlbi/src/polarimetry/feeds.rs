@@ -34,6 +34,11 @@ fn known(line: &str, name: &str) -> Option<FeedRotation> {
 /// What eht-imaging says of products that turn with the feeds.
 const TURNING: &str = "FRCAL: 0";
 
+/// Returns whether the history says that products turn with the feeds.
+pub fn is_turning(observation: &Observation) -> bool {
+    observation.history.iter().any(|line| line == TURNING)
+}
+
 /// Takes the rotation of feeds out of products of circular feeds that the history says have it (`FRCAL: 0`), and says so there:
 /// of RR the factor is e^{i(φ₁ − φ₂)}, of RL e^{i(φ₁ + φ₂)} (Smirnov 2011, A&A 527, A106). Only then is their mean Stokes I.
 /// Returns whether it was there.
@@ -41,8 +46,7 @@ const TURNING: &str = "FRCAL: 0";
 /// # Errors
 /// If the rotation is there and [`turns`] fails.
 pub fn derotate(observation: &mut Observation) -> Result<bool, Error> {
-    let is_turning = |line: &String| line == TURNING;
-    if observation.basis != Basis::Circular || !observation.history.iter().any(is_turning) {
+    if observation.basis != Basis::Circular || !is_turning(observation) {
         return Ok(false);
     }
     let angles = angles(observation)?;
@@ -50,7 +54,7 @@ pub fn derotate(observation: &mut Observation) -> Result<bool, Error> {
         let by = [a - b, b - a, a + b, -(a + b)].map(Complex64::cis);
         row.products.iter_mut().zip(by).for_each(|(product, by)| *product *= by);
     }
-    observation.history.retain(|line| !is_turning(line));
+    observation.history.retain(|line| line != TURNING);
     observation.history.push("rotation of feeds taken out".to_owned());
     Ok(true)
 }

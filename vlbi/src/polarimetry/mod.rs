@@ -7,7 +7,7 @@ mod problem;
 mod products;
 mod table;
 
-pub use feeds::{derotate, feed_rotation, published_rotation, turns};
+pub use feeds::{derotate, feed_rotation, is_turning, published_rotation, turns};
 pub use jones::{Leakage, SharedLeakage, jones, leaked, response};
 pub use problem::{LeakageDatum, LeakageProblem, LeakageSolution};
 pub use products::{Product, Products};

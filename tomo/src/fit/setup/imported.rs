@@ -16,7 +16,7 @@ use kerrlight_common::units::MICROARCSECOND;
 use kerrlight_vlbi::noise::{ScatteringKernel, unscatter};
 use kerrlight_vlbi::observation::Observation;
 use kerrlight_vlbi::operator::ImageGrid;
-use kerrlight_vlbi::polarimetry::derotate;
+use kerrlight_vlbi::polarimetry::{derotate, is_turning};
 
 /// Advice where there are no data.
 pub(super) const FILE: &str = "a table [data.visibilities] or [data.movie] with `path = \"FILE\"` (`kerrlight fit --init FILE` writes \
@@ -185,8 +185,7 @@ impl Reduction {
         let mut observation = observation;
         derotate(&mut observation).within(name)?;
         // Stokes parameters of each row do not tell how they were made.
-        let turns = observation.history.iter().any(|line| line == "FRCAL: 0");
-        if turns && is_polarized(losses) {
+        if is_turning(&observation) && is_polarized(losses) {
             refuse!(
                 "{name} says FRCAL: 0, and has Stokes parameters: give the products of the feeds, whose rotation can be taken out"
             );

@@ -43,7 +43,7 @@ pub struct RaySampling {
 
 /// Factor on the rays of pixels near the critical curve, and the most of them in a search.
 pub(super) const MORE: usize = 4;
-pub(super) const MOST_RING: usize = 256;
+const MOST_RING: usize = 256;
 
 impl RaySampling {
     /// Means over twice as many rays along each side.
@@ -54,6 +54,11 @@ impl RaySampling {
     /// Four times as many rays in pixels near the critical curve, if these have rays of their own.
     pub fn ringed(self) -> Option<Self> {
         Some(Self { ring: Some(MORE * self.ring?), ..self })
+    }
+
+    /// The same, up to the most of a search.
+    pub fn grown(self) -> Option<Self> {
+        self.ringed().filter(|more| more.ring <= Some(MOST_RING))
     }
 }
 

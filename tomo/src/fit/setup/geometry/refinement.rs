@@ -1,6 +1,6 @@
 //! Models as fine as data of another program ask for: more voxels, rays of a pixel, pixels, and panels of a ray.
 
-use super::detail::{Detail, MOST_RING, Place, RaySampling, Resolution};
+use super::detail::{Detail, Place, RaySampling, Resolution};
 use super::search_data::SearchData;
 use crate::fit::geometry::{Estimate, Geometry, GeometryProblem};
 use crate::fit::linear::{Voxels, refined};
@@ -110,9 +110,7 @@ impl Detail<'_> {
     pub fn ringed(&self, here: &Solved) -> Result<Option<Solved>> {
         let Place { at, seen, .. } = &here.place;
         let is_open = self.has_open_rays(seen) && self.file.screen.ring_rays.is_none();
-        let are_few = |rays: &RaySampling| rays.ring <= Some(MOST_RING);
-        let rays = at.rays.ringed().filter(are_few);
-        let Some(rays) = rays.filter(|_| is_open) else { return Ok(None) };
+        let Some(rays) = at.rays.grown().filter(|_| is_open) else { return Ok(None) };
         let among = self.pointed_to(here, vec![Resolution { rays, ..*at }], |_| CLEAR)?;
         self.lowest(here, among, CLEAR)
     }
@@ -204,8 +202,7 @@ mod tests {
     #[test]
     fn exact_rays_of_the_ring_grow() {
         let means = RaySampling::default().denser();
-        let more = |rays: &RaySampling| rays.ringed().filter(|more| more.ring <= Some(MOST_RING));
-        let all: Vec<_> = core::iter::successors(Some(means), more).collect();
+        let all: Vec<_> = core::iter::successors(Some(means), |rays| rays.grown()).collect();
         assert_eq!(all.iter().map(|rays| rays.ring).collect::<Vec<_>>(), [16, 64, 256].map(Some));
         assert!(RaySampling::default().ringed().is_none());
     }
